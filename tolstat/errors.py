@@ -1,0 +1,60 @@
+"""Errors that a user can cause, with where, what was found, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of an input.
+
+    Attributes
+    ----------
+    place : str
+        Where: the file, and the key path in it (``"study.toml: tolerances.pin1.offset_t"``).
+    found : str
+        What is wrong, with the value found.
+    remedy : str
+        What to write or to do instead.
+    """
+
+    place: str
+    found: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.found}\n  hint: {self.remedy}"
+
+
+class TolstatError(Exception):
+    """Base of the errors that a user can mend; the command line ends with exit code 2."""
+
+
+class InputError(TolstatError):
+    """An input file or an option with one or more faults, all of them listed at once.
+
+    Parameters
+    ----------
+    faults : sequence of Fault
+        Every fault found, in the order of the file.
+    """
+
+    def __init__(self, faults: list[Fault] | tuple[Fault, ...]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+
+@contextmanager
+def gather(faults: list[Fault]) -> Iterator[None]:
+    """Add the faults of an `InputError` raised inside to `faults` and go on, so that all are told at once."""
+    try:
+        yield
+    except InputError as error:
+        faults.extend(error.faults)
+
+
+class StoreError(TolstatError):
+    """A result file that cannot be used as asked: not ours, too new, of another study, or locked."""

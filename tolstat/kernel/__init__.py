@@ -1,0 +1,1 @@
+"""Jitted mechanics on plain arrays: no units, no files, no Python objects, failures as a status."""

@@ -1,0 +1,66 @@
+"""The one ``njit`` of the kernel, and where its compiled code is cached.
+
+Numba's cache notices an edit in the file of a cached function, but not in a file whose functions it calls. The
+cache directory therefore carries a hash of all kernel sources: code compiled from other sources is out of reach.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+
+
+def source_hash() -> str:
+    """Hash of everything that compiled kernels depend on: the kernel's sources and the tables' layout."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in [*sorted(here.glob("*.py")), here.parent / "tables.py"]:
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_directory() -> str:
+    """Directory of compiled kernels: ``NUMBA_CACHE_DIR`` if set, else one in the user's cache."""
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return str(config.CACHE_DIR)
+    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    path = root / "tolstat" / f"kernel-{source_hash()}"
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        if os.access(path, os.W_OK):
+            return str(path)
+    except OSError:
+        pass  # a read-only home: compile into the temporary directory instead
+    path = Path(tempfile.gettempdir()) / f"tolstat-{os.getuid()}-kernel-{source_hash()}"
+    path.mkdir(parents=True, exist_ok=True)
+    return str(path)
+
+
+CACHE_DIRECTORY = cache_directory()
+
+
+def njit(function: Callable[..., Any]) -> Any:
+    """Compile `function` as every kernel is compiled, and keep the code on disk.
+
+    No ``fastmath``: it removes the checks for NaN. No ``parallel``: processes share the work.
+    """
+    before = config.CACHE_DIR
+    # read when a function is decorated; other users' functions in this process keep their own directory
+    config.CACHE_DIR = CACHE_DIRECTORY
+    try:
+        return numba.njit(cache=True, error_model="numpy", fastmath=False)(function)
+    finally:
+        config.CACHE_DIR = before
+
+
+def closure(function: Callable[..., Any]) -> Any:
+    """Compile a function made by a factory; it is cached with the entry point that calls it."""
+    return numba.njit(error_model="numpy", fastmath=False)(function)

@@ -1,0 +1,71 @@
+"""Vectors of three as tuples: they live in registers and nothing is allocated."""
+
+from tolstat.kernel._jit import njit
+
+
+@njit
+def add(a, b):
+    """Return a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@njit
+def sub(a, b):
+    """Return a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@njit
+def scale(s, a):
+    """Return s a."""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@njit
+def axpy(s, a, b):
+    """Return s a + b."""
+    return (s * a[0] + b[0], s * a[1] + b[1], s * a[2] + b[2])
+
+
+@njit
+def dot(a, b):
+    """Return the scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit
+def cross(a, b):
+    """Return the vector product a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@njit
+def row(matrix, i):
+    """Row `i` of an (n, 3) array."""
+    return (matrix[i, 0], matrix[i, 1], matrix[i, 2])
+
+
+@njit
+def put(matrix, i, a):
+    """Write `a` to row `i` of an (n, 3) array."""
+    matrix[i, 0], matrix[i, 1], matrix[i, 2] = a
+
+
+@njit
+def turn(matrices, i, a):
+    """Return A a, A being matrix `i` of an (n, 3, 3) array."""
+    return (
+        matrices[i, 0, 0] * a[0] + matrices[i, 0, 1] * a[1] + matrices[i, 0, 2] * a[2],
+        matrices[i, 1, 0] * a[0] + matrices[i, 1, 1] * a[1] + matrices[i, 1, 2] * a[2],
+        matrices[i, 2, 0] * a[0] + matrices[i, 2, 1] * a[1] + matrices[i, 2, 2] * a[2],
+    )
+
+
+@njit
+def turn_back(matrices, i, a):
+    """Return A^T a, A being matrix `i` of an (n, 3, 3) array."""
+    return (
+        matrices[i, 0, 0] * a[0] + matrices[i, 1, 0] * a[1] + matrices[i, 2, 0] * a[2],
+        matrices[i, 0, 1] * a[0] + matrices[i, 1, 1] * a[1] + matrices[i, 2, 1] * a[2],
+        matrices[i, 0, 2] * a[0] + matrices[i, 1, 2] * a[1] + matrices[i, 2, 2] * a[2],
+    )

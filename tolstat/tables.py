@@ -1,0 +1,265 @@
+"""The tables that every stage reads and writes: row i is joint i in each of them.
+
+A table is described by a tuple of `Field`; from it come the NumPy dtype that the kernel works on, the
+columns of the result file and the columns of every CSV. SI units throughout.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
+PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
+HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
+MAX_STATIONS = 16
+"""Most contact stations that one pin can have (``contact.law = "sliced"``)."""
+
+
+class Status(IntEnum):
+    """What became of a joint. ``PENDING`` is the fill value of a new file: the file is the to-do list."""
+
+    PENDING = 0
+    OK = 1
+    NOT_SETTLED = 2
+    NEWTON_FAILED = 3
+    NOT_FINITE = 4
+    OUTSIDE_MODEL = 5
+
+    @property
+    def label(self) -> str:
+        """Name as it is written to the user: ``"not_settled"``."""
+        return self.name.lower()
+
+
+STATUS_TEXT = {
+    Status.PENDING: "not simulated yet",
+    Status.OK: "settled; results valid",
+    Status.NOT_SETTLED: "closure error above solver.settle_tol after solver.max_revs; results of the last revolution",
+    Status.NEWTON_FAILED: "a step failed at the smallest sub-step; results are NaN",
+    Status.NOT_FINITE: "the solution overflowed; results are NaN",
+    Status.OUTSIDE_MODEL: "negative clearance (an interference fit has no contact law here); results are NaN",
+}
+
+
+class Law(IntEnum):
+    """Contact law (model, section 5)."""
+
+    UNIFORM = 0
+    POINT = 1
+    MODE = 2
+    SLICED = 3
+
+
+class Method(IntEnum):
+    """Time integration method."""
+
+    BDF2 = 0
+    GENERALIZED_ALPHA = 1
+
+
+class Start(IntEnum):
+    """How a joint is started: torque ramp from the ideal pose, or from static equilibrium at theta = 0."""
+
+    RAMP = 0
+    STATIC = 1
+
+
+class Mode(IntEnum):
+    """Contact mode of a pin (Cirelli et al. 2021, Figure 3)."""
+
+    NONE = 0
+    ONE_POINT = 1
+    TWO_POINT = 2
+    UNIFORM = 3
+
+
+class Field(NamedTuple):
+    """One column, or a small array of columns, of a table.
+
+    Attributes
+    ----------
+    name : str
+        Identifier, the same from TOML key to file and CSV header.
+    unit : str
+        SI unit, ``"1"`` for a pure number.
+    description : str
+        One sentence for the reader of the file.
+    dtype : str
+        NumPy scalar type.
+    shape : tuple of int
+        ``()`` for a scalar column.
+    """
+
+    name: str
+    unit: str
+    description: str
+    dtype: str = "f8"
+    shape: tuple[int, ...] = ()
+
+
+class Options(NamedTuple):
+    """Numerical settings of the solver, the same for every joint of a campaign; see `study.Solver`."""
+
+    method: int = Method.BDF2
+    start: int = Start.STATIC
+    steps_per_rev: int = 180
+    max_revs: int = 20
+    settle_tol: float = 1e-4
+    newton_tol: float = 1e-6
+    newton_max_iter: int = 12
+    max_halvings: int = 10
+    rho_inf: float = 0.8
+
+
+def dtype_of(fields: tuple[Field, ...]) -> np.dtype[np.void]:
+    """Aligned structured dtype of a table."""
+    return np.dtype([(f.name, f.dtype, f.shape) for f in fields], align=True)
+
+
+def _error_fields() -> tuple[Field, ...]:
+    fields = []
+    for feature in PINS + HOLES:
+        kind = "pin" if feature.startswith("pin") else "hole"
+        for axis in "etz":
+            text = f"position error of the {kind} axis along {axis}"
+            fields.append(Field(f"{feature}.offset_{axis}", "m", text))
+        for axis in "tz":
+            fields.append(
+                Field(f"{feature}.tilt_{axis}", "rad", f"angular error of the {kind} axis about {axis}")
+            )
+        fields.append(Field(f"{feature}.diameter", "m", f"deviation of the {kind}'s diameter from nominal"))
+    fields += [
+        Field("operation.alpha", "rad", "misalignment of the shafts"),
+        Field("operation.speed", "rad/s", "angular velocity of the input shaft"),
+        Field("operation.torque", "N*m", "resisting torque on the output shaft"),
+        Field(
+            "material.E_factor",
+            "1",
+            "factor on Young's modulus: bushings, their damping, contact coefficients",
+        ),
+    ]
+    return tuple(fields)
+
+
+ERROR_FIELDS = _error_fields()
+"""Manufacturing errors (deviations from nominal, zero for the nominal joint) and the operating point's values."""
+
+PARAM_FIELDS = (
+    Field("alpha", "rad", "misalignment"),
+    Field("omega", "rad/s", "angular velocity of the input shaft"),
+    Field("torque", "N*m", "resisting torque T_r"),
+    Field("Js", "kg*m^2", "inertia of the output shaft"),
+    Field("R", "m", "distance of the pins' and arms' reference points from O"),
+    Field("r_b", "m", "distance of the cross bushings' markers from O"),
+    Field("l_f", "m", "distance of the fork bushings' markers from the hole centre along z"),
+    Field("hub_mass", "kg", "mass of the hub"),
+    Field("hub_inertia", "kg*m^2", "inertia of the hub about x, y, z of C", shape=(3,)),
+    Field("pin_mass", "kg", "mass of a pin"),
+    Field("pin_inertia", "kg*m^2", "inertia of a pin about e, t, z", shape=(3,)),
+    Field("arm_mass", "kg", "mass of an arm"),
+    Field("arm_inertia", "kg*m^2", "inertia of an arm about e, t, z", shape=(3,)),
+    Field("k_cross", "N/m, N*m/rad", "cross bushing stiffness: force e, t, z, torque e, t, z", shape=(6,)),
+    Field("c_cross", "N*s/m, N*m*s/rad", "cross bushing damping, same order", shape=(6,)),
+    Field("k_fork", "N/m, N*m/rad", "fork bushing stiffness, same order", shape=(6,)),
+    Field("c_fork", "N*s/m, N*m*s/rad", "fork bushing damping, same order", shape=(6,)),
+    Field("law", "1", "contact law, see Law", "i8"),
+    Field("k1u", "N/m^2", "quadratic coefficient, uniform contact"),
+    Field("k2u", "N/m", "linear coefficient, uniform contact"),
+    Field("k1p", "N/m^2", "quadratic coefficient, point contact"),
+    Field("k2p", "N/m", "linear coefficient, point contact"),
+    Field("c_d", "N*s/m", "normal contact damping"),
+    Field("c_t", "N*s/m", "tangential contact damping (lubricant film)"),
+    Field("delta_d", "m", "penetration over which contact damping rises"),
+    Field("n_stations", "1", "contact stations per pin", "i8"),
+    Field(
+        "station_s", "m", "signed distance of each station from P along the pin axis", shape=(MAX_STATIONS,)
+    ),
+    Field("station_weight", "1", "weight of each station; 1 at two stations, sum 2", shape=(MAX_STATIONS,)),
+    Field("clearance", "m", "radial clearance c of each pin", shape=(4,)),
+    Field("pin_point", "m", "P less the pin's reference point, in axes of C", shape=(4, 3)),
+    Field("pin_axis", "1", "direction of the pin axis, in axes of C", shape=(4, 3)),
+    Field(
+        "hole_point",
+        "m",
+        "hole centre less the arm's reference point, in axes of the arm's frame",
+        shape=(4, 3),
+    ),
+    Field("hole_axis", "1", "direction of the hole axis, in axes of the arm's frame", shape=(4, 3)),
+)
+"""What the kernel needs of one joint. Pin fields are indexed by pin, hole fields by arm (hole k is on arm k)."""
+
+
+def _load_fields() -> list[Field]:
+    fields = []
+    for load, unit, noun in (("F", "N", "force"), ("T", "N*m", "torque")):
+        for stat, text in (("max", "largest"), ("mean", "mean"), ("range", "largest less smallest")):
+            description = f"{text} modulus of the bushing {noun} over the last revolution"
+            fields.append(Field(f"{load}_{stat}", unit, description, shape=(8,)))
+    return fields
+
+
+RESULT_FIELDS = (
+    Field("status", "1", "see Status", "u1"),
+    Field("settled", "1", "1 when the closure error is below solver.settle_tol", "u1"),
+    Field("closure", "1", "closure error of the last revolution"),
+    Field("revolutions", "1", "revolutions integrated, the recorded one included"),
+    Field("steps", "1", "steps taken, sub-steps included", "i4"),
+    Field("newton_iterations", "1", "Newton iterations", "i4"),
+    Field("halvings", "1", "times that a step was halved", "i4"),
+    *_load_fields(),
+    Field(
+        "contact_max",
+        "N",
+        "largest normal force on the outer (1) and inner (2) half of the pin",
+        shape=(4, 2),
+    ),
+    Field("mode_share", "1", "share of the last revolution in each contact mode", shape=(4, 4)),
+    Field("psi_max", "1", "largest |Psi|, relative error of the speed ratio, eq. (13)"),
+)
+
+ERROR = dtype_of(ERROR_FIELDS)
+PARAM = dtype_of(PARAM_FIELDS)
+RESULT = dtype_of(RESULT_FIELDS)
+
+
+class Column(NamedTuple):
+    """One flat column of a table as files and CSV headers show it.
+
+    `element` is the index into a field that holds a small array; ``()`` for a scalar field.
+    """
+
+    name: str
+    unit: str
+    description: str
+    dtype: str
+    field: str
+    element: tuple[int, ...]
+
+    def of(self, table: NDArray[np.void]) -> NDArray[Any]:
+        """Values of the column in `table`, (n,): a view that can be written to."""
+        values: NDArray[Any] = table[self.field][(slice(None), *self.element)]
+        return values
+
+
+def _result_columns() -> tuple[Column, ...]:
+    columns = []
+    for f in RESULT_FIELDS:
+        for index in np.ndindex(*f.shape):
+            if f.name[:2] in ("F_", "T_"):
+                name = f"{BUSHINGS[index[0]]}.{f.name}"
+            elif f.name == "contact_max":
+                name = f"{PINS[index[0]]}.contact{index[1] + 1}_max"
+            elif f.name == "mode_share":
+                name = f"{PINS[index[0]]}.share_{Mode(index[1]).name.lower()}"
+            else:
+                name = f.name
+            columns.append(Column(name, f.unit, f.description, f.dtype, f.name, index))
+    return tuple(columns)
+
+
+ERROR_COLUMNS = tuple(Column(f.name, f.unit, f.description, f.dtype, f.name, ()) for f in ERROR_FIELDS)
+RESULT_COLUMNS = _result_columns()

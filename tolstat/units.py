@@ -1,0 +1,164 @@
+"""Unit strings at the border: ``"0.1 mm"`` in a file is ``1e-4`` (m) inside.
+
+Every quantity of an input file is a string with its unit; `Quantity` turns it into an SI float while
+pydantic validates, so that a wrong or missing unit is one fault among the others of the file.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+if TYPE_CHECKING:
+    import pint
+
+EXAMPLES = {
+    "m": "0.1 mm",
+    "m^2": "11.34 cm^2",
+    "m^4": "1.02e-7 m^4",
+    "rad": "0.5 deg",
+    "rad/s": "500 rpm",
+    "N": "700 N",
+    "N*m": "100 N*m",
+    "N*m/rad": "5.9e5 N*m/rad",
+    "N/m": "1.2e6 N/mm",
+    "N/m^2": "7.5e7 N/mm^2",
+    "N*s/m": "200 N*s/m",
+    "Pa": "210 GPa",
+    "kg": "0.32 kg",
+    "kg*m^2": "0.01 kg*m^2",
+    "kg/m^3": "7700 kg/m^3",
+    "1": "0.5",
+}
+"""How a value of each unit is written; shown in the remedy of a fault."""
+
+
+@cache
+def registry() -> pint.UnitRegistry[float]:
+    """Return the one unit registry (made on first use: it costs some 0.3 s)."""
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def _fault(found: str, unit: str) -> PydanticCustomError:
+    remedy = f'write "{EXAMPLES.get(unit, "1 " + unit)}"' if unit != "1" else "write a number without unit"
+    return PydanticCustomError("quantity", "{found}", {"found": found, "remedy": remedy})
+
+
+def to_si(value: object, unit: str) -> float:
+    """Convert a quantity as written in a file to an SI float.
+
+    Parameters
+    ----------
+    value : object
+        A string such as ``"0.1 mm"``; a bare number only where `unit` is ``"1"``.
+    unit : str
+        SI unit that the value must be convertible to.
+
+    Returns
+    -------
+    float
+        Value in `unit`.
+
+    Raises
+    ------
+    pydantic_core.PydanticCustomError
+        For a missing, unknown or wrong unit, or a value that is not finite.
+    """
+    import pint
+
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise _fault(f"{value!r} is not a quantity", unit)
+    if isinstance(value, (int, float)):
+        if unit != "1":
+            raise _fault(f"{value!r} has no unit", unit)
+        if not math.isfinite(value):
+            raise _fault(f"{value!r} is not a finite number", unit)
+        return float(value)
+    try:
+        quantity = registry().Quantity(value)
+        if unit == "1":
+            if quantity.unitless or str(quantity.units) == "percent":
+                si = float(quantity.to("").magnitude)
+            else:
+                raise _fault(f"{value!r} has a unit where a pure number is expected", unit)
+        else:
+            if quantity.unitless:
+                raise _fault(f"{value!r} has no unit", unit)
+            if unit == "rad/s" and "hertz" in str(quantity.units):
+                raise _fault(f"{value!r} is ambiguous (1 Hz may mean 1 rad/s or 2 pi rad/s)", unit)
+            si = float(quantity.to(unit).magnitude)
+    except pint.DimensionalityError as error:
+        raise _fault(f"{value!r} cannot be a value in {unit}", unit) from error
+    except pint.UndefinedUnitError as error:
+        raise _fault(f"{value!r} has an unknown unit", unit) from error
+    except (pint.PintError, ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError) as error:
+        raise _fault(f"{value!r} is not a number with a unit", unit) from error
+    if not math.isfinite(si):
+        raise _fault(f"{value!r} is not a finite number", unit)
+    return si
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Annotation that makes a pydantic ``float`` field read a unit string.
+
+    ``Annotated[float, Quantity("m")]`` accepts ``"0.1 mm"`` and holds ``1e-4``. SI floats are written back
+    as ``"0.0001 m"`` by ``model_dump(mode="json")``, so that a dump can be read again.
+    """
+
+    unit: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Schema: parse on validation, write value and unit on JSON dump."""
+
+        def write(value: float) -> str | float:
+            return value if self.unit == "1" else f"{value!r} {self.unit}"
+
+        return core_schema.no_info_plain_validator_function(
+            lambda value: to_si(value, self.unit),
+            serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
+        )
+
+
+def positive(value: float) -> float:
+    """Validate a quantity that must be greater than zero."""
+    if not value > 0:
+        raise PydanticCustomError(
+            "sign", "{found}", {"found": f"{value:g} (SI) must be positive", "remedy": "give a value above zero"}
+        )
+    return value
+
+
+def not_negative(value: float) -> float:
+    """Validate a quantity that must not be less than zero."""
+    if value < 0:
+        raise PydanticCustomError(
+            "sign",
+            "{found}",
+            {"found": f"{value:g} (SI) must not be negative", "remedy": "give zero or a value above it"},
+        )
+    return value
+
+
+Length = Annotated[float, Quantity("m")]
+Area = Annotated[float, Quantity("m^2")]
+AreaMoment = Annotated[float, Quantity("m^4")]
+Angle = Annotated[float, Quantity("rad")]
+Speed = Annotated[float, Quantity("rad/s")]
+Torque = Annotated[float, Quantity("N*m")]
+Stress = Annotated[float, Quantity("Pa")]
+Mass = Annotated[float, Quantity("kg")]
+Inertia = Annotated[float, Quantity("kg*m^2")]
+Density = Annotated[float, Quantity("kg/m^3")]
+Stiffness = Annotated[float, Quantity("N/m")]
+RotaryStiffness = Annotated[float, Quantity("N*m/rad")]
+QuadraticStiffness = Annotated[float, Quantity("N/m^2")]
+Damping = Annotated[float, Quantity("N*s/m")]
+Number = Annotated[float, Quantity("1")]

@@ -38,7 +38,7 @@ class Status(IntEnum):
 STATUS_TEXT = {
     Status.PENDING: "not simulated yet",
     Status.OK: "settled; results valid",
-    Status.NOT_SETTLED: "closure error above solver.settle_tol after solver.max_revs; results of the last revolution",
+    Status.NOT_SETTLED: "closure error still above solver.settle_tol after solver.max_revs; results stored",
     Status.NEWTON_FAILED: "a step failed at the smallest sub-step; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
     Status.OUTSIDE_MODEL: "negative clearance (an interference fit has no contact law here); results are NaN",
@@ -104,8 +104,8 @@ class Field(NamedTuple):
 class Options(NamedTuple):
     """Numerical settings of the solver, the same for every joint of a campaign; see `study.Solver`."""
 
-    method: int = Method.BDF2
-    start: int = Start.STATIC
+    method: int = int(Method.BDF2)
+    start: int = int(Start.STATIC)
     steps_per_rev: int = 180
     max_revs: int = 20
     settle_tol: float = 1e-4
@@ -113,6 +113,22 @@ class Options(NamedTuple):
     newton_max_iter: int = 12
     max_halvings: int = 10
     rho_inf: float = 0.8
+
+
+class HistorySpec(NamedTuple):
+    """What a load history holds for each joint: an array of `shape`, without the leading axis of joints."""
+
+    shape: tuple[int, ...]
+    dtype: str
+    unit: str
+    description: str
+
+
+class Simulation(NamedTuple):
+    """What simulating n joints gives: RESULT rows, and the histories asked for by name, each with leading axis n."""
+
+    results: np.ndarray[tuple[int], np.dtype[np.void]]
+    histories: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
 
 
 def dtype_of(fields: tuple[Field, ...]) -> np.dtype[np.void]:
@@ -146,7 +162,7 @@ def _error_fields() -> tuple[Field, ...]:
 
 
 ERROR_FIELDS = _error_fields()
-"""Manufacturing errors (deviations from nominal, zero for the nominal joint) and the operating point's values."""
+"""Manufacturing errors (deviations from nominal, zero for the nominal joint) and the operating point."""
 
 PARAM_FIELDS = (
     Field("alpha", "rad", "misalignment"),
@@ -190,7 +206,7 @@ PARAM_FIELDS = (
     ),
     Field("hole_axis", "1", "direction of the hole axis, in axes of the arm's frame", shape=(4, 3)),
 )
-"""What the kernel needs of one joint. Pin fields are indexed by pin, hole fields by arm (hole k is on arm k)."""
+"""What the kernel needs of one joint. Pin fields are indexed by pin, hole fields by arm (hole k: arm k)."""
 
 
 def _load_fields() -> list[Field]:
@@ -241,7 +257,8 @@ class Column(NamedTuple):
 
     def of(self, table: NDArray[np.void]) -> NDArray[Any]:
         """Values of the column in `table`, (n,): a view that can be written to."""
-        values: NDArray[Any] = table[self.field][(slice(None), *self.element)]
+        index: tuple[Any, ...] = (slice(None), *self.element)
+        values: NDArray[Any] = table[self.field][index]
         return values
 
 

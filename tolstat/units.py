@@ -7,6 +7,8 @@ pydantic validates, so that a wrong or missing unit is one fault among the other
 from __future__ import annotations
 
 import math
+import sys
+import tokenize
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
@@ -46,6 +48,13 @@ def registry() -> pint.UnitRegistry[float]:
     return pint.UnitRegistry()
 
 
+_NOT_PARSED = (
+    *(ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError, AssertionError, LookupError),
+    tokenize.TokenError,
+)
+"""What pint's parser raises for a text that is no quantity, besides its own errors."""
+
+
 def _fault(found: str, unit: str) -> PydanticCustomError:
     remedy = f'write "{EXAMPLES.get(unit, "1 " + unit)}"' if unit != "1" else "write a number without unit"
     return PydanticCustomError("quantity", "{found}", {"found": found, "remedy": remedy})
@@ -78,11 +87,11 @@ def to_si(value: object, unit: str) -> float:
     if isinstance(value, (int, float)):
         if unit != "1":
             raise _fault(f"{value!r} has no unit", unit)
-        if not math.isfinite(value):
+        if not abs(value) <= sys.float_info.max:  # also an integer too long for a float
             raise _fault(f"{value!r} is not a finite number", unit)
         return float(value)
     try:
-        quantity = registry().Quantity(value)
+        quantity: Any = registry().Quantity(value)
         if unit == "1":
             if quantity.unitless or str(quantity.units) == "percent":
                 si = float(quantity.to("").magnitude)
@@ -98,7 +107,7 @@ def to_si(value: object, unit: str) -> float:
         raise _fault(f"{value!r} cannot be a value in {unit}", unit) from error
     except pint.UndefinedUnitError as error:
         raise _fault(f"{value!r} has an unknown unit", unit) from error
-    except (pint.PintError, ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError) as error:
+    except (pint.PintError, *_NOT_PARSED) as error:
         raise _fault(f"{value!r} is not a number with a unit", unit) from error
     if not math.isfinite(si):
         raise _fault(f"{value!r} is not a finite number", unit)
@@ -116,7 +125,7 @@ class Quantity:
     unit: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Schema: parse on validation, write value and unit on JSON dump."""
+        """Return the schema: parse on validation, write value and unit on JSON dump."""
 
         def write(value: float) -> str | float:
             return value if self.unit == "1" else f"{value!r} {self.unit}"
@@ -130,9 +139,8 @@ class Quantity:
 def positive(value: float) -> float:
     """Validate a quantity that must be greater than zero."""
     if not value > 0:
-        raise PydanticCustomError(
-            "sign", "{found}", {"found": f"{value:g} (SI) must be positive", "remedy": "give a value above zero"}
-        )
+        found = f"{value:g} (SI) must be positive"
+        raise PydanticCustomError("sign", "{found}", {"found": found, "remedy": "give a value above zero"})
     return value
 
 

@@ -32,7 +32,7 @@ def build_equilibrium(residual, newton, size):
             if newton(0.0, 1 / step, 1 / (step * step), par, options, work, state):
                 state.q0[:] = state.q
                 residual(0.0, state.q0, state.v0, state.a0, par, options, work, state.residual)
-                if size(1.0, state) < ENOUGH:
+                if size(1.0, 1.0, state) < ENOUGH:
                     return True
                 step = min(GROWTH * step, LARGEST)
             else:

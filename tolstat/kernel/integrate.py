@@ -54,7 +54,7 @@ def reset(state):
 
 
 @njit
-def scaled_size(ca, state):
+def scaled_size(cv, ca, state):
     """Largest residual in units of its scale."""
     size = 0.0
     for i in range(state.q.size):
@@ -76,7 +76,7 @@ def build_integrator(residual, factorise, solve, size=scaled_size):
         Makes and factorises d(residual)/dq + cv d/dv + ca d/da at the point last evaluated; False when singular.
     solve : jitted function (q, work) -> None
         Solves for ``work.solution`` in place.
-    size : jitted function (ca, state) -> float
+    size : jitted function (cv, ca, state) -> float
         Norm of ``state.residual`` that is compared with ``options.newton_tol``.
 
     Returns
@@ -94,7 +94,7 @@ def build_integrator(residual, factorise, solve, size=scaled_size):
         at_roundoff = False
         for iteration in range(options.newton_max_iter + 1):
             residual(t, q, v, a, par, options, work, state.residual)
-            now = size(ca, state)
+            now = size(cv, ca, state)
             if now <= options.newton_tol or (at_roundoff and now < 1e300):
                 return True
             if not now < 1e300 or iteration == options.newton_max_iter:

@@ -1,0 +1,164 @@
+"""A study and stages that cost nothing, so that stores and campaigns can be tested without a kernel.
+
+The numbers depend on the row's errors only, as those of the real simulation do. `main` runs a campaign, for
+tests that kill it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tolstat import campaign
+from tolstat.tables import ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
+
+SPECS = {
+    "loads": HistorySpec((30, 8, 6), "f4", "N, N*m", "bushing loads"),
+    "mode": HistorySpec((30, 4), "u1", "1", "contact modes"),
+    "error": HistorySpec((2,), "f8", "1", "error of the harmonics"),
+}
+
+
+class Dump(dict):
+    """A mapping with pydantic's way of writing itself."""
+
+    def model_dump(self, mode: str = "json") -> dict[str, Any]:
+        """Return the mapping itself."""
+        return dict(self)
+
+
+@dataclass(frozen=True)
+class Output:
+    """Table ``[output]`` of a study."""
+
+    histories: str = "none"
+    harmonics: int = 4
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Table ``[solver]`` of a study."""
+
+    steps_per_rev: int = 30
+
+    def options(self) -> Options:
+        """Return the settings as the kernel takes them."""
+        return Options(steps_per_rev=self.steps_per_rev)
+
+
+@dataclass(frozen=True)
+class Study:
+    """What store and campaign ask of a study."""
+
+    n: int = 40
+    seed: int = 7
+    solver: Solver = Solver()
+    output: Output = Output()
+    limits: dict[str, float] = field(default_factory=lambda: {"cross1.F": 700.0})
+    name: str = "fake"
+    text: str = "# a study\n[sampling]\nn = 40  # Größe\n"
+    joint: Dump = field(default_factory=lambda: Dump(material=Dump(E="2.1e11 Pa")))
+
+    @property
+    def sampling(self) -> Dump:
+        """Table ``[sampling]`` of a study."""
+        return Dump(method="random", n=self.n, seed=self.seed, nominal_first=True)
+
+    def identity(self) -> dict[str, Any]:
+        """Return what decides the numbers."""
+        solver = {"solver.steps_per_rev": self.solver.steps_per_rev}
+        return solver | {"sampling.n": self.n, "sampling.seed": self.seed, "output": self.output.histories}
+
+
+def draw(study: Study) -> np.ndarray:
+    rng = np.random.default_rng(study.seed)
+    errors = np.zeros(study.n, ERROR)
+    for f in ERROR_FIELDS:
+        errors[f.name] = rng.normal(size=study.n)
+    return errors
+
+
+def perturb(joint: Any, errors: np.ndarray) -> np.ndarray:
+    params = np.zeros(len(errors), PARAM)
+    params["alpha"] = errors["operation.alpha"]
+    params["R"] = errors["pin1.offset_t"]
+    return params
+
+
+def history_specs(options: Options, histories: str, n_harmonics: int) -> dict[str, HistorySpec]:
+    return SPECS if histories == "full" else {}
+
+
+def simulate(
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, seconds: float = 0.0
+) -> Simulation:
+    """Simulate joints by a formula, `seconds` each; one in ten fails, one in ten does not settle."""
+    time.sleep(seconds * len(params))
+    results = np.zeros(len(params), RESULT)
+    x = params["R"] + 2 * params["alpha"]
+    results["status"] = np.where(x > 3, Status.NEWTON_FAILED, np.where(x < -3, Status.NOT_SETTLED, Status.OK))
+    results["settled"] = results["status"] == Status.OK
+    results["steps"] = options.steps_per_rev
+    for i, name in enumerate(n for n in RESULT.names if RESULT[n].base == np.float64):
+        shape = (len(params),) + (1,) * len(RESULT[name].shape)
+        results[name] = np.where(x > 3, np.nan, np.sin(x + i)).reshape(shape)
+    return Simulation(results, {name: history(spec, x) for name, spec in specs_of(histories).items()})
+
+
+def specs_of(histories: str) -> dict[str, HistorySpec]:
+    return history_specs(Options(), histories, 0)
+
+
+def history(spec: HistorySpec, x: np.ndarray) -> np.ndarray:
+    steps = np.arange(np.prod(spec.shape)).reshape(spec.shape)
+    values = x.reshape((-1,) + (1,) * len(spec.shape)) * np.cos(steps)
+    return (np.abs(values) * 50 % 4 if spec.dtype == "u1" else values).astype(spec.dtype)
+
+
+def simulate_or_die(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+    """Simulate, but kill this process at the joint with the largest misalignment of the fake study."""
+    if params["alpha"].max() > 2.0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return simulate(params, options, histories, n_harmonics)
+
+
+def simulate_or_raise(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+    if params["alpha"].max() > 2.0:
+        raise ZeroDivisionError("a bug")
+    return simulate(params, options, histories, n_harmonics)
+
+
+def stages(simulate: Any = simulate) -> campaign.Stages:
+    return campaign.Stages(
+        draw, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up=lambda: None
+    )
+
+
+def main(out: str, workers: int, block: int, seconds: float, histories: str = "none", n: int = 40) -> None:
+    """Run a campaign of `n` slow joints, as `tolstat run` does; says ``go`` after the first block."""
+    said: list[int] = []
+
+    def say(counts: Any) -> None:
+        said.append(counts.done)
+        if len(said) == 2:
+            print("go", flush=True)
+
+    study = Study(n=n, output=Output(histories))
+    try:
+        slow = stages(partial(simulate, seconds=seconds))
+        campaign.run(study, Path(out), workers, block, progress=say, stages=slow)
+    except campaign.Interrupted as stop:
+        print(stop, flush=True)
+        raise SystemExit(130) from None
+
+
+def environment() -> dict[str, str]:
+    """Environment in which another Python finds tolstat and these modules."""
+    return os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}

@@ -1,0 +1,181 @@
+"""The joint once more, slowly and plainly: world coordinates, NumPy, one statement for each sentence of the model.
+
+Twin of ``kernel.dynamics``: it shares no code with the kernel but the table of parameters. Velocities and
+accelerations of bodies come from differences of their world position and attitude in time, so that none of the
+kernel's inertial terms is written a second time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+PIN_AXES = {1: (0, 1), 2: (0, -1), 3: (1, 0), 4: (-1, 0)}
+ARM_AXES = {1: (1, 0), 2: (-1, 0), 3: (0, -1), 4: (0, 1)}
+ARM_OF_PIN = {1: 4, 2: 3, 3: 1, 4: 2}
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def turn(axis, angle):
+    return Rotation.from_rotvec(angle * np.array(axis, float)).as_matrix()
+
+
+def frames(theta, alpha):
+    """Attitudes of I, C and F."""
+    beta = np.arctan(np.tan(alpha) * np.sin(theta))
+    gamma = np.arcsin(np.sin(alpha) * np.cos(theta))
+    i = turn(Z, theta)
+    c = i @ turn((1, 0, 0), beta)
+    return i, c, c @ turn((0, 1, 0), gamma)
+
+
+def triad(axes):
+    e = np.array([*axes, 0.0])
+    return np.array([e, np.cross(Z, e), Z])
+
+
+class Bodies:
+    """World position of reference points and attitude of all bodies at one time."""
+
+    def __init__(self, t, q, par):
+        i, c, f = frames(par.omega * t, par.alpha)
+        self.position, self.attitude = {}, {}
+        names = ["hub"] + [f"pin{k}" for k in (1, 2, 3, 4)] + [f"arm{k}" for k in (1, 2, 3, 4)]
+        for k, name in enumerate(names):
+            number = int(name[-1]) if name != "hub" else 0
+            frame = c if k < 5 else (i if number < 3 else f)
+            e = np.zeros(3) if k == 0 else triad((PIN_AXES if k < 5 else ARM_AXES)[number])[0]
+            u, phi = q[6 * k : 6 * k + 3], q[6 * k + 3 : 6 * k + 6]
+            self.position[name] = frame @ (par.R * e + u)
+            self.attitude[name] = frame @ Rotation.from_rotvec(phi).as_matrix()
+        self.position["in"] = self.position["out"] = np.zeros(3)
+        self.attitude["in"], self.attitude["out"] = i, f @ turn(Z, q[54])
+
+
+def motion(t, q, v, a, par, h=1e-6):
+    """Positions, attitudes, velocities and accelerations by central differences along q + v s + a s^2 / 2."""
+    before, now, after = (Bodies(t + s, q + v * s + a * s * s / 2, par) for s in (-h, 0.0, h))
+    velocity, spin = {}, {}
+    for name in now.position:
+        velocity[name] = (after.position[name] - before.position[name]) / (2 * h)
+        step = Rotation.from_matrix(after.attitude[name] @ before.attitude[name].T).as_rotvec()
+        spin[name] = step / (2 * h)
+    return now, velocity, spin
+
+
+def smooth_step(x):
+    x = np.clip(x, 0, 1)
+    return x * x * (3 - 2 * x)
+
+
+def forces(t, q, v, par):
+    """World force and torque about the reference point of every body; also the loads of the bushings."""
+    body, velocity, spin = motion(t, q, v, np.zeros(55), par)
+    force = {name: np.zeros(6) for name in body.position}
+    loads = np.zeros((8, 6))
+
+    def apply(name, f, torque, point):
+        force[name] += np.concatenate([f, torque + np.cross(point - body.position[name], f)])
+
+    for k in range(8):
+        number = k % 4 + 1
+        if k < 4:
+            lump, base, local = f"pin{number}", "hub", triad(PIN_AXES[number])
+            on_base = par.r_b * local[0]
+            on_lump = (par.r_b - par.R) * local[0]
+            stiffness, damping = par.k_cross, par.c_cross
+        else:
+            lump, base, local = f"arm{number}", "in" if number < 3 else "out", triad(ARM_AXES[number])
+            lever = (-par.l_f if number < 3 else par.l_f) * Z
+            on_base, on_lump = par.R * local[0] + lever, lever
+            stiffness, damping = par.k_fork, par.c_fork
+        a_base, a_lump = body.attitude[base], body.attitude[lump]
+        marker = body.position[lump] + a_lump @ on_lump
+        to_marker = local @ a_base.T
+        x = to_marker @ (marker - body.position[base] - a_base @ on_base)
+        moving = velocity[lump] + np.cross(spin[lump], marker - body.position[lump])
+        moving = moving - velocity[base] - np.cross(spin[base], marker - body.position[base])
+        phi = Rotation.from_matrix(a_base.T @ a_lump).as_rotvec()
+        # rate of the rotation vector, by a short turn
+        h = 1e-7
+        relative = a_base.T @ (spin[lump] - spin[base])
+        turned = Rotation.from_matrix(Rotation.from_rotvec(relative * h).as_matrix() @ a_base.T @ a_lump)
+        turned_back = Rotation.from_matrix(Rotation.from_rotvec(-relative * h).as_matrix() @ a_base.T @ a_lump)
+        rate = (turned.as_rotvec() - turned_back.as_rotvec()) / (2 * h)
+        loads[k] = -stiffness * np.concatenate([x, local @ phi])
+        loads[k] -= damping * np.concatenate([to_marker @ moving, local @ rate])
+        f, torque = to_marker.T @ loads[k, :3], to_marker.T @ loads[k, 3:]
+        apply(lump, f, torque, marker)
+        apply(base, -f, -torque, marker)
+
+    for p in (1, 2, 3, 4):
+        pin, arm = f"pin{p}", f"arm{ARM_OF_PIN[p]}"
+        a_pin, a_arm = body.attitude[pin], body.attitude[arm]
+        centre = body.position[arm] + a_arm @ par.hole_point[ARM_OF_PIN[p] - 1]
+        axis = a_arm @ par.hole_axis[ARM_OF_PIN[p] - 1]
+        stations = []
+        for j in range(par.n_stations):
+            point = body.position[pin] + a_pin @ (par.pin_point[p - 1] + par.station_s[j] * par.pin_axis[p - 1])
+            d = point - centre
+            g = d - (d @ axis) * axis
+            slip = velocity[pin] + np.cross(spin[pin], point - body.position[pin])
+            slip = slip - velocity[arm] - np.cross(spin[arm], point - body.position[arm])
+            stations.append((point, g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p - 1], slip))
+        w = 1.0
+        if par.law == 1:
+            w = 0.0
+        elif par.law == 2:
+            (_, n_a, d_a, _), (_, n_b, d_b, _) = stations
+            w = 0.0
+            if d_a > 0 and d_b > 0:
+                r = min(d_a, d_b) / max(d_a, d_b)
+                w = r * r * (3 - 2 * r) * max(0.0, n_a @ n_b)
+        for (point, n, delta, slip), weight in zip(stations, par.station_weight, strict=False):
+            if delta <= 0:
+                continue
+            uniform = 0.5 * (par.k1u * delta**2 + par.k2u * delta)
+            elastic = w * uniform + (1 - w) * (par.k1p * delta**2 + par.k2p * delta)
+            if par.law == 3:
+                elastic = weight * uniform
+            ramp = weight * smooth_step(delta / par.delta_d)
+            pressing = max(0.0, elastic + par.c_d * ramp * (slip @ n))
+            tangential = slip - (slip @ n) * n - (slip @ axis) * axis
+            f = -pressing * n - par.c_t * ramp * tangential
+            apply(pin, f, np.zeros(3), point)
+            apply(arm, -f, np.zeros(3), point)
+    return force, loads
+
+
+def imbalance(t, q, v, a, par, resisting):
+    """World momentum rates less forces and torques of every lump, and of the shaft about its axis."""
+    force, _ = forces(t, q, v, par)
+    h = 1e-6
+    lumps = ["hub"] + [f"pin{k}" for k in (1, 2, 3, 4)] + [f"arm{k}" for k in (1, 2, 3, 4)]
+    momentum = []
+    for s in (-h, h):
+        body, velocity, spin = motion(t + s, q + v * s + a * s * s / 2, v + a * s, a, par)
+        momentum.append((body, velocity, spin))
+    off = {}
+    for name in lumps:
+        if name == "hub":
+            mass, inertia, local = par.hub_mass, par.hub_inertia, np.eye(3)
+        else:
+            pin = name.startswith("pin")
+            mass = par.pin_mass if pin else par.arm_mass
+            inertia = par.pin_inertia if pin else par.arm_inertia
+            local = triad((PIN_AXES if pin else ARM_AXES)[int(name[-1])])
+        linear, angular = [], []
+        for body, velocity, spin in momentum:
+            attitude = body.attitude[name] @ local.T
+            linear.append(mass * velocity[name])
+            angular.append(attitude @ (inertia * (attitude.T @ spin[name])))
+        off[name] = np.concatenate(
+            [
+                (linear[1] - linear[0]) / (2 * h) - force[name][:3],
+                (angular[1] - angular[0]) / (2 * h) - force[name][3:],
+            ]
+        )
+    shaft = np.array([np.sin(par.alpha), 0, np.cos(par.alpha)])
+    rate = (momentum[1][2]["out"] - momentum[0][2]["out"]) @ shaft / (2 * h)
+    off["out"] = par.Js * rate - force["out"][3:] @ shaft + resisting
+    return off

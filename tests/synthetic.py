@@ -1,0 +1,104 @@
+"""Campaigns with invented results: loads of a plausible size without running the solver."""
+
+import numpy as np
+
+from tolstat.tables import ERROR, RESULT, Status
+
+
+def errors(n, seed=7):
+    """Draw normal errors on all geometry, constant operation; row 0 is the nominal joint."""
+    rng = np.random.default_rng(seed)
+    table = np.zeros(n, ERROR)
+    for name in ERROR.names:
+        if name.startswith(("pin", "hole")):
+            table[name][1:] = rng.normal(0.0, 5e-5 if "tilt" not in name else 3e-3, n - 1)
+    table["operation.alpha"], table["operation.speed"], table["operation.torque"] = 0.2618, 52.36, 100.0
+    table["material.E_factor"] = 1.0
+    return table
+
+
+def results(n, seed=8, failed=0, unsettled=0):
+    """Invent results: loads rise with a gamma variate, the last rows failed or did not settle."""
+    rng = np.random.default_rng(seed)
+    table = np.zeros(n, RESULT)
+    table["status"], table["settled"] = Status.OK, 1
+    scatter = rng.gamma(3.0, 0.03, (n, 8)) * np.array([1, 1, 0.15, 0.15, 0.15, 0.15, 1, 1])
+    scatter[0] = 0.0
+    base = {"F": [640, 640, 655, 655, 655, 655, 640, 640], "T": [12, 12, 22, 22, 24, 24, 15, 15]}
+    for letter, values in base.items():
+        table[f"{letter}_max"] = np.array(values) * (1.0 + scatter * (1.0 if letter == "F" else 2.5))
+        table[f"{letter}_mean"] = 0.9 * table[f"{letter}_max"]
+        table[f"{letter}_range"] = 0.2 * table[f"{letter}_max"]
+    table["contact_max"] = 600.0 * (1.0 + scatter[:, :4, None] * [1.0, 0.5])
+    table["mode_share"][:, :, 1] = 1.0
+    table["psi_max"] = 1e-4 * (1.0 + scatter[:, 0])
+    table["revolutions"], table["steps"], table["closure"] = 2.0, 360, 2e-5
+    table["status"][n - unsettled :] = Status.NOT_SETTLED
+    table["settled"][n - unsettled :] = 0
+    bad = slice(n - unsettled - failed, n - unsettled)
+    for name in RESULT.names:
+        if RESULT[name].base.kind == "f":
+            table[name][bad] = np.nan
+    table["status"][bad], table["settled"][bad] = Status.NEWTON_FAILED, 0
+    return table
+
+
+STUDY = """
+[joint]
+base = "cirelli2021"
+
+[operation]
+alpha = "15 deg"
+speed = "500 rpm"
+torque = "100 N*m"
+
+[tolerances]
+"pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }
+
+[sampling]
+n = 60
+seed = 2021
+
+[limits]
+"cross1.F" = "700 N"
+"fork*.T" = "40 N*m"
+"pin1.contact" = "800 N"
+"psi" = 0.01
+"""
+
+SWEEP = """
+[joint]
+base = "cirelli2021"
+
+[operation]
+alpha = "15 deg"
+speed = "500 rpm"
+torque = "100 N*m"
+
+[errors]
+pin1.tilt_z = "0.5 deg"
+
+[sampling]
+method = "sweep"
+
+[sweep]
+"pin*.diameter" = { from = "-0.1 mm", to = "0.1 mm", points = 11 }
+"""
+
+
+def store(folder, text=STUDY, name="small", simulated=None, **kwargs):
+    """Make a result file without running the solver; `simulated` rows of it have invented results."""
+    from tolstat import sampling, study
+    from tolstat.store import ResultStore
+    from tolstat.tables import Simulation
+
+    source = folder / f"{name}.toml"
+    source.write_text(text, encoding="utf-8")
+    plan = study.load(source)
+    path = folder / f"{name}.h5"
+    table = results(plan.rows, **kwargs)
+    rows = np.arange(plan.rows if simulated is None else simulated)
+    with ResultStore.create(path, plan, sampling.draw(plan)) as file:
+        if rows.size:
+            file.write(rows, Simulation(table[rows], None))
+    return path

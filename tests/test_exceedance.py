@@ -1,0 +1,191 @@
+"""Exceedance shares and quantiles: exact intervals, coverage, unresolved joints on both sides."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import binomtest, norm
+
+from tolstat.analysis import exceedance, quantile
+from tolstat.tables import Status
+
+N_SEEDS = 1500
+N_JOINTS = 120
+TRUE_SHARE = 0.02
+LEVEL = float(norm.isf(TRUE_SHARE))
+
+
+def samples():
+    """Draw loads of `N_SEEDS` campaigns of `N_JOINTS` joints, standard normal."""
+    return np.random.default_rng(20210304).standard_normal((N_SEEDS, N_JOINTS))
+
+
+def clopper_pearson(count, n):
+    return exceedance.clopper_pearson(count, n, 0.95)
+
+
+def wald(count, n):
+    """Textbook interval that is known to cover too rarely: what the coverage test must catch."""
+    share = count / n
+    half = norm.ppf(0.975) * np.sqrt(share * (1.0 - share) / n)
+    return share - half, share + half
+
+
+def coverage(interval):
+    count = (samples() > LEVEL).sum(axis=1)
+    lower, upper = interval(count, N_JOINTS)
+    return np.mean((lower <= TRUE_SHARE) & (upper >= TRUE_SHARE))
+
+
+@pytest.mark.parametrize("confidence", [0.5, 0.9, 0.95, 0.999])
+@pytest.mark.parametrize("n", [1, 2, 7, 50, 512, 4096])
+def test_interval_is_scipys_exact_interval(n, confidence):
+    count = np.unique([0, 1, n // 3, n - 1, n])
+    lower, upper = exceedance.clopper_pearson(count, n, confidence)
+    for k, low, high in zip(count, lower, upper, strict=True):
+        expected = binomtest(int(k), n).proportion_ci(confidence, method="exact")
+        assert low == pytest.approx(expected.low, rel=1e-9, abs=1e-12)
+        assert high == pytest.approx(expected.high, rel=1e-9, abs=1e-12)
+
+
+def test_no_trial_tells_nothing():
+    assert [float(end) for end in exceedance.clopper_pearson(0, 0)] == [0.0, 1.0]
+
+
+def test_interval_covers_over_seeds_and_the_wald_interval_does_not():
+    three_sigma = 3.0 * np.sqrt(0.95 * 0.05 / N_SEEDS)
+    assert coverage(clopper_pearson) >= 0.95 - three_sigma
+    assert coverage(wald) < 0.95 - three_sigma
+
+
+def test_coverage_through_the_public_function():
+    covered = 0
+    for loads in samples()[:500]:
+        share = exceedance.at(loads, np.full(N_JOINTS, Status.OK), LEVEL)
+        covered += share.lower <= TRUE_SHARE <= share.upper
+    assert covered / 500 >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 500)
+
+
+def test_hand_counted_case():
+    values = [1.0, 2.0, 3.0, 4.0, np.nan, 9.0, 9.0]
+    status = [1, 1, 1, 1, Status.NEWTON_FAILED, Status.NOT_SETTLED, Status.PENDING]
+    share = exceedance.at(values, status, 2.0)
+    assert (share.n, share.n_failed, share.n_unsettled, share.count) == (6, 1, 1, 2)
+    assert share.estimate == 0.5
+    assert (share.bound_lower, share.bound_upper) == (2 / 6, 4 / 6)
+    assert share.lower == pytest.approx(binomtest(2, 4).proportion_ci(0.95, "exact").low)
+    assert share.outer_lower == pytest.approx(binomtest(2, 6).proportion_ci(0.95, "exact").low)
+    assert share.outer_upper == pytest.approx(binomtest(4, 6).proportion_ci(0.95, "exact").high)
+
+
+def test_a_load_equal_to_the_level_does_not_exceed_it():
+    assert exceedance.at([1.0, 1.0, 2.0], [1, 1, 1], 1.0).count == 1
+
+
+def test_every_unresolved_joint_widens_the_bounds():
+    rng = np.random.default_rng(5)
+    values, status = rng.normal(size=200), np.full(200, Status.OK)
+    complete = exceedance.at(values, status, 1.0)
+    for bad in (Status.NOT_SETTLED, Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL):
+        status[: 10 * bad] = bad
+        partial = exceedance.at(values, status, 1.0)
+        assert partial.n == 200
+        assert partial.n_failed + partial.n_unsettled == 10 * bad
+        assert partial.bound_lower <= complete.estimate <= partial.bound_upper
+        assert partial.outer_lower <= partial.bound_lower < partial.bound_upper <= partial.outer_upper
+
+
+def test_value_that_is_not_finite_counts_as_failed_even_when_marked_ok():
+    assert exceedance.at([np.nan, 1.0], [Status.OK, Status.OK], 0.0).n_failed == 1
+
+
+def test_dependent_samples_get_no_interval_but_keep_the_bounds():
+    share = exceedance.at([1.0, 2.0, 3.0], [1, 1, Status.NOT_FINITE], 1.5, iid=False)
+    assert np.isnan([share.lower, share.upper, share.outer_lower, share.outer_upper]).all()
+    assert (share.estimate, share.bound_lower, share.bound_upper) == (0.5, 1 / 3, 2 / 3)
+
+
+def test_no_joint_at_all():
+    share = exceedance.at([], [], 1.0)
+    assert np.isnan(share.estimate)
+    assert (share.lower, share.upper, share.bound_lower, share.bound_upper) == (0.0, 1.0, 0.0, 1.0)
+    assert exceedance.curve([np.nan], [Status.PENDING]).size == 0
+
+
+@given(
+    st.lists(st.tuples(st.integers(-5, 5), st.integers(0, 5)), min_size=1, max_size=40),
+    st.integers(-6, 6),
+)
+@settings(max_examples=60, deadline=None)
+def test_curve_agrees_with_counting_and_falls(rows, level):
+    values, status = (np.array(column) for column in zip(*rows, strict=True))
+    table = exceedance.curve(values, status)
+    assert list(table["level"]) == sorted(set(values[status == Status.OK]))
+    assert np.all(np.diff(table["count"]) < 0)
+    share = exceedance.at(values, status, level)
+    assert share.count == sum(v > level and s == Status.OK for v, s in rows)
+    assert share.bound_lower <= share.bound_upper
+    assert share.outer_lower <= share.bound_lower
+    assert share.bound_upper <= share.outer_upper
+    if share.n > share.n_failed + share.n_unsettled:
+        assert share.bound_lower <= share.estimate <= share.bound_upper
+        assert table["count"][-1] == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: exceedance.at([1.0], [1, 1], 0.0), "one length"),
+        (lambda: exceedance.at([1.0], [1], float("nan")), "NaN"),
+        (lambda: exceedance.at([1.0], [1], 0.0, confidence=1.0), "confidence"),
+        (lambda: exceedance.clopper_pearson(3, 2), "between 0 and n"),
+        (lambda: quantile.at([1.0], [1], 1.0), "share"),
+    ],
+)
+def test_misuse_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+@pytest.mark.parametrize(("share", "confidence", "n"), [(0.95, 0.9, 59), (0.99, 0.9, 299)])
+def test_quantile_upper_end_needs_the_number_of_joints_wilks_gives(share, confidence, n):
+    """A two-sided 90 % interval has the one-sided 95 % upper end of Wilks' first-order formula."""
+    enough = quantile.at(np.arange(n), np.ones(n), share, confidence)
+    too_few = quantile.at(np.arange(n - 1), np.ones(n - 1), share, confidence)
+    assert enough.upper == n - 1
+    assert too_few.upper == np.inf
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_quantile_interval_covers_over_seeds(share):
+    truth, covered = norm.ppf(share), 0
+    for loads in samples()[:600]:
+        q = quantile.at(loads, np.ones(N_JOINTS), share)
+        covered += q.lower <= truth <= q.upper
+    assert covered / 600 >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 600)
+
+
+def test_quantile_is_numpys_inverted_cdf_and_unresolved_joints_bound_it():
+    loads = np.random.default_rng(3).normal(size=100)
+    status = np.ones(100)
+    assert quantile.at(loads, status, 0.9).estimate == np.quantile(loads, 0.9, method="inverted_cdf")
+    status[:5] = Status.NEWTON_FAILED
+    q = quantile.at(loads, status, 0.9)
+    low, high = loads.copy(), loads.copy()
+    low[:5], high[:5] = -np.inf, np.inf
+    assert q.bound_lower == np.quantile(low, 0.9, method="inverted_cdf")
+    assert q.bound_upper == np.quantile(high, 0.9, method="inverted_cdf")
+    assert quantile.at(loads, status, 0.96).bound_upper == np.inf
+    assert np.isnan(quantile.at(loads, status, 0.9, iid=False).lower)
+
+
+def test_analysis_needs_no_file_and_no_figure():
+    import subprocess
+    import sys
+
+    code = (
+        "import sys, tolstat.analysis.exceedance, tolstat.analysis.quantile;"
+        "print(sorted({'h5py', 'matplotlib', 'pandas', 'tolstat.store'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,175 @@
+"""The integrator on textbook systems: order, invariants, kinks, and honest failure."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+from tolstat.integration import integrate
+from tolstat.kernel import rotation
+from tolstat.tables import Status
+
+METHODS = ("bdf2", "generalized_alpha")
+
+
+@numba.njit
+def oscillator(t, q, v, out):
+    out[0] = -q[0] - 0.2 * v[0]
+
+
+@numba.njit
+def pendulum(t, q, v, out):
+    out[0] = -np.sin(q[0])
+
+
+@numba.njit
+def pendulum_tangent(t, q, v, dq, dv):
+    dq[0, 0] = -np.cos(q[0])
+    dv[0, 0] = 0.0
+
+
+def pendulum_angle(t, amplitude):
+    """Closed form by Jacobi's elliptic functions, released from rest at `amplitude`."""
+    k = np.sin(amplitude / 2)
+    sn = ellipj(ellipk(k * k) - t, k * k)[0]
+    return 2 * np.arcsin(k * sn)
+
+
+INERTIA = (1.0, 2.0, 3.5)
+to_spin, to_rate, bias = rotation.spin, rotation.unspin, rotation.spin_bias
+
+
+@numba.njit
+def free_body(t, q, v, out):
+    """Euler's equations in rotation vectors: w' = J^-1 (-w x J w) in body axes, w turned to the axes of phi."""
+    phi, rate = (q[0], q[1], q[2]), (v[0], v[1], v[2])
+    back = (-q[0], -q[1], -q[2])
+    w = to_spin(back, rate)  # T(-phi) phi': angular velocity in body axes
+    push = bias(back, (-rate[0], -rate[1], -rate[2]))
+    j = INERTIA
+    torque = (
+        (j[1] - j[2]) * w[1] * w[2],
+        (j[2] - j[0]) * w[2] * w[0],
+        (j[0] - j[1]) * w[0] * w[1],
+    )
+    rest = (torque[0] / j[0] + push[0], torque[1] / j[1] + push[1], torque[2] / j[2] + push[2])
+    out[0], out[1], out[2] = to_rate(back, rest)
+
+
+@numba.njit
+def bouncer(t, q, v, out):
+    """Mass 1 thrown against a stiff spring with clearance, the kink of a contact."""
+    out[0] = -1e6 * q[0] if q[0] > 0 else 0.0
+
+
+@numba.njit
+def hardening(t, q, v, out):
+    out[0] = -1e3 * q[0] ** 7 - 20 * v[0]
+
+
+@numba.njit
+def exploding(t, q, v, out):
+    out[0] = q[0] ** 3
+
+
+@numba.njit
+def broken(t, q, v, out):
+    out[0] = np.nan
+
+
+def orders(errors):
+    return np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+
+
+def system_error(system, method, steps):
+    if system == "oscillator":
+        w = np.sqrt(1 - 0.01)
+        exact = np.exp(-0.5) * (np.cos(5 * w) + 0.1 / w * np.sin(5 * w))
+        return abs(integrate(oscillator, [1.0], [0.0], (0, 5), steps, method).q[-1, 0] - exact)
+    return abs(integrate(pendulum, [1.5], [0.0], (0, 5), steps, method).q[-1, 0] - pendulum_angle(5, 1.5))
+
+
+@pytest.mark.parametrize("system", ["oscillator", "pendulum"])
+@pytest.mark.parametrize("method", METHODS)
+def test_order_is_two_over_five_halvings(system, method):
+    errors = [system_error(system, method, 100 * 2**k) for k in range(6)]
+    np.testing.assert_allclose(orders(errors), 2.0, atol=0.2)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_velocity_and_acceleration_are_of_order_two(method):
+    errors = []
+    for steps in (200, 400, 800):
+        r = integrate(pendulum, [1.5], [0.0], (0, 5), steps, method)
+        exact = pendulum_angle(r.t, 1.5)
+        energy = r.v[-1, 0] ** 2 / 2 - np.cos(r.q[-1, 0]) + np.cos(1.5)
+        errors.append([abs(energy), abs(r.a[-1, 0] + np.sin(exact[-1]))])
+    for k in range(2):
+        np.testing.assert_allclose(orders([e[k] for e in errors]), 2.0, atol=0.3)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_free_body_keeps_energy_and_momentum_to_the_order(method):
+    """Tumbling about the middle axis: energy and the angular momentum vector in space drift as h^2."""
+    j = np.array(INERTIA)
+    rate = np.array([0.3, 1.0, 0.2])
+    errors = []
+    for steps in (100, 200, 400, 800):
+        r = integrate(free_body, np.zeros(3), rate, (0, 2), steps, method)
+        assert r.status == Status.OK
+        back = tuple(-r.q[-1])
+        w = np.array(rotation.spin(back, tuple(r.v[-1])))
+        attitude = np.full((1, 3, 3), np.nan)
+        rotation.exponential(tuple(r.q[-1]), attitude, 0)
+        energy = 0.5 * j @ w**2 - 0.5 * j @ rate**2
+        momentum = attitude[0] @ (j * w) - j * rate
+        errors.append([abs(energy), np.linalg.norm(momentum)])
+    for k in range(2):
+        np.testing.assert_allclose(orders([e[k] for e in errors]), 2.0, atol=0.2)
+    assert max(errors[-1]) < 1e-4
+
+
+def test_a_given_tangent_gives_the_same_solution():
+    plain = integrate(pendulum, [1.5], [0.0], (0, 5), 300)
+    given = integrate(pendulum, [1.5], [0.0], (0, 5), 300, tangent=pendulum_tangent)
+    np.testing.assert_allclose(given.q, plain.q, atol=1e-9)
+
+
+@pytest.mark.parametrize(("method", "loss"), [("bdf2", 0.06), ("generalized_alpha", 0.01)])
+def test_an_impact_gives_back_its_energy(method, loss):
+    """Restitution 1 in truth; at 8 steps a contact the methods lose a few per cent of the speed at most."""
+    contact = np.pi / 1e3
+    r = integrate(bouncer, [-0.01], [1.0], (0, 0.03), round(0.03 / (contact / 8)), method)
+    assert r.status == Status.OK
+    assert -r.v[-1, 0] == pytest.approx(1.0, abs=loss)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_step_too_long_for_newton_is_halved_and_counted(method):
+    """The predictor overshoots into a spring of the seventh power; the output grid stays."""
+    r = integrate(hardening, [0.0], [100.0], (0, 1), 10, method)
+    assert r.status == Status.OK
+    assert r.q.shape == (11, 1)
+    assert r.halvings > 0
+    assert r.steps > 10
+    assert np.isfinite(r.q).all()
+
+
+@pytest.mark.parametrize("system", [exploding, broken])
+@pytest.mark.parametrize("method", METHODS)
+def test_failure_is_a_status_and_nan(system, method):
+    r = integrate(system, [2.0], [0.0], (0, 10), 50, method)
+    assert r.status == Status.NEWTON_FAILED
+    assert np.isnan(r.q[-1, 0])
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [({"q0": [[1.0]]}, "vectors"), ({"v0": [np.nan]}, "finite"), ({"steps": 0}, "steps"), ({"t_span": (1, 0)}, "grow")],
+)
+def test_senseless_arguments_are_refused(change, word):
+    given = {"q0": [1.0], "v0": [0.0], "t_span": (0, 1), "steps": 10} | change
+    with pytest.raises(ValueError, match=word):
+        integrate(pendulum, **given)

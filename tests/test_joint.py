@@ -1,0 +1,316 @@
+"""Joint files, and the way from errors to parameters."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from tolstat import joint as joints
+from tolstat import material
+from tolstat.errors import InputError
+from tolstat.joint import ARM_OF_PIN, ARM_TRIADS, PIN_TRIADS, Joint, Operation
+from tolstat.schema import validate
+from tolstat.tables import ERROR_FIELDS, HOLES, MAX_STATIONS, PARAM, PINS, Law
+
+FILE = joints.data_dir() / "joints" / "cirelli2021.toml"
+MM = 1e-3
+
+
+@pytest.fixture(scope="module")
+def joint():
+    return joints.load("cirelli2021", {}, "case.toml")
+
+
+@pytest.fixture(scope="module")
+def operation():
+    return validate(Operation, {"alpha": "15 deg", "speed": "500 rpm", "torque": "100 N*m"}, "case.toml")
+
+
+def one(operation, **errors):
+    table = joints.nominal_errors(1, operation)
+    for name, value in errors.items():
+        table[name.replace("__", ".")] = value
+    return table
+
+
+def faults(overrides, base="cirelli2021", folder=None):
+    with pytest.raises(InputError) as caught:
+        joints.load(base, overrides, "case.toml", folder)
+    return {f.place: f for f in caught.value.faults}
+
+
+# --- joint files ----------------------------------------------------------------------------------------
+
+
+def test_every_key_names_its_source():
+    keys = [
+        line
+        for line in FILE.read_text(encoding="utf-8").splitlines()
+        if re.match(r"(# )?\w+ = [\"\[\d]", line)
+    ]
+    data = tomllib.loads(FILE.read_text(encoding="utf-8"))
+    flat = sum(len(v) if isinstance(v, dict) else 1 for v in data.values())
+    inside = len(data["bushing"]["cross"]) + len(data["bushing"]["fork"]) - 2
+    active = [line for line in keys if not line.startswith("#")]
+    assert len(active) == flat + inside
+    for line in keys:
+        assert re.search(r"#\s+(printed|derived|assumed|misprint)\b", line), line
+
+
+def test_default_joint_holds_the_printed_numbers(joint):
+    assert_array_equal(joint.k_cross, [6.54e9, 2.21e9, 2.21e9, 4.44e5, 5.90e5, 5.90e5])
+    assert_array_equal(joint.k_fork, [2.14e9, 2.14e9, 6.82e9, 1.91e6, 2.32e5, 8.08e5])
+    assert joint.contact.normal_damping(joint.pin, joint.material) == 1.18e4
+    assert joint.arm.body(joint.material.rho)[0] == pytest.approx(7700 * 12.18e-4 * 37.49 * MM)
+    assert_allclose([joint.cross.R, joint.pin.Jp], [2 * joint.pin.l, 2 * joint.pin.J])
+
+
+def test_stiffness_coefficients_and_damping_can_follow_from_geometry():
+    over = {
+        "bushing": {"stiffness": "beam"},
+        "contact": {"coefficients": "fitted", "damping": "beam"},
+        "material": {"E": "105 GPa"},
+    }
+    j = joints.load("cirelli2021", over, "case.toml")
+    assert_allclose(j.k_cross, [3.27e9, 2.21e9, 2.21e9, 4.44e5, 2.95e5, 2.95e5], rtol=4e-3)
+    assert_allclose(j.k_fork, [2.14e9, 2.14e9, 3.41e9, 0.955e6, 1.16e5, 8.08e5], rtol=4e-3)
+    k1u, k2u, k1p, k2p = j.contact.stiffness(j.material)
+    assert (k1u, k2u) == material.fit_contact(20e3, j.contact.z, j.contact.D_H, j.contact.D_P, 105e9, 0.28)
+    assert_allclose([k1p, k2p], [k1u / 6.9**2, k2u / 6.9])
+    assert j.contact.normal_damping(j.pin, j.material) == pytest.approx(1.18e4 / np.sqrt(2), rel=1e-3)
+
+
+def test_keys_that_may_be_left_out(tmp_path):
+    text = FILE.read_text(encoding="utf-8")
+    for key in ("k1p", "k2p", 'Jp = "20.4', 'mass = "0.32', "fit_load", "description"):
+        text, n = re.subn(rf"^{key}.*\n", "", text, flags=re.M)
+        assert n == 1, key
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    j = joints.load("mine.toml", {}, "case.toml", tmp_path)
+    assert_allclose(j.contact.stiffness(j.material)[2:], [7.5e13 / 6.9**2, 1.2e9 / 6.9])
+    assert j.pin.body(7700.0)[0] == pytest.approx(7700 * 11.34e-4 * 36.41 * MM)
+    beam = joints.load(tmp_path / "mine.toml", {"bushing": {"stiffness": "beam"}}, "case.toml")
+    assert beam.k_cross[3] == pytest.approx(4.44e5, rel=4e-3)
+
+
+def test_joint_survives_its_json(joint):
+    again = validate(Joint, joint.model_dump(mode="json"), "file.h5")
+    assert again == joint
+
+
+def test_all_faults_of_a_broken_joint_file_at_once(tmp_path):
+    text = FILE.read_text(encoding="utf-8")
+    for old, new in (
+        ('E = "210 GPa"', 'E = "-210 GPa"'),
+        ("nu = 0.28", "nu = 0.5"),
+        ('l = "36.41 mm"', 'l = "36.41"'),
+        ('mass = "1.0 kg"', 'mass = "1.0 mm"'),
+        ('"5.3e-4 kg*m^2"]', '"9e-4 kg*m^2"]'),
+        ("xi = 0.04", "xi = -0.04"),
+        ("n_stations = 5", "n_stations = 17"),
+        ('c_d = "1.18e4', 'c_dd = "1.18e4'),
+        ('D_P = "76.0 mm"', 'D_P = "76.3 mm"'),
+        ('k_tz = "4.44e5', 'k_tz = "nan'),
+    ):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    path = tmp_path / "broken.toml"
+    path.write_text(text, encoding="utf-8")
+    found = faults({"contact": {"law": "hard"}}, "broken.toml", tmp_path)
+    places = [
+        "material.E",
+        "material.nu",
+        "pin.l",
+        "hub.mass",
+        "hub.inertia",
+        "bushing.xi",
+        "bushing.cross.k_tz",
+    ]
+    places += ["contact.n_stations", "contact.D_P", "contact.c_d", "contact.c_dd"]
+    expected = {f"{path}: {p}" for p in places} | {"case.toml: joint.contact.law"}
+    assert set(found) == expected
+    assert 'damping = "beam"' in found[f"{path}: contact.c_d"].remedy
+    assert all(f.remedy for f in found.values())
+
+
+def test_overrides_can_mend_a_joint_file_and_their_faults_are_the_case_s(tmp_path):
+    text = FILE.read_text(encoding="utf-8").replace('Js = "0.01 kg*m^2"', 'Js = "0 kg*m^2"')
+    path = tmp_path / "light.toml"
+    path.write_text(text, encoding="utf-8")
+    assert set(faults({}, path)) == {f"{path}: shaft.Js"}
+    mended = joints.load(path, {"shaft": {"Js": "0.02 kg*m^2"}}, "case.toml")
+    assert mended.shaft.Js == 0.02
+    assert set(faults({"shaft": {"Js": "0 kg*m^2"}, "hubb": {}, "pin": 4}, path)) >= {
+        "case.toml: joint.hubb",
+        "case.toml: joint.pin",
+    }
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "place"),
+    [
+        ("contact", {"z": "200 mm"}, "contact"),
+        ("contact", {"coefficients": "fitted", "D_P": "76.2 mm"}, "contact.coefficients"),
+        ("contact", {"coefficients": "fitted", "fit_load": "1e9 N"}, "contact"),
+        ("contact", {"c_t": "-1 N*s/m"}, "contact.c_t"),
+        ("contact", {"delta_d": "0 um"}, "contact.delta_d"),
+        ("contact", {"n_stations": 0}, "contact.n_stations"),
+        ("contact", {"H": "2 mm"}, "contact.H"),
+        ("arm", {"mass": "0 kg"}, "arm.mass"),
+        ("bushing", {"stiffness": "stiff"}, "bushing.stiffness"),
+    ],
+)
+def test_values_without_sense_are_faults(section, values, place):
+    assert set(faults({section: values})) == {f"case.toml: joint.{place}"}
+
+
+def test_base_that_cannot_be_found(tmp_path):
+    (f,) = faults({}, "cireli2021").values()
+    assert "cirelli2021" in f.remedy
+    (f,) = faults({}, "other").values()
+    assert "cirelli2021" in f.remedy
+    (f,) = faults({}, "none.toml", tmp_path).values()
+    assert f.place == str(tmp_path / "none.toml")
+    assert "cannot be read" in f.found
+
+
+def test_operation_is_validated():
+    with pytest.raises(InputError) as caught:
+        validate(Operation, {"alpha": "90 deg", "speed": "0 rpm", "torque": "-1 N*m"}, "case.toml")
+    assert [f.place for f in caught.value.faults] == [f"case.toml: {k}" for k in ("alpha", "speed", "torque")]
+
+
+# --- from errors to parameters --------------------------------------------------------------------------
+
+
+def test_nominal_joint(joint, operation):
+    p = joints.perturb(joint, joints.nominal_errors(3, operation))
+    assert p.dtype == PARAM
+    assert_allclose(p["alpha"], np.radians(15))
+    assert_allclose(p["omega"], 500 * 2 * np.pi / 60)
+    assert_array_equal(p["torque"], 100.0)
+    assert_allclose(p["clearance"], 0.1 * MM, rtol=1e-12)
+    assert_array_equal(p["pin_point"], 0.0)
+    assert_array_equal(p["hole_point"], 0.0)
+    assert_array_equal(p["pin_axis"][0], [[0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0]])
+    assert_array_equal(p["hole_axis"][0], [[1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 1, 0]])
+    assert_allclose(p["c_cross"][0, 0], 0.08 * np.sqrt(6.54e9 * 0.32))
+    assert_allclose(p["c_fork"][0, 3], 0.08 * np.sqrt(1.91e6 * joint.arm.body(7700.0)[1][0]))
+    assert p["law"][0] == Law.MODE
+    assert_allclose(p["station_s"][0, :2], [11 * MM, -11 * MM])
+    assert_array_equal(p["station_weight"][0], [1, 1] + [0] * (MAX_STATIONS - 2))
+    assert all(np.isfinite(p[name]).all() for name in PARAM.names)
+
+
+def test_triads_are_right_handed_with_z_of_the_frame():
+    for triads in (PIN_TRIADS, ARM_TRIADS):
+        for e, t, z in triads:
+            assert_array_equal(z, [0, 0, 1])
+            assert_array_equal(t, np.cross(z, e))
+            assert_array_equal(np.cross(e, t), z)
+    # at theta = 0 and alpha = 0 all frames coincide: a pin then points the way of the arm that takes it
+    for pin, arm in enumerate(ARM_OF_PIN):
+        assert_array_equal(PIN_TRIADS[pin], ARM_TRIADS[arm])
+
+
+def test_offsets_and_tilts_by_hand(joint, operation):
+    s, c = np.sin(0.01), np.cos(0.01)
+    by_hand = {
+        ("pin1.offset_t", 1e-4): ("pin_point", 0, [-1e-4, 0, 0]),  # pin 1 on +y: t = -x
+        ("pin2.offset_t", 1e-4): ("pin_point", 1, [1e-4, 0, 0]),
+        ("pin2.offset_e", 1e-4): ("pin_point", 1, [0, -1e-4, 0]),
+        ("pin3.offset_t", 1e-4): ("pin_point", 2, [0, 1e-4, 0]),
+        ("pin4.offset_z", 1e-4): ("pin_point", 3, [0, 0, 1e-4]),
+        ("hole4.offset_t", 1e-4): ("hole_point", 3, [-1e-4, 0, 0]),
+        ("hole3.offset_e", 1e-4): ("hole_point", 2, [0, -1e-4, 0]),
+        ("hole2.offset_t", -1e-4): ("hole_point", 1, [0, 1e-4, 0]),
+        ("pin1.tilt_z", 0.01): ("pin_axis", 0, [-s, c, 0]),
+        ("pin2.tilt_z", 0.01): ("pin_axis", 1, [s, -c, 0]),
+        ("pin3.tilt_t", 0.01): ("pin_axis", 2, [c, 0, -s]),
+        ("hole4.tilt_t", 0.01): ("hole_axis", 3, [0, c, -s]),
+        ("hole4.tilt_z", -0.01): ("hole_axis", 3, [s, c, 0]),
+        ("hole1.tilt_z", 0.01): ("hole_axis", 0, [c, s, 0]),
+    }
+    nominal = joints.perturb(joint, joints.nominal_errors(1, operation))
+    for (error, value), (field, index, expected) in by_hand.items():
+        p = joints.perturb(joint, one(operation, **{error: value}))
+        assert_allclose(p[field][0, index], expected, atol=1e-18, err_msg=error)
+        p[field][0, index] = nominal[field][0, index]
+        assert p.tobytes() == nominal.tobytes(), error  # nothing else has moved
+
+
+def test_all_features_against_finite_rotations(joint, operation):
+    rng = np.random.default_rng(7)
+    errors = joints.nominal_errors(20, operation)
+    for f in ERROR_FIELDS:
+        if f.name.startswith(("pin", "hole")):
+            errors[f.name] = rng.normal(scale=0.3 if "tilt" in f.name else 1e-4, size=20)
+    p = joints.perturb(joint, errors)
+    for names, triads, kind in ((PINS, PIN_TRIADS, "pin"), (HOLES, ARM_TRIADS, "hole")):
+        for k, name in enumerate(names):
+            offset = np.stack([errors[f"{name}.offset_{a}"] for a in "etz"], axis=1)
+            assert_allclose(p[f"{kind}_point"][:, k], offset @ triads[k], atol=1e-18)
+            rotvec = np.outer(errors[f"{name}.tilt_t"], triads[k][1])
+            rotvec += np.outer(errors[f"{name}.tilt_z"], triads[k][2])
+            axis = Rotation.from_rotvec(rotvec).apply(triads[k][0])
+            assert_allclose(p[f"{kind}_axis"][:, k], axis, atol=1e-14)
+
+
+def test_rows_do_not_see_each_other(joint, operation):
+    rng = np.random.default_rng(8)
+    errors = joints.nominal_errors(9, operation)
+    for f in ERROR_FIELDS[:-4]:
+        errors[f.name] = rng.normal(scale=1e-4, size=9)
+    errors["material.E_factor"] = rng.normal(1.0, 0.05, size=9)
+    before = errors.tobytes()
+    together = joints.perturb(joint, errors)
+    alone = np.concatenate([joints.perturb(joint, errors[i : i + 1]) for i in range(9)])
+    assert together.tobytes() == alone.tobytes()
+    assert errors.tobytes() == before
+    assert len(joints.perturb(joint, errors[:0])) == 0
+
+
+def test_diameters_enter_the_clearance_of_their_pin_alone(joint, operation):
+    for pin, hole in (("pin1", "hole4"), ("pin2", "hole3"), ("pin3", "hole1"), ("pin4", "hole2")):
+        k = PINS.index(pin)
+        p = joints.perturb(joint, one(operation, **{f"{pin}.diameter": -2e-5, f"{hole}.diameter": 6e-5}))
+        expected = np.full(4, 1e-4)
+        expected[k] = 1.4e-4
+        assert_allclose(p["clearance"][0], expected, rtol=1e-12)
+
+
+def test_a_pin_of_exactly_the_hole_s_size_has_zero_clearance(joint, operation):
+    names = {f"{pin}.diameter": 0.0002 for pin in PINS}
+    assert_array_equal(joints.perturb(joint, one(operation, **names))["clearance"], 0.0)
+    interference = joints.perturb(joint, one(operation, **{"pin1.diameter": 0.0002 + 1e-9}))["clearance"]
+    assert interference[0, 0] == pytest.approx(-5e-10, rel=1e-5)
+
+
+def test_factor_on_E(joint, operation):
+    nominal = joints.perturb(joint, one(operation))
+    p = joints.perturb(joint, one(operation, material__E_factor=1.21))
+    for name in PARAM.names:
+        scale = 1.21 if name in ("k_cross", "k_fork", "k1u", "k2u", "k1p", "k2p") else 1.0
+        scale = 1.1 if name in ("c_cross", "c_fork") else scale
+        assert_allclose(p[name], scale * nominal[name], rtol=1e-14, err_msg=name)
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, MAX_STATIONS])
+def test_sliced_law_has_gauss_points_the_outermost_first(operation, n):
+    j = joints.load("cirelli2021", {"contact": {"law": "sliced", "n_stations": n}}, "case.toml")
+    p = joints.perturb(j, joints.nominal_errors(1, operation))[0]
+    s, w = p["station_s"], p["station_weight"]
+    assert p["n_stations"] == n
+    assert p["law"] == Law.SLICED
+    assert_array_equal(s[n:], 0.0)
+    assert_array_equal(w[n:], 0.0)
+    assert (np.diff(s[:n]) < 0).all()
+    assert np.abs(s).max() < 11 * MM
+    assert w.sum() == pytest.approx(2.0)
+    if n > 1:
+        assert (w * s**2).sum() == pytest.approx(2 * (11 * MM) ** 2 / 3)  # mean square over the length, twice

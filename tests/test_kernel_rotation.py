@@ -1,0 +1,65 @@
+"""Rotation vectors against scipy and against differences in time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tolstat.kernel import rotation
+
+SIZES = [0.0, 1e-9, 1e-3, 0.3, 0.31622, 0.31624, 1.0, 2.5]
+"""Angles on both sides of the change from series to closed form at 0.3162 rad."""
+
+
+def vectors(size):
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        direction = rng.normal(size=3)
+        yield size * direction / np.linalg.norm(direction), rng.normal(size=3)
+
+
+def matrix(phi):
+    out = np.full((1, 3, 3), np.nan)
+    rotation.exponential(tuple(phi), out, 0)
+    return out[0]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_exponential_is_scipys(size):
+    for phi, _ in vectors(size):
+        np.testing.assert_allclose(matrix(phi), Rotation.from_rotvec(phi).as_matrix(), atol=1e-15)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_spin_is_the_angular_velocity(size):
+    h = 1e-5
+    for phi, rate in vectors(size):
+        step = matrix(phi + h * rate) @ matrix(phi - h * rate).T
+        expected = Rotation.from_matrix(step).as_rotvec() / (2 * h)
+        np.testing.assert_allclose(rotation.spin(tuple(phi), tuple(rate)), expected, atol=2e-9)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_unspin_inverts_spin(size):
+    for phi, rate in vectors(size):
+        there = rotation.spin(tuple(phi), tuple(rate))
+        np.testing.assert_allclose(rotation.unspin(tuple(phi), there), rate, atol=1e-14)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_bias_is_the_change_of_spin_at_constant_rate(size):
+    h = 1e-5
+    for phi, rate in vectors(size):
+        ahead = np.array(rotation.spin(tuple(phi + h * rate), tuple(rate)))
+        behind = np.array(rotation.spin(tuple(phi - h * rate), tuple(rate)))
+        bias = rotation.spin_bias(tuple(phi), tuple(rate))
+        np.testing.assert_allclose(bias, (ahead - behind) / (2 * h), atol=1e-9)
+
+
+@pytest.mark.parametrize("size", [*SIZES, 3.0])
+def test_relative_vector_is_scipys(size):
+    for phi, other in vectors(size):
+        first = Rotation.from_rotvec(other)
+        pair = np.stack([first.as_matrix(), (first * Rotation.from_rotvec(phi)).as_matrix()])
+        np.testing.assert_allclose(rotation.relative_vector(pair, 0, 1), phi, atol=3e-15)

@@ -1,0 +1,335 @@
+"""Joints from their start to a settled revolution: reference joints, closed forms, symmetries, convergence."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from tests.conftest import REFERENCE, REFERENCE_CASES
+from tolstat import ideal, study, trace
+from tolstat.simulation import restore, simulate_rows
+from tolstat.tables import RESULT, Law, Method, Mode, Options, Start, Status
+
+OPTIONS = Options()
+TWIST = {"pin1__tilt_z": 0.005, "pin3__offset_t": 3e-5, "hole2__tilt_t": -0.004, "hole4__offset_e": 4e-5}
+
+
+def full(par, **options):
+    """Results row and load histories of one joint."""
+    r = simulate_rows(par, OPTIONS._replace(**options), "full")
+    return r.results[0], {name: values[0].astype(float) for name, values in r.histories.items()}
+
+
+@pytest.fixture(scope="module")
+def reference():
+    with np.load(REFERENCE / "loads.npz") as file:
+        return dict(file)
+
+
+@pytest.mark.parametrize("name", REFERENCE_CASES)
+def test_reference_joints(reference, name):
+    """Every component at every angle within 1e-3 of the largest of its kind, and the maxima too."""
+    result = trace.simulate_case(study.load_case(REFERENCE / f"{name}.toml"))
+    row = result.simulation.results[0]
+    assert row["status"] == Status.OK
+    largest = reference[f"{name}__max"]
+    for k, kind in enumerate(("F_max", "T_max")):
+        np.testing.assert_allclose(row[kind], largest[:, k], atol=1e-3 * largest[:, k].max())
+    histories = {key: values[0] for key, values in result.simulation.histories.items()}
+    loads = reference[f"{name}__loads"]
+    for k, part in enumerate((slice(0, 3), slice(3, 6))):
+        np.testing.assert_allclose(histories["loads"][..., part], loads[..., part], atol=1e-3 * largest[:, k].max())
+    np.testing.assert_allclose(histories["tau"], reference[f"{name}__tau"], atol=2e-4)
+    if f"{name}__contact" in reference:
+        contact = reference[f"{name}__contact"]
+        np.testing.assert_allclose(histories["contact"], contact, atol=1e-3 * contact.max())
+
+
+def test_straight_ideal_joint_carries_its_torque_at_the_outer_ends(params):
+    """T_r / (2 (R + z/2)) on each pin, from statics (596.5 N), and the contact stays at one end."""
+    par = params()
+    row, histories = full(par)
+    force = par.torque[0] / (2 * (par.R[0] + 0.011))
+    assert force == pytest.approx(596.5, abs=0.1)
+    np.testing.assert_allclose(histories["contact"][:, :, 0], force, rtol=2e-3)
+    np.testing.assert_allclose(histories["contact"][:, :, 1], 0.0)
+    assert (row["mode_share"][:, Mode.ONE_POINT] == 1).all()
+    # constant in these coordinates, up to where Newton stops
+    assert np.ptp(histories["loads"], axis=0).max() < 1e-2
+
+
+def output_acceleration(theta, alpha, omega):
+    """Angular acceleration of the ideal output shaft by differences of the closed form, rad/s^2."""
+    h = 1e-5
+    change = ideal.speed_ratio(theta + h, alpha) - ideal.speed_ratio(theta - h, alpha)
+    return change / (2 * h) * omega**2
+
+
+@pytest.mark.parametrize("rpm", [20.0, 500.0])
+def test_bent_ideal_joint_follows_the_closed_form(params, rpm):
+    """Contact force between T/(2(R+z/2)) and that over cos(alpha), T with the inertia of shaft and arms."""
+    alpha, omega = np.radians(15), rpm * np.pi / 30
+    par = params(alpha=alpha, speed=omega)
+    _, histories = full(par)
+    theta = np.linspace(0, 2 * np.pi, 180, endpoint=False)
+    outer = par.R[0] + 0.011
+    force = ideal.pin_force(theta, alpha, 100.0, outer)
+    assert force.min() == pytest.approx(596.5, abs=0.1)
+    assert force.max() == pytest.approx(596.5 / np.cos(alpha), abs=0.2)
+    arms = 2 * (par.arm_mass[0] * par.R[0] ** 2 + par.arm_inertia[0, 2])
+    torque = 100.0 + (par.Js[0] + arms) * output_acceleration(theta, alpha, omega)
+    expected = ideal.pin_force(theta, alpha, 1.0, outer) * torque
+    total = histories["contact"].sum(axis=2)
+    np.testing.assert_allclose(total[:, :2].mean(axis=1), expected, rtol=3e-3)
+    if rpm < 100:  # without noticeable inertia every pin stays between the bounds
+        assert total.min() > 0.999 * force.min()
+        assert total.max() < 1.001 * force.max()
+
+
+@pytest.mark.parametrize("alpha", [0.0, np.radians(15)])
+def test_speed_ratio_of_the_joint_without_errors_is_the_ideal_one(params, alpha):
+    _, histories = full(params(alpha=alpha))
+    theta = np.linspace(0, 2 * np.pi, 180, endpoint=False)
+    psi = (histories["tau"] - ideal.speed_ratio(theta, alpha)) / histories["tau"]
+    assert np.abs(psi).mean() < 1e-4
+
+
+SWAP_ALL = {"pin1": "pin2", "pin2": "pin1", "pin3": "pin4", "pin4": "pin3"}
+SWAP_ALL |= {"hole1": "hole2", "hole2": "hole1", "hole3": "hole4", "hole4": "hole3"}
+SWAP_OUTPUT = {"pin1": "pin2", "pin2": "pin1", "hole3": "hole4", "hole4": "hole3"}
+
+
+def permuted(errors, swap):
+    return {f"{swap.get(name[:name.index('__')], name[:name.index('__')])}{name[name.index('__'):]}": value for name, value in errors.items()}
+
+
+class TestSymmetries:
+    """The group of order 8 made by half turn, change of side, and mirror image maps joints to joints.
+
+    Half turn: the joint begun half a revolution later, features exchanged across the axis. Side: the output shaft
+    inclined to the other side, which is the same joint half a revolution later. Mirror: reflected in the plane of the
+    shafts, where rotation and torque change sign, and with them offset_t, tilt_z (an axial vector), F_t, T_e, T_z.
+    """
+
+    ALPHA = np.radians(12)
+
+    def loads(self, params, errors, alpha=ALPHA, sign=1.0):
+        row, histories = full(params(alpha=alpha, speed=sign * 60.0, torque=sign * 80.0, **errors), settle_tol=1e-6)
+        assert row["status"] == Status.OK
+        return histories["loads"]
+
+    @staticmethod
+    def same(a, b):
+        for part in (slice(0, 3), slice(3, 6)):
+            np.testing.assert_allclose(a[..., part], b[..., part], atol=2e-5 * np.abs(a[..., part]).max())
+
+    def test_half_turn(self, params, random_errors):
+        errors = random_errors(5)
+        there = self.loads(params, permuted(errors, SWAP_ALL))
+        here = np.roll(self.loads(params, errors), 90, axis=0)[:, [1, 0, 3, 2, 5, 4, 7, 6]]
+        self.same(here, there)
+
+    def test_side(self, params, random_errors):
+        errors = random_errors(5)
+        there = self.loads(params, errors, alpha=-self.ALPHA)
+        self.same(np.roll(self.loads(params, errors), 90, axis=0), there)
+
+    def test_mirror(self, params, random_errors):
+        errors = random_errors(5)
+        flipped = {
+            name: -value if name.endswith(("offset_t", "tilt_z")) else value
+            for name, value in permuted(errors, SWAP_OUTPUT).items()
+        }
+        there = self.loads(params, flipped, sign=-1.0)
+        here = self.loads(params, errors)
+        # both count their samples in their own sense of rotation
+        self.same(here[:, [1, 0, 2, 3, 4, 5, 7, 6]] * [1, -1, 1, -1, 1, -1], there)
+
+
+def test_ramp_and_static_start_settle_to_the_same_revolution(params):
+    par = params(alpha=0.2, **TWIST)
+    static, a = full(par, start=int(Start.STATIC), settle_tol=1e-6)
+    ramp, b = full(par, start=int(Start.RAMP), settle_tol=1e-6)
+    assert static["status"] == ramp["status"] == Status.OK
+    assert ramp["revolutions"] >= static["revolutions"]
+    np.testing.assert_allclose(a["loads"], b["loads"], atol=2e-5 * np.abs(b["loads"]).max())
+
+
+METHODS = pytest.mark.parametrize("method", [Method.BDF2, Method.GENERALIZED_ALPHA])
+TIGHT = {"settle_tol": 1e-7, "newton_tol": 1e-9, "max_revs": 40}
+
+
+@METHODS
+def test_load_histories_of_a_joint_whose_contacts_stay_are_of_order_two(params, method):
+    par = params(alpha=np.radians(15), pin1__tilt_z=np.radians(0.5))
+    fine = full(par, steps_per_rev=1440, method=int(method), **TIGHT)[1]["loads"]
+    errors = []
+    for steps in (36, 72, 144):
+        coarse = full(par, steps_per_rev=steps, method=int(method), **TIGHT)[1]["loads"]
+        errors.append(np.sqrt(np.mean((coarse - fine[:: 1440 // steps])[..., :3] ** 2)))
+    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+    np.testing.assert_allclose(slopes, 2.0, atol=0.3)
+
+
+@METHODS
+def test_largest_loads_of_a_joint_whose_contacts_switch_still_converge(params, method):
+    """Ringing after a switch costs the histories their order; docs/numerics.md states the slopes measured."""
+    par = params(alpha=np.radians(15), **TWIST)
+    fine = full(par, steps_per_rev=1440, method=int(method), **TIGHT)[0]["F_max"]
+    errors = []
+    for steps in (45, 90, 180):
+        coarse = full(par, steps_per_rev=steps, method=int(method), **TIGHT)[0]["F_max"]
+        errors.append(np.abs(coarse - fine).max())
+    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (slopes > 0.5).all(), (errors, slopes)
+    assert errors[-1] < 1e-4 * fine.max()
+
+
+@pytest.mark.parametrize("clearance", [0.0, 1e-7, 5e-6, 5e-5, 2e-4, 8e-4])
+def test_any_clearance_starts(params, clearance):
+    errors = {f"pin{i}__diameter": 2e-4 - 2 * clearance for i in (1, 2, 3, 4)}
+    row = simulate_rows(params(alpha=0.2, pin1__tilt_z=2e-3, hole3__offset_t=2e-5, **errors), OPTIONS).results[0]
+    assert row["status"] == Status.OK
+    assert row["halvings"] < 50
+
+
+def test_interference_is_outside_the_model(params):
+    row = simulate_rows(params(pin2__diameter=3e-4), OPTIONS).results[0]
+    assert row["status"] == Status.OUTSIDE_MODEL
+    assert np.isnan(row["F_max"]).all()
+
+
+def test_not_settled_is_said_and_results_kept(params):
+    row = simulate_rows(params(alpha=0.2), OPTIONS._replace(max_revs=2, settle_tol=1e-15)).results[0]
+    assert row["status"] == Status.NOT_SETTLED
+    assert row["settled"] == 0
+    assert row["closure"] > 1e-15
+    assert np.isfinite(row["F_max"]).all()
+    alone = simulate_rows(params(), OPTIONS._replace(max_revs=1)).results[0]
+    assert alone["status"] == Status.NOT_SETTLED
+    assert np.isnan(alone["closure"])
+
+
+def test_failure_of_newton_is_said_and_nothing_invented(params):
+    row = simulate_rows(params(alpha=0.3), OPTIONS._replace(newton_tol=1e-30, max_halvings=2)).results[0]
+    if row["status"] == Status.NEWTON_FAILED:
+        assert np.isnan(row["F_max"]).all()
+    par = params(alpha=0.3)
+    par.k_cross[0, 0] = np.nan
+    row = simulate_rows(par, OPTIONS).results[0]
+    assert row["status"] == Status.NEWTON_FAILED
+    assert np.isnan(row["F_max"]).all()
+
+
+def test_a_joint_without_torque_ends(params):
+    row = simulate_rows(params(alpha=0.2, torque=0.0), OPTIONS._replace(max_revs=4)).results[0]
+    assert row["status"] in (Status.OK, Status.NOT_SETTLED)
+    assert np.isfinite(row["F_max"]).all()
+
+
+def test_a_row_does_not_depend_on_the_rows_before_it(params, random_errors):
+    table = np.concatenate([params(alpha=0.2, **random_errors(k)) for k in (1, 2, 3)])
+    table[1]["k_cross"][0] = np.nan
+    together = simulate_rows(table, OPTIONS).results
+    alone = np.concatenate([simulate_rows(table[k : k + 1], OPTIONS).results for k in (2, 1, 0)])[::-1]
+    for name in RESULT.names:
+        np.testing.assert_array_equal(together[name], alone[name])
+
+
+def test_harmonics_restore_the_trace_to_the_error_they_state(params):
+    par = params(alpha=np.radians(15), **TWIST)
+    _, exact = full(par)
+    kept = {k: v[0] for k, v in simulate_rows(par, OPTIONS, "harmonics", n_harmonics=24).histories.items()}
+    restored = restore(kept["coefficients_real"], kept["coefficients_imag"], 180)
+    assert restored.shape == (180, 8, 6)
+    for k, part in enumerate((slice(0, 3), slice(3, 6))):
+        size = np.linalg.norm(exact["loads"][..., part], axis=-1).max()
+        difference = np.abs(restored - exact["loads"])[..., part].max()
+        assert difference / size == pytest.approx(kept["harmonics_error"][k], rel=1e-2, abs=1e-6)
+        assert difference / size < 0.05
+    every = {k: v[0] for k, v in simulate_rows(par, OPTIONS, "harmonics", n_harmonics=500).histories.items()}
+    restored = restore(every["coefficients_real"], every["coefficients_imag"], 180)
+    np.testing.assert_allclose(restored, exact["loads"], atol=1e-5 * np.abs(exact["loads"]).max())
+
+
+@pytest.mark.parametrize("law", [Law.UNIFORM, Law.POINT, Law.SLICED])
+def test_other_laws_share_the_statics(params, law):
+    """Whatever the law, two opposite output pins carry equal tangential forces at alpha = 0."""
+    par = params(pin1__tilt_z=2e-3)
+    par.law = law
+    if law == Law.SLICED:
+        s, weight = np.polynomial.legendre.leggauss(5)
+        par.n_stations = 5
+        par.station_s[0, :5], par.station_weight[0, :5] = 0.011 * s, weight
+    row, histories = full(par)
+    assert row["status"] == Status.OK
+    pins = histories["contact"].sum(axis=2)
+    np.testing.assert_allclose(pins[:, 0], pins[:, 1], rtol=2e-2)
+
+
+PROBE = """
+import numpy as np
+from tolstat import joint
+from tolstat.kernel import dynamics, simulate
+from tolstat.tables import Options
+operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
+par = joint.perturb(joint.load("cirelli2021", {}, "test", None), joint.nominal_errors(1, operation))
+par = par.view(np.recarray)
+"""
+
+
+def python(code, **environment):
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE + code], capture_output=True, text=True, env=os.environ | environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+ACCELERATION = """
+q, out = np.linspace(-1e-4, 2e-4, 55), np.empty(55)
+dynamics.acceleration(0.01, q, q, par[0], Options(), simulate.make_work(), out)
+print(out.tolist())
+"""
+
+
+def test_the_kernel_is_the_same_without_compilation():
+    plain = eval(python(ACCELERATION, NUMBA_DISABLE_JIT="1"))
+    np.testing.assert_allclose(eval(python(ACCELERATION)), plain, rtol=1e-9, atol=1e-9 * np.abs(plain).max())
+
+
+def test_nothing_is_allocated_per_step():
+    code = """
+from numba.core.runtime import _nrt_python, rtsys
+_nrt_python.memsys_enable_stats()
+work, state, ring = simulate.make_scratch(Options())
+out = simulate.make_results(1)
+counts = []
+for revolutions in (2, 2, 4):
+    before = rtsys.get_allocation_stats().alloc
+    options = Options(max_revs=revolutions, settle_tol=1e-12)
+    simulate.simulate_joint(par[0], options, work, state, ring, out[0])
+    counts.append(rtsys.get_allocation_stats().alloc - before)
+    assert out[0].steps > 150 * revolutions
+print(counts)
+"""
+    _, two, four = eval(python(code))
+    assert two == four
+
+
+def test_a_second_process_finds_the_compiled_kernel():
+    code = """
+from tolstat.simulation import warm_up
+warm_up()
+print(sum(simulate.simulate_joint.stats.cache_hits.values()), sum(simulate.simulate_joint.stats.cache_misses.values()))
+"""
+    python(code)
+    assert python(code).split() == ["1", "0"]
+
+
+def test_results_have_the_layout_of_the_table(params):
+    assert simulate_rows(params(), OPTIONS).results.dtype == RESULT

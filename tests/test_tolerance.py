@@ -1,0 +1,280 @@
+"""Distributions, process capability, ISO 2768 tables, and the entries of ``[tolerances]``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from tolstat import tolerance
+from tolstat.errors import InputError
+from tolstat.joint import data_dir
+from tolstat.tolerance import Distribution
+from tolstat.tolerance_entry import Site
+from tolstat.tolerance_kinds import KINDS, RADIAL_KINDS, distribution
+
+ISO = data_dir() / "iso2768.csv"
+U = np.concatenate(
+    [10.0 ** np.arange(-15, -2), np.linspace(0.01, 0.99, 99), 1 - 10.0 ** np.arange(-3.0, -16, -1)]
+)
+
+bands = st.tuples(st.floats(-1e-3, 1e-3), st.floats(1e-6, 1e-3)).map(lambda b: (b[0], b[0] + b[1]))
+shares = st.floats(0.05, 0.95)
+cpks = st.floats(0.3, 3.0)
+
+
+def build(
+    data: dict[str, object], name: str = "pin1.offset_t", center: float = 0.0, unit: str = "m"
+) -> Distribution:
+    return distribution(data, Site(name, unit, center, Path()), "study.toml", ("tolerances", name))
+
+
+def faults(data: object, name: str = "pin1.offset_t", folder: Path | None = None) -> str:
+    with pytest.raises(InputError) as caught:
+        distribution(data, Site(name, "m", 0.0, folder or Path()), "study.toml", ("tolerances", name))
+    return str(caught.value)
+
+
+def each_kind(lower: float, upper: float, share: float) -> list[Distribution]:
+    middle = lower + share * (upper - lower)
+    sigma = tolerance.sigma_of(lower, upper, middle, 1.0)
+    return [
+        tolerance.Normal(middle, sigma),
+        tolerance.TruncatedNormal(middle, sigma, lower, upper),
+        tolerance.Uniform(lower, upper),
+        tolerance.Triangular(lower, upper, middle),
+        tolerance.LogNormal(lower, tolerance.Normal(math.log(middle - lower), 0.3)),
+        tolerance.Beta(0.5 + 3 * share, 2.0, lower, upper),
+        tolerance.Rayleigh(sigma),
+        tolerance.Rayleigh(sigma, 2 * sigma),
+        tolerance.Measured.of([lower, middle, upper, middle]),
+    ]
+
+
+@settings(deadline=None, max_examples=60)
+@given(bands, shares)
+def test_ppf_is_monotone_and_finite(band: tuple[float, float], share: float) -> None:
+    for dist in each_kind(*band, share):
+        values = dist.ppf(np.sort(U))
+        assert np.isfinite(values).all(), dist
+        # rounding may swap neighbours that are one part in 1e16 of the band's position apart
+        assert (np.diff(values) >= -1e-15 * np.abs(values).max()).all(), dist
+
+
+@settings(deadline=None, max_examples=60)
+@given(bands, shares)
+def test_bounded_distributions_stay_inside_their_band(band: tuple[float, float], share: float) -> None:
+    lower, upper = band
+    for dist in each_kind(lower, upper, share):
+        if isinstance(dist, (tolerance.TruncatedNormal, tolerance.Measured)):
+            values = dist.ppf(U)
+            assert values.min() >= lower
+            assert values.max() <= upper
+        elif isinstance(dist, (tolerance.Uniform, tolerance.Triangular, tolerance.Beta)):
+            slack = 1e-15 * max(abs(lower), abs(upper))
+            assert dist.ppf(U).min() >= lower - slack
+            assert dist.ppf(U).max() <= upper + slack
+
+
+@settings(deadline=None, max_examples=60)
+@given(bands, shares, cpks)
+def test_cpk_is_reproduced_on_any_band(band: tuple[float, float], share: float, cpk: float) -> None:
+    lower, upper = band
+    mean = lower + share * (upper - lower)
+    sigma = tolerance.sigma_of(lower, upper, mean, cpk)
+    assert min(upper - mean, mean - lower) / (3 * sigma) == pytest.approx(cpk, rel=1e-12)
+    # share of rejects beyond the nearer limit, from the quantile function itself
+    tail = stats.norm.sf(3 * cpk)
+    dist = tolerance.Normal(mean, sigma)
+    distance = mean - dist.ppf(np.array([tail]))[0]
+    assert distance == pytest.approx(min(upper - mean, mean - lower), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("dist", "scipy_dist"),
+    [
+        (tolerance.Normal(1.0, 2.0), stats.norm(1.0, 2.0)),
+        (tolerance.TruncatedNormal(1.0, 2.0, 0.5, 9.0), stats.truncnorm(-0.25, 4.0, 1.0, 2.0)),
+        (tolerance.Uniform(-1.0, 3.0), stats.uniform(-1.0, 4.0)),
+        (tolerance.Triangular(-1.0, 3.0, 0.0), stats.triang(0.25, -1.0, 4.0)),
+        (tolerance.Triangular(-1.0, 3.0, 3.0), stats.triang(1.0, -1.0, 4.0)),
+        (tolerance.LogNormal(-1.0, tolerance.Normal(0.2, 0.4)), stats.lognorm(0.4, -1.0, math.exp(0.2))),
+        (tolerance.Beta(2.0, 5.0, -1.0, 3.0), stats.beta(2.0, 5.0, -1.0, 4.0)),
+        (tolerance.Rayleigh(2.0), stats.rayleigh(scale=2.0)),
+    ],
+)
+def test_ppf_inverts_scipys_distribution_function(
+    dist: Distribution, scipy_dist: stats.rv_continuous
+) -> None:
+    u = U[(U > 1e-12) & (U < 1 - 1e-12)]
+    x = dist.ppf(u)
+    low = u < 0.5
+    np.testing.assert_allclose(scipy_dist.cdf(x[low]), u[low], rtol=1e-7, atol=1e-16)
+    np.testing.assert_allclose(scipy_dist.sf(x[~low]), 1 - u[~low], rtol=1e-4)
+
+
+def test_truncated_tails_are_as_exact_above_as_below() -> None:
+    dist = tolerance.TruncatedNormal(0.0, 1.0, -30.0, 30.0)
+    u = 2.0 ** -np.arange(2, 50)
+    np.testing.assert_allclose(dist.ppf(1 - u), -dist.ppf(u), rtol=1e-12)
+
+
+def test_truncated_rayleigh_ends_at_its_radius() -> None:
+    dist = tolerance.Rayleigh(1.0, 2.0)
+    assert dist.ppf(np.array([1 - 1e-16]))[0] == pytest.approx(2.0)
+    half = dist.ppf(np.array([0.5]))[0]
+    assert stats.rayleigh.cdf(half) == pytest.approx(0.5 * stats.rayleigh.cdf(2.0), rel=1e-12)
+
+
+def test_measured_draws_each_value_equally_often() -> None:
+    dist = tolerance.Measured.of([3.0, 1.0, 2.0, 2.0])
+    np.testing.assert_array_equal(
+        dist.ppf(np.array([1e-9, 0.25, 0.26, 0.5, 0.75, 0.76, 1.0])), [1, 1, 2, 2, 2, 3, 3]
+    )
+    assert dist.describe() == tolerance.Measured.of([1.0, 2.0, 2.0, 3.0]).describe()
+    assert dist.describe() != tolerance.Measured.of([1.0, 2.0, 3.0, 3.0]).describe()
+
+
+LINEAR = {
+    "f": "0.5 .05, 3 .05, 6 .05, 6.01 .1, 30 .1, 30.01 .15, 120 .15, 400 .2, 1000 .3, 2000 .5",
+    "m": "0.5 .1, 3 .1, 6 .1, 30 .2, 120 .3, 400 .5, 1000 .8, 2000 1.2, 4000 2",
+}
+
+
+@pytest.mark.parametrize("grade", ["f", "m"])
+def test_iso2768_tables(grade: str) -> None:
+    for size, deviation in (map(float, pair.split()) for pair in LINEAR[grade].split(",")):
+        assert tolerance.iso2768(ISO, "linear", grade, size * 1e-3) == pytest.approx(
+            deviation * 1e-3, rel=1e-12
+        )
+    for leg, minutes in [(0.1, 60), (10, 60), (10.1, 30), (50, 30), (120, 20), (400, 10), (401, 5), (9e4, 5)]:
+        found = tolerance.iso2768(ISO, "angular", grade, leg * 1e-3)
+        assert found == pytest.approx(math.radians(minutes / 60), rel=1e-12)
+
+
+@pytest.mark.parametrize(("grade", "size"), [("f", 0.49), ("f", 2001), ("m", 4001)])
+def test_iso2768_outside_the_table(grade: str, size: float) -> None:
+    with pytest.raises(ValueError, match="outside the table"):
+        tolerance.iso2768(ISO, "linear", grade, size * 1e-3)
+    with pytest.raises(ValueError, match="no linear table for class 'c'"):
+        tolerance.iso2768(ISO, "linear", "c", 0.01)
+
+
+def test_normal_entries() -> None:
+    normal = {"distribution": "normal"}
+    assert build(normal | {"plus_minus": "0.1 mm", "cpk": 2.0}) == tolerance.Normal(
+        0.0, pytest.approx(1e-4 / 6)
+    )
+    asymmetric = build(normal | {"lower": "-0.02 mm", "upper": "0 mm", "truncate": True})
+    assert asymmetric == tolerance.TruncatedNormal(
+        pytest.approx(-1e-5), pytest.approx(1e-5 / 3), pytest.approx(-2e-5), 0.0
+    )
+    shifted = build(normal | {"lower": "-0.02 mm", "upper": "0 mm", "mean": "-0.005 mm", "cpk": 1.0})
+    assert shifted == tolerance.Normal(pytest.approx(-5e-6), pytest.approx(5e-6 / 3))
+    assert build(
+        normal | {"mean": "100 N*m", "std": "5 N*m"}, "operation.torque", 90.0, "N*m"
+    ) == tolerance.Normal(100, 5)
+    about = build(normal | {"plus_minus": "30 N*m"}, "operation.torque", 90.0, "N*m")
+    assert about == tolerance.Normal(90.0, pytest.approx(10.0))
+
+
+def test_other_entries() -> None:
+    iso = build({"iso2768": "f", "nominal": "50 mm", "distribution": "uniform"}, "hole1.tilt_z", 0.0, "rad")
+    assert iso == tolerance.Uniform(pytest.approx(-math.radians(0.5)), pytest.approx(math.radians(0.5)))
+    iso = build({"iso2768": "m", "nominal": "50 mm", "distribution": "uniform"})
+    assert iso == tolerance.Uniform(pytest.approx(-3e-4), pytest.approx(3e-4))
+    peaked = build({"lower": "0 mm", "upper": "3 mm", "peak": "1 mm", "distribution": "triangular"})
+    assert peaked == tolerance.Triangular(0.0, pytest.approx(3e-3), pytest.approx(1e-3))
+    assert build({"plus_minus": "1 mm", "a": 2, "b": 3, "distribution": "beta"}) == tolerance.Beta(
+        2, 3, pytest.approx(-1e-3), pytest.approx(1e-3)
+    )
+    radial = build({"plus_minus": "0.3 mm", "cpk": 2.0, "distribution": "rayleigh"}, "pin1.offset_radial")
+    assert radial == tolerance.Rayleigh(pytest.approx(5e-5))
+    radial = build({"sigma": "0.3 mm", "distribution": "rayleigh"}, "pin1.offset_radial")
+    assert radial == tolerance.Rayleigh(pytest.approx(3e-4))
+
+
+def test_lognormal_entries_have_the_moments_and_limits_asked_for() -> None:
+    by_moments = build({"mean": "0.2 mm", "std": "0.1 mm", "distribution": "lognormal"})
+    middle = (np.arange(200_000) + 0.5) / 200_000
+    values = by_moments.ppf(middle)
+    assert values.mean() == pytest.approx(2e-4, rel=1e-4)
+    assert values.std() == pytest.approx(1e-4, rel=1e-3)
+    band = {"lower": "0.1 mm", "upper": "0.4 mm", "distribution": "lognormal"}
+    limits = build(band | {"cpk": 1.0}).ppf(stats.norm.cdf([-3.0, 0.0, 3.0]))
+    np.testing.assert_allclose(limits, [1e-4, 2e-4, 4e-4], rtol=1e-9)
+    cut = build(band | {"cpk": 0.5, "truncate": True}).ppf(U)
+    assert cut.min() >= 1e-4 * (1 - 1e-12)
+    assert cut.max() <= 4e-4 * (1 + 1e-12)
+
+
+def test_measured_entry_reads_a_column(tmp_path: Path) -> None:
+    (tmp_path / "parts.csv").write_text("# station 3\npart,dev\nA,-10\nB,5\nC,15\n", encoding="utf-8")
+    entry = {"distribution": "measured", "file": "parts.csv", "column": "dev", "unit": "um"}
+    site = Site("pin1.offset_t", "m", 0.0, tmp_path)
+    dist = distribution(entry, site, "study.toml", ("tolerances",))
+    np.testing.assert_allclose(dist.ppf(np.array([0.1, 0.5, 0.9])), [-1e-5, 5e-6, 1.5e-5], rtol=1e-12)
+    assert "no column 'dv'" in faults(entry | {"column": "dv"}, folder=tmp_path)
+    assert "did you mean 'dev'" in faults(entry | {"column": "dv"}, folder=tmp_path)
+    assert "cannot be read" in faults(entry | {"file": "nowhere.csv"}, folder=tmp_path)
+    assert "'1 deg' cannot be a value in m" in faults(entry | {"unit": "deg"}, folder=tmp_path)
+    (tmp_path / "parts.csv").write_text("dev\n1\nnan\n", encoding="utf-8")
+    assert "row 2 of 'dev' is 'nan'" in faults(entry, folder=tmp_path)
+    (tmp_path / "parts.csv").write_text("dev\n1\n", encoding="utf-8")
+    assert "at least two" in faults(entry, folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("entry", "found"),
+    [
+        ("0.1 mm", "'0.1 mm' is not a tolerance"),
+        ({"plus_minus": "0.1 mm"}, "pin1.offset_t.distribution: missing key"),
+        ({"distribution": "norml"}, "did you mean 'normal'?"),
+        ({"distribution": "rayleigh", "sigma": "1 mm"}, "rayleigh is for offset_radial"),
+        ({"distribution": "normal"}, "no band"),
+        (
+            {"distribution": "normal", "plus_minus": "0.1 mm", "cpk": 0},
+            "pin1.offset_t.cpk: 0 (SI) must be positive",
+        ),
+        ({"distribution": "normal", "plus_minus": "0.1 mm", "std": "1 mm", "cpk": 1}, "std and cpk"),
+        ({"distribution": "normal", "plus_minus": "0.1 mm", "std": "1 mm"}, "truncate and a band"),
+        ({"distribution": "normal", "plus_minus": "0.1 mm", "mean": "0.1 mm"}, "mean is outside the band"),
+        (
+            {"distribution": "normal", "plus_minus": "0.1 mm", "lower": "0 mm", "upper": "1 mm"},
+            "keep one of them",
+        ),
+        ({"distribution": "normal", "plus_minus": "0.1 mm", "truncate": "yes"}, "offset_t.truncate"),
+        ({"distribution": "normal", "lower": "0 mm"}, "lower without upper"),
+        ({"distribution": "normal", "lower": "1 mm", "upper": "0 mm"}, "lower is not below upper"),
+        ({"distribution": "uniform", "plus_minus": "0.1 mm", "cpk": 1.0}, "offset_t.cpk: unknown key"),
+        ({"distribution": "uniform", "iso2768": "f"}, "iso2768 without nominal"),
+        ({"distribution": "uniform", "iso2768": "f", "nominal": "3 m"}, "3000 mm is outside the table"),
+        ({"distribution": "uniform", "iso2768": "v", "nominal": "3 mm"}, "write one of 'f' or 'm'"),
+        ({"distribution": "triangular", "plus_minus": "1 mm", "peak": "2 mm"}, "peak is outside"),
+        ({"distribution": "lognormal", "plus_minus": "1 mm"}, "reaches down to threshold"),
+        ({"distribution": "lognormal", "mean": "1 mm"}, "mean and std belong together"),
+        ({"distribution": "beta", "plus_minus": "1 mm", "a": -1}, "offset_t.b: missing key"),
+        ({"distribution": "uniform", "plus_minus": "nan mm"}, "'nan mm' is not a finite number"),
+    ],
+)
+def test_faults_of_entries(entry: object, found: str) -> None:
+    message = faults(entry)
+    assert found in message
+    assert message.startswith("study.toml: tolerances.pin1.offset_t")
+    assert "hint: " in message
+
+
+def test_every_kind_is_reachable_and_describes_itself() -> None:
+    assert set(KINDS) | set(RADIAL_KINDS) == {
+        *("normal", "uniform", "triangular", "lognormal", "beta", "rayleigh", "measured"),
+    }
+    kinds = [dist.describe()["distribution"] for dist in each_kind(0.0, 1.0, 0.5)]
+    assert kinds == [
+        *("normal", "truncatednormal", "uniform", "triangular", "lognormal", "beta"),
+        *("rayleigh", "rayleigh", "measured"),
+    ]

@@ -1,0 +1,223 @@
+"""Which share of the joints exceeds a load? Estimates with exact binomial intervals.
+
+Two kinds of doubt are kept apart. *Sampling*: other joints could have been drawn; the Clopper–Pearson
+interval covers it, for independent samples only. *Unresolved joints*: a joint that failed or did not
+settle has no valid load; counting all of them below the level, then all of them above it, bounds what they
+could change. Neither is ever dropped in silence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.tables import Status
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Exceedance:
+    """Share of the joints whose load is above a level.
+
+    Attributes
+    ----------
+    level : float
+        The load asked about, in the unit of the values.
+    n : int
+        Joints simulated, the unresolved ones included.
+    n_failed, n_unsettled : int
+        Joints without a valid load: the solution failed, or had not settled at ``solver.max_revs``.
+    count : int
+        Valid joints above the level.
+    estimate : float
+        ``count`` over the number of valid joints; NaN when none is valid.
+    lower, upper : float
+        Clopper–Pearson interval of the valid joints; NaN when the samples are not independent.
+    bound_lower, bound_upper : float
+        Share of all `n` joints above the level when every unresolved joint is below it, and above it.
+    outer_lower, outer_upper : float
+        Lower Clopper–Pearson end of ``bound_lower`` and upper end of ``bound_upper``: covers both kinds of
+        doubt. NaN when the samples are not independent.
+    """
+
+    level: float
+    n: int
+    n_failed: int
+    n_unsettled: int
+    count: int
+    estimate: float
+    lower: float
+    upper: float
+    bound_lower: float
+    bound_upper: float
+    outer_lower: float
+    outer_upper: float
+
+
+CURVE = np.dtype([(f.name, "i8" if f.type == "int" else "f8") for f in fields(Exceedance)])
+"""A row of a curve: the fields of `Exceedance`."""
+
+
+class Sample(NamedTuple):
+    """Values of one load, sorted out by what became of each joint; see `sort_out`."""
+
+    valid: FloatArray
+    n_failed: int
+    n_unsettled: int
+
+    @property
+    def n(self) -> int:
+        """Joints simulated."""
+        return self.valid.size + self.n_unresolved
+
+    @property
+    def n_unresolved(self) -> int:
+        """Joints without a valid value."""
+        return self.n_failed + self.n_unsettled
+
+
+def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
+    """Split the simulated joints into valid (sorted ascending), failed and unsettled.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Load of each joint, any unit.
+    status : array_like of int, shape (n,)
+        `tables.Status` of each joint. Pending joints are left out: when a joint is simulated has nothing
+        to do with its load. A value that is not finite counts as failed whatever its status.
+
+    Returns
+    -------
+    Sample
+        Valid values and the counts of the others.
+
+    Raises
+    ------
+    ValueError
+        When the shapes differ or are not one-dimensional.
+    """
+    load, state = np.asarray(values, dtype=float), np.asarray(status)
+    if load.ndim != 1 or load.shape != state.shape:
+        raise ValueError(f"values {load.shape} and status {state.shape} must be of one length")
+    unsettled = state == Status.NOT_SETTLED
+    valid = (state == Status.OK) & np.isfinite(load)
+    failed = ~valid & ~unsettled & (state != Status.PENDING)
+    return Sample(np.sort(load[valid]), int(failed.sum()), int(unsettled.sum()))
+
+
+def clopper_pearson(
+    count: ArrayLike, n: ArrayLike, confidence: float = 0.95
+) -> tuple[FloatArray, FloatArray]:
+    """Two-sided exact interval of a binomial probability (Clopper and Pearson 1934).
+
+    Parameters
+    ----------
+    count, n : array_like of int
+        Successes and trials, broadcast together; ``0 <= count <= n``. No trial gives (0, 1).
+    confidence : float
+        Coverage guaranteed for every true probability.
+
+    Returns
+    -------
+    lower, upper : ndarray
+        Ends of the interval, shape of the broadcast.
+
+    Raises
+    ------
+    ValueError
+        When the confidence is not between 0 and 1, or a count is not between 0 and `n`.
+    """
+    from scipy.special import betaincinv
+
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence {confidence} must lie between 0 and 1")
+    k, m = np.broadcast_arrays(np.asarray(count, dtype=float), np.asarray(n, dtype=float))
+    if np.any(k < 0) or np.any(k > m):
+        raise ValueError("count must lie between 0 and n")
+    tail = 0.5 * (1.0 - confidence)
+    # The beta function of order 0 does not exist; those ends are 0 and 1 by definition.
+    inner = betaincinv(np.maximum(k, 1.0), m - np.maximum(k, 1.0) + 1.0, tail)
+    lower = np.where(k > 0, inner, 0.0)
+    inner = betaincinv(k + 1.0, np.maximum(m - k, 1.0), 1.0 - tail)
+    upper = np.where(k < m, inner, 1.0)
+    return lower, upper
+
+
+def at(
+    values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0.95, iid: bool = True
+) -> Exceedance:
+    """Share of the joints whose load is above one level.
+
+    Parameters
+    ----------
+    values, status : array_like, shape (n,)
+        Load and `tables.Status` of each joint; leave the nominal joint out.
+    level : float
+        Level, in the unit of the values; a load equal to it does not exceed it.
+    confidence : float
+        Of the intervals.
+    iid : bool
+        Whether the joints are independent samples; the intervals are NaN when they are not (Sobol', Latin
+        hypercube, sweep), since Clopper–Pearson holds for independent samples only.
+
+    Returns
+    -------
+    Exceedance
+        Estimate, interval and bounds.
+    """
+    row = curve(values, status, [level], confidence, iid)[0]
+    return Exceedance(*row.tolist())
+
+
+def curve(
+    values: ArrayLike,
+    status: ArrayLike,
+    levels: ArrayLike | None = None,
+    confidence: float = 0.95,
+    iid: bool = True,
+) -> NDArray[np.void]:
+    """Share of the joints above each of many levels: the table of P(load > x).
+
+    Parameters
+    ----------
+    values, status, confidence, iid
+        As in `at`.
+    levels : array_like, shape (m,), optional
+        Levels in the unit of the values. By default every value that a valid joint has, ascending; between
+        two of them the share does not change, so that the table is the whole step curve.
+
+    Returns
+    -------
+    ndarray of CURVE, shape (m,)
+        One row a level. The interval is pointwise: it holds at a level chosen beforehand, not for all
+        levels jointly.
+
+    Raises
+    ------
+    ValueError
+        As `sort_out` and `clopper_pearson`, or when a level is NaN.
+    """
+    sample = sort_out(values, status)
+    x = np.unique(sample.valid) if levels is None else np.atleast_1d(np.asarray(levels, dtype=float))
+    if np.isnan(x).any():
+        raise ValueError("a level is NaN")
+    n_valid = sample.valid.size
+    count = n_valid - np.searchsorted(sample.valid, x, side="right")
+    table = np.zeros(x.shape, CURVE)
+    table["level"], table["count"] = x, count
+    table["n"], table["n_failed"], table["n_unsettled"] = sample.n, sample.n_failed, sample.n_unsettled
+    table["estimate"] = count / n_valid if n_valid else np.nan
+    table["bound_lower"] = count / sample.n if sample.n else 0.0
+    table["bound_upper"] = (count + sample.n_unresolved) / sample.n if sample.n else 1.0
+    for name in ("lower", "upper", "outer_lower", "outer_upper"):
+        table[name] = np.nan
+    if iid:
+        table["lower"], table["upper"] = clopper_pearson(count, n_valid, confidence)
+        table["outer_lower"] = clopper_pearson(count, sample.n, confidence)[0]
+        table["outer_upper"] = clopper_pearson(count + sample.n_unresolved, sample.n, confidence)[1]
+    return table

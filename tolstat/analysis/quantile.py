@@ -1,0 +1,116 @@
+"""Which load does a given share of the joints stay below? Quantiles with distribution-free intervals.
+
+The interval's ends are order statistics (Wilks 1941): the inverse of the Clopper–Pearson question, so that
+both tables of a report tell one story. An end that the number of joints cannot support is infinite.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tolstat.analysis.exceedance import FloatArray, sort_out
+
+
+class Quantile(NamedTuple):
+    """Load that a share of the joints stays at or below.
+
+    Attributes
+    ----------
+    share : float
+        The share asked about, between 0 and 1.
+    n, n_failed, n_unsettled : int
+        As in `exceedance.Exceedance`.
+    estimate : float
+        Smallest value that at least `share` of the valid joints do not exceed; NaN when none is valid.
+    lower, upper : float
+        Two-sided interval from the valid joints, ±inf when they are too few; NaN for dependent samples.
+    bound_lower, bound_upper : float
+        The estimate when every unresolved joint is below every valid one, and above: ±inf when the
+        unresolved joints alone decide.
+    """
+
+    share: float
+    n: int
+    n_failed: int
+    n_unsettled: int
+    estimate: float
+    lower: float
+    upper: float
+    bound_lower: float
+    bound_upper: float
+
+
+def at(
+    values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0.95, iid: bool = True
+) -> Quantile:
+    """Quantile of a load over the joints.
+
+    Parameters
+    ----------
+    values, status : array_like, shape (n,)
+        Load and `tables.Status` of each joint; leave the nominal joint out.
+    share : float
+        Share of the joints that stay at or below the quantile, 0 < share < 1.
+    confidence : float
+        Of the interval.
+    iid : bool
+        Whether the joints are independent samples; the interval is NaN when they are not.
+
+    Returns
+    -------
+    Quantile
+        Estimate, interval and bounds, in the unit of the values.
+
+    Raises
+    ------
+    ValueError
+        When `share` or `confidence` is not between 0 and 1, or the shapes differ.
+    """
+    if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
+        raise ValueError(f"share {share} and confidence {confidence} must lie between 0 and 1")
+    sample = sort_out(values, status)
+    x, missing = sample.valid, sample.n_unresolved
+    low, high = _interval_ranks(x.size, share, confidence) if iid else (0, 0)
+    return Quantile(
+        share,
+        sample.n,
+        sample.n_failed,
+        sample.n_unsettled,
+        _order(x, _rank(x.size, share)) if x.size else np.nan,
+        _order(x, low) if iid else np.nan,
+        _order(x, high) if iid else np.nan,
+        _order(x, _rank(sample.n, share) - missing) if sample.n else -np.inf,
+        _order(x, _rank(sample.n, share)),
+    )
+
+
+def _rank(n: int, share: float) -> int:
+    """Rank (from 1) of the inverted empirical distribution; rounding of ``n * share`` is not an excess."""
+    return max(1, int(np.ceil(n * share * (1.0 - 4e-16))))
+
+
+def _order(x: FloatArray, rank: int) -> float:
+    """Value of a rank counted from 1; outside of the sample nothing is known."""
+    if rank < 1:
+        return -np.inf
+    return float(x[rank - 1]) if rank <= x.size else np.inf
+
+
+def _interval_ranks(n: int, share: float, confidence: float) -> tuple[int, int]:
+    """Ranks l, u with P(x_l > q) and P(x_u < q) at most half the error probability each.
+
+    With B ~ binomial(n, share) the number of joints at or below the quantile q, x_l > q means B < l and
+    x_u < q means B >= u (continuous values; ties only widen the coverage).
+    """
+    from scipy.special import bdtr
+
+    tail = 0.5 * (1.0 - confidence)
+    if n == 0:
+        return 0, 1
+    cdf = np.asarray(bdtr(np.arange(n), n, share))  # P(B <= k), k = 0 .. n-1
+    low = int(np.searchsorted(cdf, tail, side="right"))
+    high = int(np.searchsorted(cdf, 1.0 - tail, side="left")) + 1
+    return low, high

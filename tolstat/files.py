@@ -1,0 +1,62 @@
+"""Files that are whole or not there: on the disk before they get their name."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def writing(path: Path, overwrite: bool = True) -> Iterator[Path]:
+    """Yield a temporary name beside `path`; what is written there becomes `path` if all went well.
+
+    Parameters
+    ----------
+    path : Path
+        The name that the file shall have. It never names half a file.
+    overwrite : bool
+        Whether a file of that name is replaced.
+
+    Raises
+    ------
+    FileExistsError
+        When `overwrite` is false and `path` exists, even if it came to exist in the meantime.
+    """
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        yield temporary
+        sync(temporary)
+        if overwrite:
+            os.replace(temporary, path)
+        else:
+            _rename_new(temporary, path)
+        sync(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def sync(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    folder = path.is_dir()
+    if folder and os.name != "posix":  # other systems do not open folders
+        return
+    handle = os.open(path, os.O_RDONLY if folder else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _rename_new(source: Path, target: Path) -> None:
+    """Give `source` another name without replacing a file, which a rename would do silently."""
+    try:
+        os.link(source, target)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without hard links
+        if target.exists():
+            raise FileExistsError(f"{target} exists") from None
+        os.rename(source, target)

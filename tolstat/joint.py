@@ -1,0 +1,175 @@
+"""The nominal joint, its operating point, and `perturb`: the one place where metrology meets mechanics."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator
+
+from tolstat import material, units
+from tolstat.joint_contact import Contact
+from tolstat.joint_file import Joint, data_dir, load
+from tolstat.joint_sections import Array, fault
+from tolstat.kernel.topology import ARM, ARM_OF_PIN, PIN, TRIAD
+from tolstat.schema import Strict
+from tolstat.tables import ERROR, HOLES, PARAM, PINS, Law
+
+__all__ = [
+    "ARM_OF_PIN",
+    "ARM_TRIADS",
+    "PIN_TRIADS",
+    "Joint",
+    "Operation",
+    "data_dir",
+    "load",
+    "nominal_errors",
+    "perturb",
+]
+
+Table = NDArray[np.void]
+
+
+PIN_TRIADS: Array = TRIAD[PIN : PIN + 4]
+"""Rows e, t, z of pins 1 to 4 in axes of the cross frame C; shape (4, 3, 3)."""
+
+ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
+"""Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
+
+
+def _steep(alpha: float) -> float:
+    if not abs(alpha) < np.pi / 2:
+        raise fault(f"{np.degrees(alpha):g} deg cannot be run by a Cardan joint", "give less than 90 deg")
+    return alpha
+
+
+class Operation(Strict):
+    """Operating point: misalignment (rad), speed of the input shaft (rad/s), resisting torque (N*m)."""
+
+    alpha: Annotated[units.Angle, AfterValidator(_steep)]
+    speed: Annotated[units.Speed, AfterValidator(units.positive)]
+    torque: Annotated[units.Torque, AfterValidator(units.not_negative)]
+
+
+def nominal_errors(n: int, operation: Operation) -> Table:
+    """Table of `n` joints without errors at an operating point.
+
+    Returns
+    -------
+    ndarray, shape (n,), dtype ERROR
+        Zero deviations, the operating point's values, factor 1 on E.
+    """
+    errors = np.zeros(n, ERROR)
+    errors["operation.alpha"] = operation.alpha
+    errors["operation.speed"] = operation.speed
+    errors["operation.torque"] = operation.torque
+    errors["material.E_factor"] = 1.0
+    return errors
+
+
+def perturb(joint: Joint, errors: Table) -> Table:
+    """Turn a table of errors into a table of parameters: what the mechanics needs of each joint.
+
+    Errors and diameters enter the contacts alone: they move no marker, mass, inertia or stiffness. The factor
+    on E scales stiffness and contact coefficients in proportion and bushing damping by its root, eq. (12);
+    contact damping it leaves alone.
+
+    Parameters
+    ----------
+    joint : Joint
+        The nominal joint.
+    errors : ndarray, shape (n,), dtype ERROR
+        Row i holds the errors of joint i.
+
+    Returns
+    -------
+    ndarray, shape (n,), dtype PARAM
+        Row i holds the parameters of joint i.
+    """
+    params = np.zeros(len(errors), PARAM)
+    for name, value in _constants(joint).items():
+        params[name] = value
+    params["alpha"] = errors["operation.alpha"]
+    params["omega"] = errors["operation.speed"]
+    params["torque"] = errors["operation.torque"]
+    factor = errors["material.E_factor"]
+    for name in ("k_cross", "k_fork"):
+        params[name] *= factor[:, None]
+    for name in ("k1u", "k2u", "k1p", "k2p"):
+        params[name] *= factor
+    with np.errstate(invalid="ignore"):  # a negative modulus ends in NaN, which the kernel reports as such
+        for name in ("c_cross", "c_fork"):
+            params[name] *= np.sqrt(factor)[:, None]
+    for i in range(4):
+        params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, PINS[i], PIN_TRIADS[i])
+        params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, HOLES[i], ARM_TRIADS[i])
+        hole = errors[f"{HOLES[ARM_OF_PIN[i]]}.diameter"]
+        params["clearance"][:, i] = _clearance(joint.contact, hole, errors[f"{PINS[i]}.diameter"])
+    return params
+
+
+def _constants(joint: Joint) -> dict[str, Any]:
+    """Parameters that are the same for every joint, at factor 1 on E."""
+    pin_mass, pin_inertia = joint.pin.body(joint.material.rho)
+    arm_mass, arm_inertia = joint.arm.body(joint.material.rho)
+    k1u, k2u, k1p, k2p = joint.contact.stiffness(joint.material)
+    s, weight = joint.contact.stations()
+    padding = (0, PARAM["station_s"].shape[0] - len(s))
+    xi = joint.bushing.xi
+    return {
+        "Js": joint.shaft.Js,
+        "R": joint.cross.R,
+        "r_b": joint.cross.r_b,
+        "l_f": joint.arm.l_f,
+        "hub_mass": joint.hub.mass,
+        "hub_inertia": joint.hub.inertia,
+        "pin_mass": pin_mass,
+        "pin_inertia": pin_inertia,
+        "arm_mass": arm_mass,
+        "arm_inertia": arm_inertia,
+        "k_cross": joint.k_cross,
+        "c_cross": material.bushing_damping(joint.k_cross, pin_mass, pin_inertia, xi),
+        "k_fork": joint.k_fork,
+        "c_fork": material.bushing_damping(joint.k_fork, arm_mass, arm_inertia, xi),
+        "law": Law[joint.contact.law.upper()],
+        "k1u": k1u,
+        "k2u": k2u,
+        "k1p": k1p,
+        "k2p": k2p,
+        "c_d": joint.contact.normal_damping(joint.pin, joint.material),
+        "c_t": joint.contact.c_t,
+        "delta_d": joint.contact.delta_d,
+        "n_stations": len(s),
+        "station_s": np.pad(s, padding),
+        "station_weight": np.pad(weight, padding),
+    }
+
+
+def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
+    """Shift and direction of a feature's axis in its frame, both of shape (n, 3).
+
+    The direction is exp(epsilon x) e, epsilon = tilt_t t + tilt_z z, as a finite rotation; as epsilon is
+    normal to e, Rodrigues' formula leaves cos|epsilon| e + sin|epsilon|/|epsilon| (epsilon x e).
+    """
+    e, t, z = triad
+    point = sum(
+        np.multiply.outer(errors[f"{feature}.offset_{name}"], axis)
+        for name, axis in zip("etz", triad, strict=True)
+    )
+    about_t, about_z = errors[f"{feature}.tilt_t"], errors[f"{feature}.tilt_z"]
+    angle = np.hypot(about_t, about_z)
+    ratio = np.sinc(angle / np.pi)
+    axis = np.multiply.outer(np.cos(angle), e)
+    axis += np.multiply.outer(ratio * about_z, t) - np.multiply.outer(ratio * about_t, z)
+    return np.asarray(point), axis
+
+
+def _clearance(contact: Contact, hole: Array, pin: Array) -> Array:
+    """Radial clearance (m) of deviations (m) of both diameters, shape (n,); rounding about zero is zero.
+
+    Without that, a pin meant to fit exactly would be an interference fit of 1e-17 m.
+    """
+    clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin))
+    clearance[np.abs(clearance) < 4.0 * np.finfo(float).eps * contact.D_H] = 0.0
+    return np.asarray(clearance)

@@ -1,0 +1,147 @@
+"""The nominal joint: what a joint file holds, and how it is read."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationInfo, field_validator
+
+from tolstat import schema
+from tolstat.errors import Fault, InputError
+from tolstat.joint_contact import Contact
+from tolstat.joint_sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft, fault
+from tolstat.schema import Strict
+
+
+class Joint(Strict):
+    """A nominal Cardan joint: the sections of a joint file in SI units.
+
+    Triples and sixes that the properties give are along or about the local axes (e, t, z) of a pin or arm.
+    """
+
+    description: str = ""
+    material: Material
+    pin: Pin
+    arm: Arm
+    hub: Hub
+    shaft: Shaft
+    cross: Cross
+    bushing: Bushing
+    contact: Contact
+
+    @field_validator("contact")
+    @classmethod
+    def _beside_the_centre(cls, value: Contact, info: ValidationInfo) -> Contact:
+        cross = info.data.get("cross")
+        if cross is not None and value.z >= 2.0 * cross.R:
+            raise fault(f"z = {value.z:g} m reaches past the joint centre", "give contact.z < 2 cross.R")
+        return value
+
+    @field_validator("contact")
+    @classmethod
+    def _fits_hertz(cls, value: Contact, info: ValidationInfo) -> Contact:
+        """Refuse a load range beyond which eq. (3) turns back: the logarithms of 2 D / b go below zero."""
+        of = info.data.get("material")
+        if value.coefficients == "fitted" and of is not None and not min(value.stiffness(of)) > 0.0:
+            raise fault("the fit to eq. (3) gives no stiffening contact", "give a smaller contact.fit_load")
+        return value
+
+    @property
+    def k_cross(self) -> Array:
+        """Stiffness of a cross bushing (N/m, N*m/rad), shape (6,): the beam's z, x, y are e, t, z."""
+        given = self.bushing.cross if self.bushing.stiffness == "given" else None
+        k = given or self.pin.beam(self.material)
+        return np.array([k.k_z, k.k_x, k.k_y, k.k_tz, k.k_bx, k.k_by])
+
+    @property
+    def k_fork(self) -> Array:
+        """Stiffness of a fork bushing (N/m, N*m/rad), shape (6,): the beam's y, x, z are e, t, z."""
+        given = self.bushing.fork if self.bushing.stiffness == "given" else None
+        k = given or self.arm.beam(self.material)
+        return np.array([k.k_y, k.k_x, k.k_z, k.k_by, k.k_bx, k.k_tz])
+
+
+def data_dir() -> Path:
+    """Directory of the data that comes with the package: in an installed wheel, or beside a checkout's."""
+    package = Path(__file__).parent
+    inside = package / "data"
+    return inside if inside.is_dir() else package.parent / "data"
+
+
+def load(
+    base: str | Path, overrides: Mapping[str, Any], place: str, relative_to: Path | None = None
+) -> Joint:
+    """Read a joint file and merge a case's own keys over it.
+
+    Parameters
+    ----------
+    base : str or Path
+        Name of a file in ``data/joints`` without ``.toml``, or a path (it ends in ``.toml`` or has a folder).
+    overrides : mapping
+        Keys of the case's ``[joint]`` table other than `base`, nested as TOML nests them.
+    place : str
+        What faults of `base` and `overrides` are reported at: the case file's name.
+    relative_to : Path, optional
+        Folder that a relative path is taken from; the working directory by default.
+
+    Returns
+    -------
+    Joint
+        The resolved joint.
+
+    Raises
+    ------
+    InputError
+        With every fault: those of the joint file under its name, those of `overrides` under `place`.
+    """
+    path = _find(base, place, relative_to)
+    data = schema.read_toml(path)
+    try:
+        return schema.validate(Joint, _merged(data, overrides), place)
+    except InputError as error:
+        raise InputError(_attributed(error.faults, data, path, place)) from error
+
+
+def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
+    path = Path(base)
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        return (relative_to or Path()) / path
+    folder = data_dir() / "joints"
+    names = sorted(p.stem for p in folder.glob("*.toml"))
+    if str(base) in names:
+        return folder / f"{base}.toml"
+    close = difflib.get_close_matches(str(base), names, n=1)
+    known = (
+        f"did you mean {close[0]!r}?"
+        if close
+        else f"write one of {', '.join(names)}, or a path to a .toml file"
+    )
+    raise InputError([Fault(f"{place}: joint.base", f"no joint is named {str(base)!r}", known)])
+
+
+def _merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(data)
+    for key, value in over.items():
+        below = merged.get(key)
+        if isinstance(below, Mapping) and isinstance(value, Mapping):
+            value = _merged(below, value)
+        merged[key] = value
+    return merged
+
+
+def _attributed(faults: tuple[Fault, ...], data: Mapping[str, Any], path: Path, place: str) -> list[Fault]:
+    """Report the faults that the joint file has by itself under its name, the others under `place`."""
+    try:
+        schema.validate(Joint, data, str(path))
+        own = {}
+    except InputError as error:
+        own = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}
+    attributed = []
+    for f in faults:
+        key = f.place.removeprefix(f"{place}: ")
+        attributed.append(own.get((key, f.found)) or Fault(f"{place}: joint.{key}", f.found, f.remedy))
+    return attributed

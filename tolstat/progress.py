@@ -1,0 +1,137 @@
+"""How far a campaign is, on stderr: a bar on a terminal, otherwise a line a minute."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol, Self, TextIO
+
+from tolstat.store import Counts
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+LINE_S = 60.0
+"""Seconds between two lines where there is no terminal."""
+
+
+class Reporter(Protocol):
+    """What a campaign tells its progress to; called once at the start, then after every block."""
+
+    def __call__(self, counts: Counts) -> None:
+        """Take note of `counts`."""
+
+
+def text(counts: Counts, begun: int, seconds: float) -> str:
+    """One line about a campaign.
+
+    Parameters
+    ----------
+    counts : Counts
+        How far it is.
+    begun : int
+        Joints that were done at the start.
+    seconds : float
+        Time since the start.
+
+    Returns
+    -------
+    str
+        ``"128 of 513 joints, 2.9 joints/s, 2:12 to go, 1 failed, 0 not settled"``; without rate and time
+        to go before the first joint is done.
+    """
+    words = [f"{counts.done} of {counts.total} joints"]
+    if counts.done > begun and seconds > 0:
+        rate = (counts.done - begun) / seconds
+        words += [f"{rate:.3g} joints/s", f"{_clock((counts.total - counts.done) / rate)} to go"]
+    return ", ".join([*words, f"{counts.failed} failed", f"{counts.not_settled} not settled"])
+
+
+def _clock(seconds: float) -> str:
+    minutes, s = divmod(round(seconds), 60)
+    hours, m = divmod(minutes, 60)
+    return f"{hours}:{m:02d}:{s:02d}" if hours else f"{m}:{s:02d}"
+
+
+class Lines:
+    """Progress as a line a minute, and one when the campaign ends.
+
+    Parameters
+    ----------
+    stream : file, optional
+        Where the lines go; stderr without it.
+    clock : callable, optional
+        Time in seconds.
+    """
+
+    def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._stream = stream
+        self._clock = clock
+        self._start: tuple[int, float] | None = None
+        self._said = 0.0
+        self._last = ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._last:
+            self._print()
+
+    def __call__(self, counts: Counts) -> None:
+        """Take note of `counts`, and say them if a minute has passed."""
+        now = self._clock()
+        if self._start is None:
+            self._start = counts.done, now
+            self._said = now
+        self._last = text(counts, self._start[0], now - self._start[1])
+        if now - self._said >= LINE_S:
+            self._said = now
+            self._print()
+
+    def _print(self) -> None:
+        print(f"tolstat: {self._last}", file=self._stream or sys.stderr, flush=True)
+        self._last = ""
+
+
+class Bar:
+    """Progress as a bar with rate and time to go, for a terminal."""
+
+    def __init__(self) -> None:
+        self._start: tuple[int, float] | None = None
+        self._bar: Progress | None = None
+
+    def __enter__(self) -> Self:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        columns = (BarColumn(), TextColumn("{task.description}"))
+        self._bar = Progress(*columns, console=Console(stderr=True))
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, counts: Counts) -> None:
+        """Move the bar to `counts`."""
+        if self._bar is None:
+            return
+        now = time.monotonic()
+        if self._start is None:
+            self._start = counts.done, now
+            self._bar.add_task("", total=counts.total)
+        words = text(counts, self._start[0], now - self._start[1])
+        self._bar.update(self._bar.task_ids[0], completed=counts.done, description=words)
+
+
+def reporter() -> Bar | Lines:
+    """Return the progress for this stderr: a context manager to give to `campaign.run`."""
+    return Bar() if sys.stderr.isatty() else Lines()

@@ -1,0 +1,114 @@
+"""Reports of a result file: a table to read, pictures, and their numbers as CSV.
+
+A campaign of random joints gets load exceedance; a sweep gets loads against the swept value.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from tolstat.errors import Fault, InputError
+from tolstat.files import writing
+from tolstat.report import text
+from tolstat.report.source import Campaign, read
+from tolstat.store import ResultStore
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Report(NamedTuple):
+    """What a report came to.
+
+    Attributes
+    ----------
+    table : str
+        The numbers that the study asks for, as aligned text.
+    notes : str
+        How many joints they stand on and what the intervals cover.
+    files : list of Path
+        Pictures and CSV files written.
+    """
+
+    table: str
+    notes: str
+    files: list[Path]
+
+
+def write(path: str | Path, out_dir: str | Path | None = None) -> list[Path]:
+    """Write the report of a result file; see `build`.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+    """
+    return build(path, out_dir).files
+
+
+def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
+    """Write the report of a result file, in whatever state the campaign is.
+
+    For ``FILE.h5`` it writes ``FILE_exceedance.png``, ``.svg`` and ``.csv`` (the curves),
+    ``FILE_quantiles.csv`` and, where the study sets limits, ``FILE_limits.csv``; for a sweep
+    ``FILE_sweep.png``, ``.svg`` and ``.csv``.
+
+    Parameters
+    ----------
+    path : str or Path
+        The result file.
+    out_dir : str or Path, optional
+        An existing folder; by default that of the file.
+
+    Returns
+    -------
+    Report
+        Table, notes and the files written.
+
+    Raises
+    ------
+    StoreError
+        When the file cannot be read.
+    InputError
+        When the folder cannot be written to.
+    """
+    path = Path(path)
+    with ResultStore.open(path) as store:
+        campaign = read(store)
+    stem = (Path(out_dir) if out_dir is not None else path.parent) / path.stem
+    try:
+        return _sweep(campaign, stem) if campaign.method == "sweep" else _exceedance(campaign, stem)
+    except OSError as error:
+        found = f"cannot be written to: {error.strerror or error}"
+        raise InputError([Fault(str(stem.parent), found, "name an existing folder with --out")]) from error
+
+
+def _exceedance(campaign: Campaign, stem: Path) -> Report:
+    from tolstat.report import exceedance, style
+
+    files = style.save(exceedance.figure(campaign), stem.with_name(f"{stem.name}_exceedance"))
+    files.append(_csv(exceedance.curves(campaign), stem, "exceedance"))
+    quantiles = exceedance.quantiles(campaign)
+    files.append(_csv(quantiles, stem, "quantiles"))
+    table = text.quantiles(quantiles)
+    if campaign.limits:
+        limits = exceedance.limits(campaign)
+        files.append(_csv(limits, stem, "limits"))
+        table = text.limits(limits)
+    return Report(table, f"{campaign.head()}\n{exceedance.note(campaign)}", files)
+
+
+def _sweep(campaign: Campaign, stem: Path) -> Report:
+    from tolstat.report import style, sweep
+
+    files = style.save(sweep.figure(campaign), stem.with_name(f"{stem.name}_sweep"))
+    files.append(_csv(sweep.table(campaign), stem, "sweep"))
+    return Report(text.plain(sweep.worst(campaign)), campaign.head(), files)
+
+
+def _csv(frame: pd.DataFrame, stem: Path, what: str) -> Path:
+    path = stem.with_name(f"{stem.name}_{what}.csv")
+    with writing(path) as temporary:
+        frame.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+    return path

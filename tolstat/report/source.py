@@ -1,0 +1,189 @@
+"""What a report needs of a result file: the statistics' rows, the nominal joint, limits, swept errors."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.errors import Fault, InputError
+from tolstat.tables import BUSHINGS, ERROR_FIELDS, PINS, Status
+
+if TYPE_CHECKING:
+    from tolstat.store import ResultStore
+
+FloatArray = NDArray[np.float64]
+METHODS = {"random": "random sampling", "sobol": "Sobol' points", "lhs": "Latin hypercube", "sweep": "sweep"}
+LOADS = tuple(f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT")
+"""The loads that every report shows: force and torque of each bushing."""
+_ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}
+_DISPLAY = {
+    "m": ("mm", 1e3),
+    "rad": ("deg", 180.0 / np.pi),
+    "rad/s": ("rpm", 30.0 / np.pi),
+    "N*m": ("N m", 1.0),
+    "1": ("", 1.0),
+}
+
+
+class Axis(NamedTuple):
+    """One independently swept quantity.
+
+    Attributes
+    ----------
+    label : str
+        The study's pattern, such as ``pin*.diameter``, or the error's name.
+    unit : str
+        Unit for the reader, such as ``mm``.
+    values : ndarray, shape (n,)
+        Value at each joint, in `unit`.
+    """
+
+    label: str
+    unit: str
+    values: FloatArray
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign as reports see it; row i of both tables is one joint.
+
+    Attributes
+    ----------
+    name : str
+        Name of the study.
+    method : str
+        Sampling method, a key of `METHODS`.
+    limits : mapping of str to float
+        Allowed load in SI units by name (``"cross1.F"``).
+    errors, results : ndarray of ERROR and RESULT, shape (n,)
+        The joints that count; the nominal joint is not among them.
+    nominal : ndarray of RESULT, shape (1,) or (0,)
+        The joint without errors, where the campaign has one and it settled.
+    patterns : tuple of str
+        What the study sweeps; empty for a random campaign.
+    """
+
+    name: str
+    method: str
+    limits: Mapping[str, float]
+    errors: NDArray[np.void]
+    results: NDArray[np.void]
+    nominal: NDArray[np.void]
+    patterns: tuple[str, ...] = ()
+
+    @property
+    def iid(self) -> bool:
+        """Whether the joints are independent samples."""
+        return self.method == "random"
+
+    def count(self, *states: Status) -> int:
+        """Joints in any of the given states."""
+        return int(np.isin(self.results["status"], [int(state) for state in states]).sum())
+
+    def head(self) -> str:
+        """Sentence with the number of joints and of those without a valid result."""
+        failed = self.count(Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL)
+        pending = self.count(Status.PENDING)
+        text = f"{len(self.results) - pending} joints ({METHODS.get(self.method, self.method)}), "
+        text += f"{failed} failed, {self.count(Status.NOT_SETTLED)} not settled"
+        return text + (f", {pending} still pending" if pending else "")
+
+
+def read(store: ResultStore) -> Campaign:
+    """Take from a result file what a report needs; row 0 goes apart where it is the nominal joint."""
+    errors, results = store.errors(), store.results()
+    nominal = results[:0]
+    if store.sampling["nominal_first"]:
+        nominal = results[:1][results["status"][:1] == Status.OK]
+        errors, results = errors[1:], results[1:]
+    patterns = tuple(_patterns(tomllib.loads(store.study_text).get("sweep", {})))
+    method = str(store.sampling["method"])
+    return Campaign(store.study_name, method, store.limits, errors, results, nominal, patterns)
+
+
+def _patterns(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
+    """Key paths of the entries of ``[sweep]``, whether quoted or dotted."""
+    for key, value in table.items():
+        if isinstance(value, Mapping) and "from" not in value:
+            yield from _patterns(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}"
+
+
+def load(results: NDArray[np.void], name: str) -> tuple[FloatArray, str]:
+    """Largest load over the last revolution, by its name.
+
+    Parameters
+    ----------
+    results : ndarray of RESULT, shape (n,)
+        Results of the joints.
+    name : str
+        ``cross1.F``, ``fork3.T``, ``pin1.contact`` or ``psi``.
+
+    Returns
+    -------
+    values : ndarray, shape (n,)
+        The load of each joint, SI.
+    unit : str
+        ``N``, ``N*m`` or ``1``.
+
+    Raises
+    ------
+    InputError
+        When there is no such load.
+    """
+    part, _, letter = name.partition(".")
+    if part in BUSHINGS and letter in ("F", "T"):
+        return results[f"{letter}_max"][:, BUSHINGS.index(part)], "N" if letter == "F" else "N*m"
+    if part in PINS and letter == "contact":
+        return results["contact_max"][:, PINS.index(part), :].max(axis=1), "N"
+    if name == "psi":
+        return results["psi_max"], "1"
+    raise InputError(
+        [Fault(f"limits.{name}", "is not a load", "name cross1.F .. fork4.T, pin1.contact or psi")]
+    )
+
+
+def swept_axes(campaign: Campaign) -> list[Axis]:
+    """Quantities that a sweep moves, in the study's order.
+
+    Errors that are equal in every joint move together and make one axis.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        A campaign of the method ``sweep``.
+
+    Returns
+    -------
+    list of Axis
+        Empty when nothing varies.
+    """
+    groups: dict[bytes, list[str]] = {}
+    for field in ERROR_FIELDS:
+        column = np.ascontiguousarray(campaign.errors[field.name])
+        if column.size and np.ptp(column) > 0:
+            groups.setdefault(column.tobytes(), []).append(field.name)
+    axes = []
+    for names in groups.values():
+        unit, factor = _DISPLAY[_ERROR_UNITS[names[0]]]
+        values = campaign.errors[names[0]] * factor
+        values[np.abs(values) < 1e-12 * np.abs(values).max()] = (
+            0.0  # a sweep through zero misses it by rounding
+        )
+        axes.append(Axis(_label(names, campaign.patterns), unit, values))
+    rank = {pattern: i for i, pattern in enumerate(campaign.patterns)}
+    return sorted(axes, key=lambda axis: rank.get(axis.label, len(rank)))
+
+
+def _label(names: list[str], patterns: tuple[str, ...]) -> str:
+    for pattern in patterns:
+        if all(fnmatchcase(name, pattern) for name in names):
+            return pattern
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"

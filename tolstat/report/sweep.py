@@ -1,0 +1,189 @@
+"""Loads of a sweep: largest force and torque of every bushing against the swept value."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from tolstat.report import style
+from tolstat.report.source import LOADS, Axis, Campaign, load, swept_axes
+from tolstat.tables import Status
+
+Mask = NDArray[np.bool_]
+MAX_LEGEND = 6
+"""Most values of the second swept quantity that the legend names."""
+
+
+def table(campaign: Campaign) -> pd.DataFrame:
+    """Largest loads of every joint of a sweep.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        A campaign of the method ``sweep``.
+
+    Returns
+    -------
+    DataFrame
+        One row a joint, pending and failed ones included: the swept values, headed by label and unit
+        for the reader (``pin*.diameter [mm]``); ``status``; the loads of `source.LOADS`, SI, headed likewise;
+        ``psi``.
+    """
+    columns: dict[str, object] = {_head(axis): axis.values for axis in swept_axes(campaign)}
+    columns["status"] = [Status(int(code)).label for code in campaign.results["status"]]
+    for name in LOADS:
+        values, unit = load(campaign.results, name)
+        columns[f"{name} [{unit}]"] = values
+    columns["psi"] = load(campaign.results, "psi")[0]
+    return pd.DataFrame(columns)
+
+
+def worst(campaign: Campaign) -> pd.DataFrame:
+    """Short form of `table`: of the cross and of the fork bushings the largest force and torque."""
+    full = table(campaign)
+    short = full[[c for c in full.columns if not str(c).startswith(("cross", "fork", "psi"))]].copy()
+    for group in ("cross", "fork"):
+        for unit in ("N", "N*m"):
+            letter = "F" if unit == "N" else "T"
+            columns = [f"{group}{i}.{letter} [{unit}]" for i in (1, 2, 3, 4)]
+            short[f"{group}.{letter} [{unit}]"] = full[columns].max(axis=1)
+    return short
+
+
+def figure(campaign: Campaign) -> Figure:
+    """Draw the loads against the first swept quantity.
+
+    One swept quantity gives a line for each bushing. Several give a line for each combination of the others,
+    of the largest load among the four bushings, coloured by the second.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        A campaign of the method ``sweep``.
+
+    Returns
+    -------
+    Figure
+        Four panels; joints that did not settle are hollow, those without a result are crosses at the foot.
+    """
+    axes = swept_axes(campaign)
+    with style.settings():
+        title = f"{campaign.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
+        page, panels = style.panels(title, f"{campaign.head()}\n{_note(axes)}")
+        first = (
+            axes[0] if axes else Axis("joint", "", np.arange(1, len(campaign.results) + 1, dtype=np.float64))
+        )
+        for group, letter, ax in panels:
+            ax.set_xlabel(_head(first))
+            ax.xaxis.set_major_locator(MaxNLocator(6))
+            ax.set_ylabel(f"largest |{letter}| [{'N' if letter == 'F' else 'N m'}]")
+            _panel(ax, campaign, [first, *axes[1:]], group, letter)
+        _legend(page, campaign, axes)
+    return page
+
+
+def _head(axis: Axis) -> str:
+    return f"{axis.label} [{axis.unit}]" if axis.unit else axis.label
+
+
+def _note(axes: list[Axis]) -> str:
+    if len(axes) < 2:
+        return "largest modulus over the last revolution of each joint"
+    others = ", ".join(axis.label for axis in axes[2:])
+    text = f"largest of the four bushings, coloured by {_head(axes[1])}"
+    return text + (f"; one line for each {others}" if others else "")
+
+
+def _panel(ax: Axes, campaign: Campaign, axes: list[Axis], group: str, letter: str) -> None:
+    loads = np.stack([load(campaign.results, f"{group}{i}.{letter}")[0] for i in (1, 2, 3, 4)])
+    if len(axes) == 1:
+        for i, values in enumerate(loads):
+            every = np.ones(values.size, dtype=bool)
+            _line(ax, campaign, axes[0].values, values, every, style.COLOURS[i], style.DASHES[i])
+    else:
+        for colour, rows in _combinations(axes):
+            _line(ax, campaign, axes[0].values, loads.max(axis=0), rows, colour, "-")
+    if len(campaign.nominal):
+        nominal = max(load(campaign.nominal, f"{group}{i}.{letter}")[0][0] for i in (1, 2, 3, 4))
+        ax.axhline(nominal, color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0)), zorder=1.5)
+    limits = {
+        campaign.limits[name]
+        for name in (f"{group}{i}.{letter}" for i in (1, 2, 3, 4))
+        if name in campaign.limits
+    }
+    bottom, top = ax.get_ylim()
+    for limit in sorted(limits):
+        if limit < top + 0.5 * (top - bottom):
+            ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)))
+            text = f"limit {limit:g} {'N' if letter == 'F' else 'N m'}"
+            style.note(ax, text, limit)
+
+
+def _line(
+    ax: Axes,
+    campaign: Campaign,
+    x: NDArray[np.float64],
+    values: NDArray[np.float64],
+    rows: Mask,
+    colour: str,
+    dash: style.Dash,
+) -> None:
+    """Draw one line over the joints `rows`; it is broken where a joint has no result."""
+    order = np.flatnonzero(rows)[np.argsort(x[rows], kind="stable")]
+    status = campaign.results["status"][order]
+    shown = np.where(np.isin(status, [Status.OK, Status.NOT_SETTLED]), values[order], np.nan)
+    ax.plot(x[order], shown, color=colour, ls=dash, marker="o", ms=3.2, zorder=3)
+    loose = status == Status.NOT_SETTLED
+    ax.plot(x[order][loose], shown[loose], ls="", marker="o", ms=6.5, mfc="white", mec=colour, zorder=4)
+    gone = ~np.isin(status, [Status.OK, Status.NOT_SETTLED, Status.PENDING])
+    foot = np.full(int(gone.sum()), 0.02)
+    ax.plot(
+        x[order][gone], foot, ls="", marker="x", color=style.INK, transform=ax.get_xaxis_transform(), zorder=4
+    )
+
+
+def _combinations(axes: list[Axis]) -> list[tuple[str, Mask]]:
+    """Colour and rows of every combination of the quantities after the first."""
+    second = np.unique(axes[1].values)
+    shades = dict(zip(second, _shades(second.size), strict=True))
+    grid = np.column_stack([axis.values for axis in axes[1:]])
+    return [(shades[point[0]], (grid == point).all(axis=1)) for point in np.unique(grid, axis=0)]
+
+
+def _shades(count: int) -> list[str]:
+    """Colours in order from dark to light that stay in order in grey and for colour-blind readers."""
+    return [to_hex(colormaps["viridis"](x)) for x in np.linspace(0.0, 0.88, count)]
+
+
+def _legend(page: Figure, campaign: Campaign, axes: list[Axis]) -> None:
+    handles: list[Artist]
+    if len(axes) < 2:
+        handles = [
+            Line2D([], [], color=c, ls=d, marker="o", ms=3.2)
+            for c, d in zip(style.COLOURS, style.DASHES, strict=True)
+        ]
+        labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
+    else:
+        second = np.unique(axes[1].values)
+        named = np.unique(np.linspace(0, second.size - 1, MAX_LEGEND).round().astype(int))
+        shades = _shades(second.size)
+        handles = [Line2D([], [], color=shades[i], marker="o", ms=3.2) for i in named]
+        labels = [f"{second[i]:.4g} {axes[1].unit}".strip() for i in named]
+    if len(campaign.nominal):
+        handles.append(Line2D([], [], color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0))))
+        labels.append("nominal joint, largest")
+    if campaign.count(Status.NOT_SETTLED):
+        handles.append(Line2D([], [], ls="", marker="o", ms=6.5, mfc="white", mec=style.INK))
+        labels.append("not settled")
+    if campaign.count(Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL):
+        handles.append(Line2D([], [], ls="", marker="x", color=style.INK))
+        labels.append("no result")
+    style.legend(page, handles, labels)

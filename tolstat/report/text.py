@@ -1,0 +1,98 @@
+"""Tables as aligned text, for standard output."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+UNITS = {"N*m": "N m", "1": ""}
+
+
+def limits(table: pd.DataFrame) -> str:
+    """Text of `exceedance.limits`: the share of joints above each limit.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As `exceedance.limits` returns it.
+
+    Returns
+    -------
+    str
+        One line a limit. The last column, there only when joints failed or did not settle, counts them below
+        and above the limit and, for independent samples, adds the interval.
+    """
+    unresolved = bool((table["n_failed"] + table["n_unsettled"]).any())
+    rows = [["load", "nominal", "limit", "joints", "above", "share", "95 % interval"]]
+    rows[0] += ["failed, unsettled both ways"] if unresolved else []
+    for row in table.to_dict("records"):
+        line = [row["load"], _value(row["nominal"], row["unit"]), _value(row["level"], row["unit"])]
+        line += [str(row["n"]), str(row["count"]), _percent(row["estimate"])]
+        line.append(_range(row["lower"], row["upper"]))
+        if unresolved:
+            iid = not math.isnan(row["outer_lower"])
+            ends = ("outer_lower", "outer_upper") if iid else ("bound_lower", "bound_upper")
+            line.append(_range(row[ends[0]], row[ends[1]]))
+        rows.append(line)
+    return align(rows)
+
+
+def quantiles(table: pd.DataFrame) -> str:
+    """Text of `exceedance.quantiles`: one line a load, one column a share.
+
+    Returns
+    -------
+    str
+        The interval is that of the highest share; ``inf`` where the joints are too few for an end.
+    """
+    shares = sorted(table["share"].unique())
+    heads = [f"{100.0 * share:g} %" for share in shares]
+    rows = [["load", "nominal", *heads, f"95 % interval of {heads[-1]}"]]
+    for name, part in table.groupby("load", sort=False):
+        lines = part.sort_values("share").to_dict("records")
+        last, unit = lines[-1], lines[-1]["unit"]
+        interval = (
+            "-" if math.isnan(last["lower"]) else f"{last['lower']:.4g} .. {_value(last['upper'], unit)}"
+        )
+        rows.append(
+            [
+                str(name),
+                _value(last["nominal"], unit),
+                *(_value(q["estimate"], unit) for q in lines),
+                interval,
+            ]
+        )
+    return align(rows)
+
+
+def plain(table: pd.DataFrame) -> str:
+    """Text of any frame, numbers to five digits, headed by its columns."""
+    rows = [[str(column) for column in table.columns]]
+    for line in table.itertuples(index=False):
+        rows.append([f"{x:.5g}" if isinstance(x, float) else str(x) for x in line])
+    return align(rows)
+
+
+def align(rows: list[list[str]]) -> str:
+    """Align rows of text in columns: the first to the left, the others to the right."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+        lines.append("  ".join([row[0].ljust(widths[0]), *cells]).rstrip())
+    return "\n".join(lines)
+
+
+def _value(x: float, unit: str) -> str:
+    return "-" if math.isnan(x) else f"{x:.4g} {UNITS.get(unit, unit)}".strip()
+
+
+def _percent(share: float) -> str:
+    return "-" if math.isnan(share) else f"{100.0 * share:.3g} %"
+
+
+def _range(low: float, high: float) -> str:
+    return "-" if math.isnan(low) else f"{100.0 * low:.3g} .. {_percent(high)}"

@@ -1,0 +1,151 @@
+"""Names of errors and results in a file: ``"pin*.offset_t"`` selects the same error of all pins.
+
+In TOML a name may be written as one quoted key or dotted: ``pin1.tilt_z = "0.5 deg"`` arrives as a table in
+a table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
+
+from tolstat.errors import Fault, InputError
+from tolstat.schema import did_you_mean, dotted
+from tolstat.tables import BUSHINGS, ERROR_FIELDS, HOLES, PINS
+
+UNITS = {field.name: field.unit for field in ERROR_FIELDS}
+"""SI unit of every error, in the order of the table."""
+
+RADIAL_UNITS = {f"{feature}.offset_radial": "m" for feature in PINS + HOLES}
+"""Radial offsets: not columns of the table but two of them, offset_t and offset_z, drawn together."""
+
+LIMIT_UNITS = {
+    **{f"{bushing}.{load}": unit for bushing in BUSHINGS for load, unit in (("F", "N"), ("T", "N*m"))},
+    **{f"{pin}.contact": "N" for pin in PINS},
+    "psi": "1",
+}
+"""SI unit of every result that can have a limit."""
+
+
+class Entry(NamedTuple):
+    """One entry of a table keyed by error names.
+
+    Attributes
+    ----------
+    pattern : str
+        The name or pattern, dotted.
+    path : tuple of str
+        Key path in the file.
+    value : object
+        What the file says.
+    """
+
+    pattern: str
+    path: tuple[str, ...]
+    value: Any
+
+
+def entries(table: Mapping[str, Any], section: str) -> Iterator[Entry]:
+    """Entries of a table whose keys are names, written quoted or dotted."""
+    for key, value in table.items():
+        if "." not in key and isinstance(value, Mapping):
+            for name, inner in value.items():
+                yield Entry(f"{key}.{name}", (section, key, name), inner)
+        else:
+            yield Entry(key, (section, key), value)
+
+
+def select(pattern: str, names: Iterable[str]) -> list[str]:
+    """Return those of `names` that a pattern selects; ``*`` does not reach across the dot.
+
+    A radial offset is selected by its full key only: ``"pin1.offset_*"`` means the offsets along e, t, z.
+    """
+    feature, _, key = pattern.partition(".")
+    return [
+        name
+        for name in names
+        if fnmatchcase(name.partition(".")[0], feature)
+        and fnmatchcase(name.partition(".")[2], key)
+        and (not name.endswith(".offset_radial") or key == "offset_radial")
+    ]
+
+
+def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
+    """Names that an entry selects: at least one, all of one kind of quantity.
+
+    Parameters
+    ----------
+    entry : Entry
+        Entry of a table keyed by names or patterns.
+    units : mapping
+        The names to select from, and the unit of each.
+    place : str
+        File that faults name.
+
+    Returns
+    -------
+    list of str
+        In the order of `units`.
+
+    Raises
+    ------
+    InputError
+        When the entry selects nothing or names of different units.
+    """
+    selected = select(entry.pattern, units)
+    where = f"{place}: {dotted(entry.path)}"
+    if not selected:
+        raise InputError([Fault(where, "selects nothing", _instead(entry.pattern, list(units)))])
+    kinds = sorted({units[name] for name in selected})
+    if len(kinds) > 1:
+        found = f"selects quantities of different kinds ({', '.join(kinds)})"
+        raise InputError([Fault(where, found, "write one entry for each kind")])
+    return selected
+
+
+def _instead(pattern: str, names: Sequence[str]) -> str:
+    """Remedy for a pattern that selects nothing: which half of it is wrong."""
+    feature, _, key = pattern.partition(".")
+    features = list(dict.fromkeys(name.partition(".")[0] for name in names))
+    known = [f for f in features if fnmatchcase(f, feature)]
+    if not known:
+        return did_you_mean(feature, features)
+    return did_you_mean(key, [n.partition(".")[2] for n in names if n.partition(".")[0] == known[0]])
+
+
+class Claims:
+    """Which entry has decided which error; a second entry for the same error is a fault naming both."""
+
+    def __init__(self, place: str) -> None:
+        self._place = place
+        self._owner: dict[str, Entry] = {}
+
+    def claim(self, entry: Entry, names: Iterable[str]) -> None:
+        """Note that `entry` decides `names`; a radial offset decides offset_t and offset_z.
+
+        Raises
+        ------
+        InputError
+            When an earlier entry decides one of them.
+        """
+        claimed = [column for name in names for column in columns_of(name)]
+        clashes = {self._owner[c].path: c for c in claimed if c in self._owner}
+        self._owner.update((c, entry) for c in claimed if c not in self._owner)
+        if clashes:
+            where = f"{self._place}: {dotted(entry.path)}"
+            remedy = "leave one of the two out, or narrow the pattern"
+            raise InputError(
+                [
+                    Fault(where, f"{column} is decided by {dotted(path)} already", remedy)
+                    for path, column in clashes.items()
+                ]
+            )
+
+
+def columns_of(name: str) -> tuple[str, ...]:
+    """Columns of the table that an error's distribution fills."""
+    if name.endswith(".offset_radial"):
+        feature = name.partition(".")[0]
+        return f"{feature}.offset_t", f"{feature}.offset_z"
+    return (name,)

@@ -1,0 +1,385 @@
+"""The result file of a campaign: errors and results of every joint, and the list of what is still to do.
+
+Everything but histories lies in datasets of a fixed size, written in full when the file is created. From then
+on only numbers inside them change and none of HDF5's own structures, so a process killed at any moment leaves
+a file that can be read. Values are on the disk before the status that declares them valid.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import tables
+from tolstat.errors import StoreError
+from tolstat.files import writing
+from tolstat.histories import HistoryParts
+from tolstat.result_file import attributes, check_schema, create_table, fault, open_hdf5, pending_results
+from tolstat.tables import HistorySpec, Simulation, Status
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tolstat.study import Study
+
+LABELS = np.array([s.label for s in Status], dtype=object)
+NO_RESULTS = (Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL)
+
+
+class Counts(NamedTuple):
+    """How far a campaign is.
+
+    Attributes
+    ----------
+    total : int
+        Joints of the campaign.
+    done : int
+        Joints that are not pending.
+    not_settled : int
+        Joints among them whose last revolution does not close.
+    failed : int
+        Joints among them without results.
+    """
+
+    total: int
+    done: int
+    not_settled: int
+    failed: int
+
+    def after(self, status: NDArray[np.uint8]) -> Counts:
+        """Count further joints that have ended with `status`, (m,)."""
+        return Counts(
+            self.total,
+            self.done + int(np.count_nonzero(status != Status.PENDING)),
+            self.not_settled + int(np.count_nonzero(status == Status.NOT_SETTLED)),
+            self.failed + int(np.count_nonzero(np.isin(status, NO_RESULTS))),
+        )
+
+
+class ResultStore:
+    """A result file; make one with `create` or `open`, and use it as a context manager.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    n : int
+        Number of joints.
+    study_name, study_text : str
+        Name of the study and the TOML that it was read from.
+    identity : dict
+        Everything that decides the numbers, by dotted key.
+    joint, options, sampling, versions : dict
+        The joint as resolved, solver options, sampling (with ``dimensions``), versions of what ran.
+    limits : dict of str to float
+        Limits of the study in SI units, ``{"cross1.F": 700.0}``.
+    created, git_commit : str
+        Time of creation (UTC) and commit of the code, if known.
+    history_specs : dict of str to HistorySpec
+        Histories asked for; empty if none.
+    """
+
+    def __init__(self, path: Path, file: h5py.File) -> None:
+        self.path = path
+        self._file = file
+        attrs = file.attrs
+        self.study_name = str(attrs["study_name"])
+        self.study_text = str(attrs["study"])
+        self.created = str(attrs["created"])
+        self.git_commit = str(attrs["git_commit"])
+        self.identity: dict[str, Any] = json.loads(attrs["identity"])
+        self.joint: dict[str, Any] = json.loads(attrs["joint"])
+        self.options: dict[str, Any] = json.loads(attrs["options"])
+        self.sampling: dict[str, Any] = json.loads(attrs["sampling"])
+        self.versions: dict[str, str] = json.loads(attrs["versions"])
+        self.limits: dict[str, float] = json.loads(attrs["limits"])
+        specs: dict[str, Any] = json.loads(attrs["histories"])
+        self.history_specs = {k: HistorySpec(tuple(shape), *rest) for k, (shape, *rest) in specs.items()}
+        self.n = int(file["results/status"].shape[0])
+        self._parts = HistoryParts(_parts_folder(path), self.n, self.history_specs)
+
+    @classmethod
+    def create(
+        cls,
+        path: str | Path,
+        study: Study,
+        errors: NDArray[np.void],
+        histories: Mapping[str, HistorySpec] | None = None,
+        dimensions: Mapping[str, int] | None = None,
+    ) -> Self:
+        """Create the file of a new campaign, all rows pending, and open it for writing.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; must not exist.
+        study : Study
+            What is to be kept of it goes into the file's attributes.
+        errors : (n,) table ERROR
+            Errors of every joint.
+        histories : mapping of str to HistorySpec, optional
+            Load histories to keep.
+        dimensions : mapping of str to int, optional
+            Which dimension of the sequence each error is drawn from.
+
+        Raises
+        ------
+        StoreError
+            When the file, or the parts of an earlier one, exist, or the file cannot be written.
+        """
+        path = Path(path)
+        specs = {name: HistorySpec(*spec) for name, spec in (histories or {}).items()}
+        parts = _parts_folder(path)
+        if parts.exists():
+            raise fault(parts, "holds histories of another campaign", "delete it or use another --out")
+        if not path.parent.is_dir():
+            raise fault(path, "cannot be written: no such folder", "make the folder first")
+        try:
+            with writing(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
+                file.attrs.update(attributes(study, specs, dimensions or {}))
+                create_table(file.create_group("errors"), tables.ERROR_COLUMNS, errors)
+                pending = pending_results(len(errors))
+                create_table(file.create_group("results"), tables.RESULT_COLUMNS, pending)
+        except FileExistsError as error:
+            raise fault(path, "exists already", "go on with it, delete it, or use another --out") from error
+        except OSError as error:
+            reason = error.strerror or str(error)
+            remedy = "check the folder, its permissions and space"
+            raise fault(path, f"cannot be written: {reason}", remedy) from error
+        return cls.open(path, "r+")
+
+    @classmethod
+    def open(cls, path: str | Path, mode: str = "r") -> Self:
+        """Open a result file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        mode : {"r", "r+"}
+            For reading, also while a campaign writes it; or for writing, by one process at a time.
+
+        Raises
+        ------
+        StoreError
+            When it is not a result file of this or an earlier version, is damaged, or is being written by
+            another process.
+        """
+        if mode not in ("r", "r+"):
+            raise ValueError(f"mode is {mode!r}, 'r' or 'r+' expected")
+        path = Path(path)
+        file = open_hdf5(path, mode)
+        try:
+            check_schema(path, file)
+            store = cls(path, file)
+        except KeyError as error:
+            file.close()
+            raise fault(path, f"is damaged: {error}", "run the campaign again with another --out") from error
+        except StoreError:
+            file.close()
+            raise
+        if mode == "r+":
+            store._forget_lost_histories()
+        return store
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    @property
+    def complete(self) -> bool:
+        """Whether no row is pending."""
+        return self.pending().size == 0
+
+    def status(self) -> NDArray[np.uint8]:
+        """Status of every joint, (n,)."""
+        return np.asarray(self._file["results/status"][:])
+
+    def counts(self) -> Counts:
+        """How far the campaign is."""
+        return Counts(self.n, 0, 0, 0).after(self.status())
+
+    def pending(self) -> NDArray[np.intp]:
+        """Rows still to be simulated, ascending."""
+        return np.flatnonzero(self.status() == Status.PENDING)
+
+    def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
+        """Write the results of `rows`; when this returns they are on the disk and no longer pending.
+
+        Parameters
+        ----------
+        rows : (m,) array of int
+            Rows of the campaign.
+        simulation : Simulation
+            Results, and the histories if the campaign keeps them, of these rows.
+
+        Raises
+        ------
+        StoreError
+            When the file cannot be written, e.g. for want of space.
+        """
+        results = simulation.results
+        if len(results) != len(rows):
+            raise ValueError(f"{len(results)} results for {len(rows)} rows")
+        if np.any(results["status"] == Status.PENDING):
+            raise ValueError("a simulated joint must not have the status PENDING")
+        try:
+            if self.history_specs:
+                self._parts.add(rows, simulation.histories)
+            for column in tables.RESULT_COLUMNS:
+                if column.name != "status":
+                    self._put(column.name, rows, column.of(results))
+            self._sync()
+            self._put("status", rows, results["status"])
+            self._sync()
+        except OSError as error:
+            reason = error.strerror or str(error)
+            remedy = "make room and run the campaign again: finished joints are kept"
+            raise fault(self.path, f"cannot be written: {reason}", remedy) from error
+
+    def finish(self) -> None:
+        """Take the histories of a complete campaign into the file.
+
+        Does nothing while rows are pending, and nothing the second time.
+
+        Raises
+        ------
+        StoreError
+            When there is no room for them.
+        """
+        if not self.history_specs or not self.complete:
+            return
+        if "histories" not in self._file:
+            self._file.close()
+            try:
+                with writing(self.path) as temporary:
+                    shutil.copyfile(self.path, temporary)
+                    with h5py.File(temporary, "r+") as file:
+                        self._parts.gather_into(file.create_group("histories"))
+            except OSError as error:
+                reason = error.strerror or str(error)
+                remedy = "make room for a second copy and run the campaign again: finished joints are kept"
+                raise fault(self.path, f"histories cannot be taken in: {reason}", remedy) from error
+            finally:
+                self._file = open_hdf5(self.path, "r+")
+        self._parts.remove()
+
+    def errors(self) -> NDArray[np.void]:
+        """Errors of every joint, (n,) table ERROR."""
+        return self._read("errors", tables.ERROR_COLUMNS, tables.ERROR)
+
+    def results(self) -> NDArray[np.void]:
+        """Results of every joint, (n,) table RESULT; those of a joint that is PENDING mean nothing."""
+        return self._read("results", tables.RESULT_COLUMNS, tables.RESULT)
+
+    def histories(self, name: str, rows: NDArray[np.intp] | None = None) -> NDArray[Any]:
+        """Load histories of one kind.
+
+        Parameters
+        ----------
+        name : str
+            One of `history_specs`.
+        rows : (m,) array of int, optional
+            Rows to read; all without it.
+
+        Returns
+        -------
+        (m, ...) array
+            NaN for joints that are pending.
+
+        Raises
+        ------
+        StoreError
+            When the file holds no such histories.
+        """
+        if name not in self.history_specs:
+            held = ", ".join(self.history_specs) or "none"
+            remedy = 'set histories = "full" or "harmonics" in [output] of the study and run it anew'
+            raise fault(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
+        rows = np.arange(self.n) if rows is None else np.asarray(rows, dtype=np.intp)
+        if "histories" not in self._file:
+            return self._parts.read(name, rows)
+        unique, back = np.unique(rows, return_inverse=True)
+        return np.asarray(self._file["histories"][name][unique])[back]
+
+    def to_pandas(self, units: bool = False) -> pd.DataFrame:
+        """Errors and results as one frame, a row per joint, none dropped.
+
+        Parameters
+        ----------
+        units : bool
+            Give the columns a second level with the SI unit.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``row``; the errors' columns, then the results'; ``status`` as text.
+        """
+        import pandas as pd
+
+        data: dict[str, NDArray[Any]] = {}
+        errors, results = self.errors(), self.results()
+        data |= {c.name: c.of(errors) for c in tables.ERROR_COLUMNS}
+        data |= {c.name: c.of(results) for c in tables.RESULT_COLUMNS}
+        data["status"] = LABELS[data["status"]]
+        frame = pd.DataFrame(data, index=pd.RangeIndex(self.n, name="row"))
+        if units:
+            all_columns = tables.ERROR_COLUMNS + tables.RESULT_COLUMNS
+            frame.columns = pd.MultiIndex.from_tuples([(c.name, c.unit) for c in all_columns])
+        return frame
+
+    def _put(self, name: str, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
+        dataset = self._file["results"][name]
+        for here in _runs(rows):
+            dataset[rows[here.start] : rows[here.stop - 1] + 1] = values[here]
+
+    def _read(self, group: str, columns: tuple[tables.Column, ...], dtype: Any) -> NDArray[np.void]:
+        table = np.empty(self.n, dtype)
+        # The status comes first among the results: what it declares valid was written before it was.
+        for c in columns:
+            c.of(table)[:] = self._file[group][c.name][:]
+        return table
+
+    def _sync(self) -> None:
+        self._file.flush()
+        os.fsync(self._file.id.get_vfd_handle())
+
+    def _forget_lost_histories(self) -> None:
+        """Make rows pending whose histories are gone, as when the file was moved without its parts."""
+        if not self.history_specs or "histories" in self._file:
+            return
+        part, _ = self._parts.index()
+        lost = np.flatnonzero((part < 0) & (self.status() != Status.PENDING))
+        if lost.size:
+            self._put("status", lost, np.full(lost.size, Status.PENDING, np.uint8))
+            self._sync()
+
+
+def _parts_folder(path: Path) -> Path:
+    return path.with_name(path.name + ".parts")
+
+
+def _runs(rows: NDArray[np.intp]) -> Iterator[slice]:
+    """Slices of `rows` that hold consecutive numbers: these are written in one go."""
+    ends = [*(np.flatnonzero(np.diff(rows) != 1) + 1), len(rows)]
+    begin = 0
+    for end in ends:
+        yield slice(begin, int(end))
+        begin = int(end)

@@ -1,0 +1,200 @@
+"""Studies and cases: the only reader of their TOML files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tolstat.correlation import Copula
+from tolstat.joint import Joint, Operation
+from tolstat.study_file import StudyFile
+from tolstat.study_model import Output, Sampling, Solver, SweepAxis
+from tolstat.tolerance import Distribution
+
+
+@dataclass(frozen=True)
+class Case:
+    """One joint to be simulated.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    text : str
+        The file as read.
+    joint : Joint
+        Nominal joint.
+    operation : Operation
+        Operating point.
+    solver : Solver
+        Numerical settings.
+    errors : dict
+        Error name to deviation (SI).
+    """
+
+    path: Path
+    text: str
+    joint: Joint
+    operation: Operation
+    solver: Solver
+    errors: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """Name of the file without folder and ending."""
+        return self.path.stem
+
+
+@dataclass(frozen=True)
+class Study(Case):
+    """A campaign: which joints, how many, how they scatter, and what they are judged by.
+
+    Attributes
+    ----------
+    errors : dict
+        Errors that every joint has but the nominal one (SI).
+    tolerances : dict
+        Error name to distribution; ``pin1.offset_radial`` stands for offset_t and offset_z of a feature.
+    copula : Copula
+        Correlation of the errors.
+    sampling : Sampling
+        How many, and how they are drawn.
+    sweep : tuple of SweepAxis
+        Axes of a grid, the last running fastest; empty unless ``sampling.method`` is ``sweep``.
+    limits : dict
+        Result name (``cross1.F``, ``fork2.T``, ``pin1.contact``, ``psi``) to limit (SI).
+    output : Output
+        What is stored beside the results.
+    """
+
+    sampling: Sampling
+    output: Output
+    tolerances: dict[str, Distribution] = field(default_factory=dict)
+    copula: Copula = field(default_factory=Copula)
+    sweep: tuple[SweepAxis, ...] = ()
+    limits: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def samples(self) -> int:
+        """Number of joints, the nominal one not counted."""
+        return self.sampling.n or math.prod(axis.points for axis in self.sweep)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of every table of this study."""
+        return self.samples + self.sampling.nominal_first
+
+    def identity(self) -> dict[str, Any]:
+        """Everything that decides the numbers, as dotted key to JSON value.
+
+        Limits, comments and the file's name do not belong to it. Two studies of equal identity have the
+        same rows with the same results.
+        """
+        parts = {
+            "joint": self.joint.model_dump(mode="json", exclude={"description"}),
+            "operation": self.operation.model_dump(),
+            "solver": self.solver.model_dump(),
+            "errors": self.errors,
+            "tolerances": {name: d.describe() for name, d in self.tolerances.items()},
+            "correlation": {"names": list(self.copula.names), "matrix": self.copula.matrix.tolist()},
+            "sampling": self.sampling.model_dump(),
+            "sweep": [[list(axis.names), axis.start, axis.stop, axis.points] for axis in self.sweep],
+            "output": self.output.model_dump(),
+        }
+        return dict(_flat(parts, ""))
+
+
+def _flat(value: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    for key, inner in value.items():
+        if isinstance(inner, Mapping):
+            yield from _flat(inner, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", list(inner) if isinstance(inner, tuple) else inner
+
+
+def load_case(path: str | Path) -> Case:
+    """Read a case file: one joint with its errors.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    file = StudyFile(Path(path), ("joint", "operation", "errors", "solver"))
+    joint = file.joint()
+    operation = file.model("operation", Operation, required=True)
+    solver = file.model("solver", Solver)
+    errors = file.errors()
+    file.finish()
+    assert joint is not None
+    assert operation is not None
+    assert solver is not None
+    return Case(file.path, file.text, joint, operation, solver, errors)
+
+
+SECTIONS = (
+    *("joint", "operation", "solver", "errors", "tolerances", "correlation"),
+    *("sampling", "sweep", "limits", "output"),
+)
+
+
+def load(path: str | Path, n: int | None = None) -> Study:
+    """Read a study file.
+
+    Parameters
+    ----------
+    path : str or Path
+        TOML file.
+    n : int, optional
+        Number of joints instead of the file's ``sampling.n``.
+
+    Returns
+    -------
+    Study
+        With patterns expanded, units converted and the joint file read.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file, of the joint file and of measured data that it names.
+    """
+    file = StudyFile(Path(path), SECTIONS)
+    if n is not None:
+        file.override("sampling", "n", n)
+    joint = file.joint()
+    operation = file.model("operation", Operation, required=True)
+    solver = file.model("solver", Solver)
+    errors = file.errors()
+    tolerances = file.tolerances(operation)
+    copula = file.correlation()
+    sampling = file.model("sampling", Sampling, required=True)
+    sweep = file.sweep()
+    limits = file.limits()
+    output = file.model("output", Output)
+    if sampling is not None:
+        file.check_scatter(sampling, sweep)
+    if output is not None and solver is not None:
+        file.check_harmonics(output, solver)
+    file.finish()
+    assert joint is not None
+    assert operation is not None
+    assert solver is not None
+    assert sampling is not None
+    assert output is not None
+    return Study(
+        path=file.path,
+        text=file.text,
+        joint=joint,
+        operation=operation,
+        solver=solver,
+        errors=errors,
+        sampling=sampling,
+        output=output,
+        tolerances=tolerances,
+        copula=copula,
+        sweep=sweep,
+        limits=limits,
+    )

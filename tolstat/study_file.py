@@ -1,0 +1,229 @@
+"""Reading a study or case file section by section, so that one run tells all of its faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic_core import PydanticCustomError
+
+from tolstat import joint, schema, selection, units
+from tolstat.correlation import Copula, assemble
+from tolstat.errors import Fault, InputError, gather
+from tolstat.joint import Joint, Operation
+from tolstat.schema import read_toml
+from tolstat.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Claims, Entry
+from tolstat.study_model import MAX_ROWS, Correlation, Output, Sampling, Solver, SweepAxis, SweepEntry
+from tolstat.tolerance import Distribution
+from tolstat.tolerance_entry import Site
+from tolstat.tolerance_kinds import distribution
+
+ModelT = TypeVar("ModelT", bound=schema.Strict)
+
+
+class StudyFile:
+    """A TOML file and the faults found in it so far.
+
+    Each method reads one section, notes its faults and returns what could be read; `finish` raises if there
+    was any fault.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    sections : iterable of str
+        Top-level keys that it may have.
+
+    Raises
+    ------
+    InputError
+        When the file is not readable TOML.
+    """
+
+    def __init__(self, path: Path, sections: Iterable[str]) -> None:
+        self.path = path
+        self.place = str(path)
+        self.data = read_toml(path)
+        self.text = path.read_text(encoding="utf-8")
+        self._faults: list[Fault] = []
+        self._claims = Claims(self.place)
+        self._toleranced: dict[str, str] = {}
+        allowed = list(sections)
+        for key in self.data:
+            if key not in allowed:
+                self._fault((key,), "unknown key", schema.did_you_mean(key, allowed))
+
+    def finish(self) -> None:
+        """Raise what was found.
+
+        Raises
+        ------
+        InputError
+            With every fault.
+        """
+        if self._faults:
+            raise InputError(self._faults)
+
+    def override(self, section: str, key: str, value: object) -> None:
+        """Put a value from the command line in place of the file's."""
+        if isinstance(self.data.setdefault(section, {}), dict):
+            self.data[section][key] = value
+
+    def model(self, section: str, model: type[ModelT], *, required: bool = False) -> ModelT | None:
+        """Section that is one model; with its defaults where the file has none."""
+        if required and section not in self.data:
+            self._fault((section,), "missing table", f"add [{section}]")
+            return None
+        with gather(self._faults):
+            return schema.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
+        return None
+
+    def joint(self) -> Joint | None:
+        """``[joint]``: a joint file by name or path, and keys that replace some of its own."""
+        table = self._table("joint")
+        base = table.get("base")
+        if base is None:
+            self._fault(("joint", "base"), "missing key", 'add base, for example base = "cirelli2021"')
+        elif not isinstance(base, str):
+            self._fault(("joint", "base"), f"{base!r} is not a text", "give a name in data/joints or a path")
+        else:
+            overrides = {key: value for key, value in table.items() if key != "base"}
+            with gather(self._faults):
+                return joint.load(base, overrides, self.place, self.path.parent)
+        return None
+
+    def errors(self) -> dict[str, float]:
+        """``[errors]``: the errors that every joint has."""
+        fixed: dict[str, float] = {}
+        names = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
+        for entry in self._entries("errors"):
+            if entry.pattern.startswith("operation."):
+                self._fault(entry.path, "is not an error", f"set {entry.path[-1]} in [operation]")
+                continue
+            with gather(self._faults):
+                selected = selection.resolve(entry, names, self.place)
+                value = self._quantity(entry, names[selected[0]])
+                self._claims.claim(entry, selected)
+                fixed |= dict.fromkeys(selected, value)
+        return fixed
+
+    def tolerances(self, operation: Operation | None) -> dict[str, Distribution]:
+        """``[tolerances]``: how each error scatters."""
+        scatter: dict[str, Distribution] = {}
+        for entry in self._entries("tolerances"):
+            with gather(self._faults):
+                selected = selection.resolve(entry, UNITS | RADIAL_UNITS, self.place)
+                with gather(self._faults):
+                    self._claims.claim(entry, selected)
+                self._toleranced |= {name: (UNITS | RADIAL_UNITS)[name] for name in selected}
+                for name in selected:
+                    center = nominal_value(name, operation)
+                    if center is not None:
+                        site = Site(name, self._toleranced[name], center, self.path.parent)
+                        scatter[name] = distribution(entry.value, site, self.place, entry.path)
+        return scatter
+
+    def correlation(self) -> Copula:
+        """``[[correlation]]``: which of the errors that `tolerances` has read come together."""
+        data = self.data.get("correlation", [])
+        if not isinstance(data, list):
+            self._fault(("correlation",), "is not a list of tables", "write [[correlation]]")
+            return Copula()
+        entries = []
+        before = len(self._faults)
+        for number, item in enumerate(data):
+            with gather(self._faults):
+                prefix = ("correlation", number)
+                entries.append(schema.validate(Correlation, item, self.place, prefix=prefix))
+        if len(self._faults) == before:
+            with gather(self._faults):
+                return assemble(entries, self._toleranced, self.place)
+        return Copula()
+
+    def sweep(self) -> tuple[SweepAxis, ...]:
+        """``[sweep]``: the axes of a grid."""
+        axes = []
+        for entry in self._entries("sweep"):
+            with gather(self._faults):
+                names = selection.resolve(entry, UNITS, self.place)
+                with gather(self._faults):
+                    self._claims.claim(entry, names)
+                site = Site(names[0], UNITS[names[0]], 0.0, self.path.parent)
+                context = {"site": site}
+                read = schema.validate(
+                    SweepEntry, entry.value, self.place, prefix=entry.path, context=context
+                )
+                axes.append(SweepAxis(tuple(names), read.start, read.stop, read.points))
+        return tuple(axes)
+
+    def limits(self) -> dict[str, float]:
+        """``[limits]``: the loads that the joints are judged by."""
+        limits: dict[str, float] = {}
+        claims = Claims(self.place)
+        for entry in self._entries("limits"):
+            with gather(self._faults):
+                names = selection.resolve(entry, LIMIT_UNITS, self.place)
+                claims.claim(entry, names)
+                value = self._quantity(entry, LIMIT_UNITS[names[0]])
+                if value <= 0:
+                    self._fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")
+                limits |= dict.fromkeys(names, value)
+        return limits
+
+    def check_scatter(self, sampling: Sampling, sweep: tuple[SweepAxis, ...]) -> None:
+        """Find what does not go with the sampling method."""
+        if sampling.method == "sweep":
+            if not self.data.get("sweep"):
+                self._fault(("sweep",), "missing table", "add [sweep], or another sampling.method")
+            for section in ("tolerances", "correlation"):
+                if self.data.get(section):
+                    self._fault(
+                        (section,), "has no effect in a sweep", "remove it, or change sampling.method"
+                    )
+            points = math.prod(axis.points for axis in sweep)
+            if points > MAX_ROWS:
+                self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
+            return
+        if not self.data.get("tolerances"):
+            self._fault(("tolerances",), "missing table: nothing scatters", "add [tolerances]")
+        if "sweep" in self.data:
+            self._fault(
+                ("sweep",), f"has no effect with {sampling.method!r}", 'write sampling.method = "sweep"'
+            )
+
+    def check_harmonics(self, output: Output, solver: Solver) -> None:
+        """Find harmonics that the steps of a revolution cannot carry."""
+        most = solver.steps_per_rev // 2
+        if output.histories == "harmonics" and output.harmonics > most:
+            found = f"{output.harmonics} harmonics from {solver.steps_per_rev} steps a revolution"
+            self._fault(("output", "harmonics"), found, f"give at most {most}, or more solver.steps_per_rev")
+
+    def _table(self, section: str) -> Mapping[str, Any]:
+        table = self.data.get(section, {})
+        if isinstance(table, Mapping):
+            return table
+        self._fault((section,), f"{table!r} is not a table", f"write [{section}]")
+        return {}
+
+    def _entries(self, section: str) -> list[Entry]:
+        return list(selection.entries(self._table(section), section))
+
+    def _quantity(self, entry: Entry, unit: str) -> float:
+        try:
+            return units.to_si(entry.value, unit)
+        except PydanticCustomError as error:
+            context = error.context or {}
+            where = f"{self.place}: {schema.dotted(entry.path)}"
+            raise InputError([Fault(where, context["found"], context["remedy"])]) from error
+
+    def _fault(self, path: tuple[str, ...], found: str, remedy: str) -> None:
+        self._faults.append(Fault(f"{self.place}: {schema.dotted(path)}", found, remedy))
+
+
+def nominal_value(name: str, operation: Operation | None) -> float | None:
+    """Value of an error in the nominal joint (SI); None for an operating point that could not be read."""
+    if name.startswith("operation."):
+        return None if operation is None else float(getattr(operation, name.removeprefix("operation.")))
+    return 1.0 if name == "material.E_factor" else 0.0

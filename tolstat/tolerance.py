@@ -1,0 +1,264 @@
+"""From a drawing's tolerance to a distribution: inverse distribution functions, process capability, ISO 2768.
+
+No statistics of the errors of Cardan crosses are published; every distribution here is an assumption
+that a study makes and states.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaincinv, ndtr, ndtri
+
+Array = NDArray[np.float64]
+
+
+class Distribution(ABC):
+    """Distribution of one error, in SI units, given by the inverse of its distribution function."""
+
+    @abstractmethod
+    def ppf(self, u: Array) -> Array:
+        """Return the value that is exceeded with probability 1 - u.
+
+        Parameters
+        ----------
+        u : ndarray, (n,)
+            Probabilities in the open interval (0, 1).
+
+        Returns
+        -------
+        ndarray, (n,)
+            Values in the error's SI unit, monotone in `u`.
+        """
+
+    @abstractmethod
+    def describe(self) -> dict[str, Any]:
+        """Kind and parameters, as JSON values: what decides the numbers that are drawn."""
+
+
+@dataclass(frozen=True)
+class _Described(Distribution):
+    """Distribution whose dataclass fields are all of it."""
+
+    def describe(self) -> dict[str, Any]:
+        """See `Distribution.describe`."""
+        return {"distribution": type(self).__name__.lower(), **asdict(self)}
+
+
+@dataclass(frozen=True)
+class Normal(_Described):
+    """Normal distribution with `mean` and standard deviation `sigma`."""
+
+    mean: float
+    sigma: float
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        return self.mean + self.sigma * ndtri(u)
+
+
+@dataclass(frozen=True)
+class TruncatedNormal(_Described):
+    """Normal distribution of parts of which those outside the band are rejected.
+
+    `mean` and `sigma` are those before the inspection.
+    """
+
+    mean: float
+    sigma: float
+    lower: float
+    upper: float
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
+        # each half from its own tail: probabilities near 1 have lost the digits that those near 0 still have
+        low = ndtri(ndtr(a) + u * (ndtr(b) - ndtr(a)))
+        high = -ndtri(ndtr(-b) + (1 - u) * (ndtr(-a) - ndtr(-b)))
+        z = np.where(low <= 0, low, high)
+        return np.clip(self.mean + self.sigma * z, self.lower, self.upper)
+
+
+@dataclass(frozen=True)
+class Uniform(_Described):
+    """Uniform distribution on the band."""
+
+    lower: float
+    upper: float
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        return self.lower + (self.upper - self.lower) * u
+
+
+@dataclass(frozen=True)
+class Triangular(_Described):
+    """Triangular distribution on the band, most likely at `peak`."""
+
+    lower: float
+    upper: float
+    peak: float
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        width, rise, fall = self.upper - self.lower, self.peak - self.lower, self.upper - self.peak
+        below = self.lower + np.sqrt(u * width * rise)
+        above = self.upper - np.sqrt((1 - u) * width * fall)
+        return np.where(u * width <= rise, below, above)
+
+
+@dataclass(frozen=True)
+class LogNormal(_Described):
+    """Lognormal distribution: ``threshold + exp(y)``, where y is (truncated) normal."""
+
+    threshold: float
+    log: Normal | TruncatedNormal
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        return self.threshold + np.exp(self.log.ppf(u))
+
+
+@dataclass(frozen=True)
+class Beta(_Described):
+    """Beta distribution with shapes `a` and `b`, stretched over the band."""
+
+    a: float
+    b: float
+    lower: float
+    upper: float
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        return self.lower + (self.upper - self.lower) * betaincinv(self.a, self.b, u)
+
+
+@dataclass(frozen=True)
+class Rayleigh(_Described):
+    """Radius of a point whose two coordinates are normal with standard deviation `sigma` each.
+
+    With `upper`, parts beyond that radius are rejected.
+    """
+
+    sigma: float
+    upper: float | None = None
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        share = 1.0 if self.upper is None else -math.expm1(-0.5 * (self.upper / self.sigma) ** 2)
+        radius: Array = self.sigma * np.sqrt(-2 * np.log1p(-u * share))
+        return radius if self.upper is None else np.minimum(radius, self.upper)
+
+
+@dataclass(frozen=True)
+class Measured(Distribution):
+    """Empirical distribution of measured parts: every draw is one of the measured values.
+
+    The inverse of the empirical distribution function, so mean and deviation are those of the sample;
+    nothing is interpolated or drawn beyond what was measured.
+
+    Attributes
+    ----------
+    values : ndarray, (m,)
+        Measured values, ascending.
+    digest : str
+        Digest of the values, which stands for them in a study's identity.
+    """
+
+    values: Array = field(repr=False, compare=False)
+    digest: str
+
+    @classmethod
+    def of(cls, values: Iterable[float]) -> Measured:
+        """Empirical distribution of `values` (SI) in any order."""
+        ordered = np.sort(np.asarray(list(values), dtype="<f8"))
+        return cls(ordered, hashlib.sha256(ordered.tobytes()).hexdigest())
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        index = np.ceil(u * self.values.size).astype(np.intp) - 1
+        return self.values[np.clip(index, 0, self.values.size - 1)]
+
+    def describe(self) -> dict[str, Any]:
+        """See `Distribution.describe`."""
+        return {"distribution": "measured", "count": self.values.size, "digest": self.digest}
+
+
+def sigma_of(lower: float, upper: float, mean: float, cpk: float) -> float:
+    """Return the standard deviation of a process of capability `cpk` in the band.
+
+    Cpk = min(upper - mean, mean - lower) / (3 sigma), so the nearer limit decides.
+    """
+    return min(upper - mean, mean - lower) / (3 * cpk)
+
+
+class IsoRow(NamedTuple):
+    """One range of the ISO 2768-1 tables: sizes over `over` up to and including `up_to` (mm)."""
+
+    kind: str
+    grade: str
+    over: float
+    up_to: float
+    deviation: float
+
+
+@cache
+def iso2768_rows(path: Path) -> tuple[IsoRow, ...]:
+    """Read the general tolerances; deviations in m and rad."""
+    factor = {"mm": 1e-3, "arcmin": math.radians(1 / 60)}
+    with path.open(encoding="utf-8", newline="") as file:
+        return tuple(
+            IsoRow(
+                row["kind"],
+                row["class"],
+                float(row["over_mm"]),
+                float(row["up_to_mm"]),
+                float(row["deviation"]) * factor[row["unit"]],
+            )
+            for row in csv.DictReader(line for line in file if not line.startswith("#"))
+        )
+
+
+def iso2768(path: Path, kind: str, grade: str, nominal: float) -> float:
+    """Permissible deviation (plus and minus) of a dimension without individual tolerance.
+
+    Parameters
+    ----------
+    path : Path
+        The table, ``data/iso2768.csv``.
+    kind : str
+        ``"linear"`` or ``"angular"``.
+    grade : str
+        Tolerance class, ``"f"`` or ``"m"``.
+    nominal : float
+        Nominal size (m); for an angle the length of its shorter leg.
+
+    Returns
+    -------
+    float
+        Deviation in m or rad.
+
+    Raises
+    ------
+    ValueError
+        When the table has no such class or ends before that size; the text names the range that it covers.
+    """
+    rows = [row for row in iso2768_rows(path) if (row.kind, row.grade) == (kind, grade)]
+    if not rows:
+        raise ValueError(f"no {kind} table for class {grade!r}")
+    size = 1e3 * nominal
+    fits = (row for row in rows if size <= row.up_to * (1 + 1e-12))
+    row = next(fits, None) if size >= rows[0].over * (1 - 1e-12) else None
+    if row is None:
+        raise ValueError(f"{size:g} mm is outside the table ({rows[0].over:g} mm to {rows[-1].up_to:g} mm)")
+    return row.deviation

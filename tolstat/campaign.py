@@ -25,8 +25,8 @@ from tolstat.tables import HistorySpec, Options, Simulation
 if TYPE_CHECKING:
     from tolstat.study import Study
 
-MAX_BLOCK = 16
-"""Largest default block: at some tenths of a second a joint, what a stop or a crash costs is seconds."""
+MAX_BLOCK = 32
+"""Largest default block: a second or a few of work, which is what a stop or a crash costs."""
 BLOCKS_PER_WORKER = 4
 """Least blocks a worker by default, so that none is long idle at the end."""
 
@@ -42,7 +42,7 @@ class Stages(NamedTuple):
         () -> dimension of the sequence by name of error.
     perturb : callable
         Joint, (m,) table ERROR -> (m,) table PARAM.
-    history_spec : callable
+    history_specs : callable
         Options, kind of histories, number of harmonics -> what each history holds for a joint.
     simulate : callable
         (m,) table PARAM, Options, ``histories=``, ``n_harmonics=`` -> Simulation; goes to other processes.
@@ -54,7 +54,7 @@ class Stages(NamedTuple):
     draw: Callable[..., NDArray[np.void]]
     dimensions: Callable[[], Mapping[str, int]]
     perturb: Callable[..., NDArray[np.void]]
-    history_spec: Callable[..., Mapping[str, HistorySpec]]
+    history_specs: Callable[..., Mapping[str, HistorySpec]]
     simulate: Callable[..., Simulation]
     warm_up: Callable[[], object]
 
@@ -199,7 +199,7 @@ def _own_stages() -> Stages:
 
 def _create_or_resume(study: Study, path: Path, stages: Stages) -> ResultStore:
     if not path.exists():
-        histories = stages.history_spec(study.solver.options(), *_history_options(study))
+        histories = stages.history_specs(study.solver.options(), *_history_options(study))
         return ResultStore.create(path, study, stages.draw(study), histories, stages.dimensions())
     store = ResultStore.open(path, "r+")
     try:

@@ -1,0 +1,315 @@
+"""Result files: what is written is read, what cannot be used is refused, and a kill does no harm."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import tolstat
+from tests import fakes, format_tables
+from tolstat import campaign, tables
+from tolstat.errors import StoreError
+from tolstat.store import Counts, ResultStore
+from tolstat.tables import Simulation, Status
+
+
+def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
+    params = fakes.perturb(study.joint, fakes.draw(study)[rows])
+    return fakes.simulate(params, study.solver.options(), study.output.histories, study.output.harmonics)
+
+
+def new_store(path: Path, study: fakes.Study) -> ResultStore:
+    specs = fakes.specs_of(study.output.histories)
+    return ResultStore.create(path, study, fakes.draw(study), specs, {"pin1.offset_e": 3})
+
+
+@pytest.fixture
+def study() -> fakes.Study:
+    return fakes.Study(n=12, output=fakes.Output("full"))
+
+
+def test_what_is_written_is_read(tmp_path: Path, study: fakes.Study) -> None:
+    path = tmp_path / "a.h5"
+    rows = np.array([1, 2, 3, 7, 9, 8])
+    with new_store(path, study) as store:
+        assert store.pending().tolist() == list(range(12))
+        store.write(rows, simulation(study, rows))
+    with ResultStore.open(path) as store:
+        assert store.pending().tolist() == [0, 4, 5, 6, 10, 11]
+        assert store.errors().tobytes() == fakes.draw(study).tobytes()
+        written, expected = store.results(), simulation(study, rows)
+        for name in tables.RESULT.names or ():
+            np.testing.assert_array_equal(written[name][rows], expected.results[name])
+        assert np.isnan(written["F_max"][store.pending()]).all()
+        for name in fakes.SPECS:
+            np.testing.assert_array_equal(store.histories(name, rows), expected.histories[name])
+        assert np.isnan(store.histories("loads", [0, 4])).all()
+
+
+def test_attributes_tell_where_the_numbers_come_from(tmp_path: Path, study: fakes.Study) -> None:
+    with new_store(tmp_path / "a.h5", study) as store:
+        assert store.study_text == study.text
+        assert store.study_name == "fake"
+        assert store.identity == study.identity()
+        assert store.joint == study.joint
+        assert store.options["steps_per_rev"] == 30
+        assert store.sampling["dimensions"] == {"pin1.offset_e": 3}
+        assert store.sampling["seed"] == study.seed
+        assert store.limits == {"cross1.F": 700.0}
+        assert store.versions["tolstat"] == tolstat.__version__
+        assert {"python", "numpy", "numba", "scipy", "h5py"} <= store.versions.keys()
+        assert store.created.endswith("+00:00")
+
+
+def test_long_study_text_fits(tmp_path: Path) -> None:
+    study = fakes.Study(n=2, text="# ü\n" * 100_000)
+    new_store(tmp_path / "a.h5", study).close()
+    with ResultStore.open(tmp_path / "a.h5") as store:
+        assert store.study_text == study.text
+
+
+def test_every_dataset_has_unit_and_description(tmp_path: Path, study: fakes.Study) -> None:
+    new_store(tmp_path / "a.h5", study).close()
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file.attrs["filetype"] == "tolstat campaign"
+        assert file.attrs["schema_version"] == 1
+        for group, columns in (("errors", tables.ERROR_COLUMNS), ("results", tables.RESULT_COLUMNS)):
+            assert set(file[group]) == {c.name for c in columns}
+            for c in columns:
+                dataset = file[group][c.name]
+                assert (dataset.attrs["units"], dataset.attrs["description"]) == (c.unit, c.description)
+                assert dataset.shape == (study.n,)
+                assert dataset.dtype == c.dtype
+                assert dataset.chunks is None
+
+
+def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) -> None:
+    rows = np.arange(5)
+    with new_store(tmp_path / "a.h5", study) as store:
+        store.write(rows, simulation(study, rows))
+        frame, with_units = store.to_pandas(), store.to_pandas(units=True)
+        results = store.results()
+    columns = tables.ERROR_COLUMNS + tables.RESULT_COLUMNS
+    assert list(frame.columns) == [c.name for c in columns]
+    assert list(with_units.columns) == [(c.name, c.unit) for c in columns]
+    assert frame.index.name == "row"
+    assert len(frame) == study.n
+    assert frame["status"].tolist() == [Status(s).label for s in results["status"]]
+    assert frame["status"].iloc[-1] == "pending"
+    np.testing.assert_array_equal(frame["fork3.T_mean"], results["T_mean"][:, 6])
+    np.testing.assert_array_equal(frame["pin2.contact2_max"], results["contact_max"][:, 1, 1])
+    np.testing.assert_array_equal(frame["pin4.share_uniform"], results["mode_share"][:, 3, 3])
+
+
+def test_counts(tmp_path: Path, study: fakes.Study) -> None:
+    rows = np.arange(4)
+    part = simulation(study, rows)
+    part.results["status"] = [Status.OK, Status.NOT_SETTLED, Status.NOT_FINITE, Status.NEWTON_FAILED]
+    with new_store(tmp_path / "a.h5", study) as store:
+        store.write(rows, part)
+        assert store.counts() == Counts(total=12, done=4, not_settled=1, failed=2)
+
+
+def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
+    """Why a kill cannot make the file unreadable: bytes change inside the results' own space only."""
+    study, path = fakes.Study(n=500), tmp_path / "a.h5"
+    new_store(path, study).close()
+    before = np.fromfile(path, np.uint8)
+    with ResultStore.open(path, "r+") as store:
+        for rows in np.array_split(np.random.default_rng(1).permutation(study.n), 9):
+            store.write(rows, simulation(study, rows))
+        assert store.complete
+    after = np.fromfile(path, np.uint8)
+    assert before.size == after.size
+    may_change = np.zeros(before.size, bool)
+    with h5py.File(path) as file:
+        for dataset in file["results"].values():
+            may_change[dataset.id.get_offset() :][: dataset.id.get_storage_size()] = True
+    changed = before != after
+    assert changed.any()
+    assert not (changed & ~may_change).any()
+
+
+def test_finished_file_holds_the_histories(tmp_path: Path, study: fakes.Study) -> None:
+    path, rows = tmp_path / "a.h5", np.arange(12)
+    with new_store(path, study) as store:
+        store.write(rows[5:], simulation(study, rows[5:]))
+        store.finish()
+        assert (tmp_path / "a.h5.parts").is_dir()
+        store.write(rows[:5], simulation(study, rows[:5]))
+        before = store.histories("loads")
+        store.finish()
+        store.finish()
+        assert not (tmp_path / "a.h5.parts").exists()
+        np.testing.assert_array_equal(store.histories("loads"), before)
+        picked = store.histories("mode", np.array([7, 2, 7]))
+    expected = simulation(study, rows).histories
+    np.testing.assert_array_equal(before, expected["loads"])
+    np.testing.assert_array_equal(picked, expected["mode"][[7, 2, 7]])
+    with h5py.File(path) as file:
+        for name, spec in fakes.SPECS.items():
+            dataset = file["histories"][name]
+            assert dataset.compression == "gzip"
+            assert dataset.attrs["units"] == spec.unit
+            np.testing.assert_array_equal(dataset[...], expected[name])
+    assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
+
+
+def test_rows_that_lost_their_histories_are_pending_again(tmp_path: Path, study: fakes.Study) -> None:
+    rows = np.arange(6)
+    with new_store(tmp_path / "a.h5", study) as store:
+        store.write(rows[:4], simulation(study, rows[:4]))
+        store.write(rows[4:], simulation(study, rows[4:]))
+    (tmp_path / "a.h5.parts" / "00000000.h5").unlink()
+    with ResultStore.open(tmp_path / "a.h5", "r+") as store:
+        assert np.flatnonzero(store.status()).tolist() == [4, 5]
+
+
+def test_a_damaged_part_is_named(tmp_path: Path, study: fakes.Study) -> None:
+    with new_store(tmp_path / "a.h5", study) as store:
+        store.write(np.arange(4), simulation(study, np.arange(4)))
+    part = tmp_path / "a.h5.parts" / "00000000.h5"
+    part.write_bytes(b"nothing")
+    with pytest.raises(StoreError, match=r"00000000.h5: is damaged\n  hint: delete it"):
+        ResultStore.open(tmp_path / "a.h5", "r+")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"filetype": "statepoint"}, "is HDF5, but of type 'statepoint'"),
+        (
+            {"schema_version": 2},
+            "has schema version 2, this tolstat reads up to 1\n  hint: use a newer tolstat",
+        ),
+    ],
+)
+def test_other_files_are_refused(tmp_path: Path, study: fakes.Study, change: dict, message: str) -> None:
+    path = tmp_path / "a.h5"
+    new_store(path, study).close()
+    with h5py.File(path, "r+") as file:
+        file.attrs.update(change)
+    for mode in ("r", "r+"):
+        with pytest.raises(StoreError, match=message):
+            ResultStore.open(path, mode)
+
+
+def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> None:
+    text = tmp_path / "text.h5"
+    text.write_text("not HDF5")
+    with pytest.raises(StoreError, match=r"text.h5: is not an HDF5 file\n  hint: give a file"):
+        ResultStore.open(text)
+    with pytest.raises(StoreError, match=r"none.h5: is not there"):
+        ResultStore.open(tmp_path / "none.h5")
+    with pytest.raises(StoreError, match="is not there"):
+        ResultStore.open(tmp_path)
+    foreign = tmp_path / "foreign.h5"
+    h5py.File(foreign, "w").close()
+    with pytest.raises(StoreError, match="of type None"):
+        ResultStore.open(foreign)
+    cut = tmp_path / "cut.h5"
+    new_store(cut, study).close()
+    cut.write_bytes(cut.read_bytes()[:5000])
+    with pytest.raises(StoreError, match="is damaged"):
+        ResultStore.open(cut)
+    poor = tmp_path / "poor.h5"
+    new_store(poor, study).close()
+    with h5py.File(poor, "r+") as file:
+        del file["results"]
+    with pytest.raises(StoreError, match="is damaged"):
+        ResultStore.open(poor)
+
+
+def test_one_writer_and_any_readers(tmp_path: Path, study: fakes.Study) -> None:
+    path = tmp_path / "a.h5"
+    code = (
+        "import sys; from tolstat.store import ResultStore; from tolstat.errors import StoreError\n"
+        f"with ResultStore.open({str(path)!r}) as store: print(store.counts().done)\n"
+        f"try: ResultStore.open({str(path)!r}, 'r+')\n"
+        "except StoreError as error: print(error)"
+    )
+    with new_store(path, study) as store:
+        store.write(np.arange(5), simulation(study, np.arange(5)))
+        python = [sys.executable, "-c", code]
+        environment = fakes.environment()
+        answer = subprocess.run(python, capture_output=True, text=True, check=True, env=environment).stdout
+    assert answer.startswith(f"5\n{path}: is being written by another process\n  hint: ")
+
+
+def test_create_replaces_nothing(tmp_path: Path, study: fakes.Study) -> None:
+    path = tmp_path / "a.h5"
+    path.write_text("precious")
+    with pytest.raises(StoreError, match="exists already"):
+        new_store(path, study)
+    assert path.read_text() == "precious"
+    (tmp_path / "b.h5.parts").mkdir()
+    with pytest.raises(StoreError, match=r"b.h5.parts: holds histories of another campaign"):
+        new_store(tmp_path / "b.h5", study)
+    with pytest.raises(StoreError, match="no such folder"):
+        new_store(tmp_path / "none" / "a.h5", study)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "b.h5.parts"]
+
+
+def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(n: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tolstat.store.pending_results", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        new_store(tmp_path / "a.h5", fakes.Study())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
+    code = (
+        "import os, signal, pathlib, tolstat.store\n"
+        "from tests import fakes, test_store\n"
+        "tolstat.store.pending_results = lambda n: os.kill(os.getpid(), signal.SIGKILL)\n"
+        f"test_store.new_store(pathlib.Path({str(tmp_path / 'a.h5')!r}), fakes.Study())"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], env=fakes.environment(), check=False)
+    assert ended.returncode == -9
+    assert not (tmp_path / "a.h5").exists()
+    counts = campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+    assert counts.done == 40
+
+
+def test_wrong_blocks_are_bugs(tmp_path: Path, study: fakes.Study) -> None:
+    rows = np.arange(3)
+    part = simulation(study, rows)
+    with new_store(tmp_path / "a.h5", study) as store:
+        with pytest.raises(ValueError, match="3 results for 2 rows"):
+            store.write(rows[:2], part)
+        with pytest.raises(ValueError, match=r"histories \[\] given"):
+            store.write(rows, Simulation(part.results, {}))
+        with pytest.raises(ValueError, match="history mode: shape"):
+            store.write(rows, Simulation(part.results, part.histories | {"mode": np.zeros((3, 2), np.uint8)}))
+        part.results["status"][1] = Status.PENDING
+        with pytest.raises(ValueError, match="must not have the status PENDING"):
+            store.write(rows, part)
+        assert store.pending().size == 12
+        with pytest.raises(StoreError, match="holds no histories 'heat'"):
+            store.histories("heat")
+
+
+def test_document_is_up_to_date() -> None:
+    text = format_tables.DOCUMENT.read_text(encoding="utf-8")
+    assert text == format_tables.updated(text), "run: python -m tests.format_tables"
+    for name in ("errors", "results", "status"):
+        assert f"<!-- table: {name} -->\n| " in text
+
+
+def test_document_names_every_attribute(tmp_path: Path, study: fakes.Study) -> None:
+    new_store(tmp_path / "a.h5", study).close()
+    text = format_tables.DOCUMENT.read_text(encoding="utf-8")
+    with h5py.File(tmp_path / "a.h5") as file:
+        for name, value in file.attrs.items():
+            assert f"\n| `{name}` | " in text
+            if f"| `{name}` | JSON |" in text:
+                json.loads(value)

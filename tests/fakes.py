@@ -136,9 +136,7 @@ def simulate_or_raise(params: np.ndarray, options: Options, histories: str, n_ha
 
 
 def stages(simulate: Any = simulate) -> campaign.Stages:
-    return campaign.Stages(
-        draw, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up=lambda: None
-    )
+    return campaign.Stages(draw, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up=lambda: None)
 
 
 def main(out: str, workers: int, block: int, seconds: float, histories: str = "none", n: int = 40) -> None:

@@ -26,9 +26,7 @@ def field_table(columns: tuple[tables.Column, ...]) -> str:
 def status_table() -> str:
     """Markdown table of the values of ``status``."""
     lines = ["| status | name | meaning |", "|---|---|---|"]
-    return "\n".join(
-        lines + [f"| {s.value} | `{s.label}` | {tables.STATUS_TEXT[s]} |" for s in tables.Status]
-    )
+    return "\n".join(lines + [f"| {s.value} | `{s.label}` | {tables.STATUS_TEXT[s]} |" for s in tables.Status])
 
 
 def updated(text: str) -> str:

@@ -49,12 +49,8 @@ def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     return study, expected
 
 
-@pytest.mark.parametrize(
-    ("workers", "block"), [(1, 1), (1, 7), (1, 40), (1, 1000), (2, None), (2, 3), (3, 1)]
-)
-def test_workers_and_blocks_change_no_byte(
-    tmp_path: Path, reference, workers: int, block: int | None
-) -> None:
+@pytest.mark.parametrize(("workers", "block"), [(1, 1), (1, 7), (1, 40), (1, 1000), (2, None), (2, 3), (3, 1)])
+def test_workers_and_blocks_change_no_byte(tmp_path: Path, reference, workers: int, block: int | None) -> None:
     study, expected = reference
     campaign.run(study, tmp_path / "a.h5", workers, block, stages=fakes.stages())
     assert datasets(tmp_path / "a.h5") == expected
@@ -153,10 +149,7 @@ def test_ctrl_c_keeps_finished_blocks(tmp_path: Path, workers: int) -> None:
     assert process.returncode == 130
     with ResultStore.open(path) as store:
         counts = store.counts()
-    assert (
-        said
-        == f"stopped: {counts.done} of 40 joints are kept in {path}\n  hint: run the same command to go on\n"
-    )
+    assert said == f"stopped: {counts.done} of 40 joints are kept in {path}\n  hint: run the same command to go on\n"
     assert 2 <= counts.done < 40
     campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
     campaign.run(fakes.Study(), tmp_path / "b.h5", 1, stages=fakes.stages())
@@ -211,9 +204,7 @@ def test_kill_loses_at_most_the_blocks_in_work(tmp_path: Path, long_reference, m
 
 
 @pytest.mark.parametrize("step", ["gather_into", "remove"])
-def test_stopped_while_histories_are_taken_in(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
-) -> None:
+def test_stopped_while_histories_are_taken_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
     study, path = fakes.Study(output=fakes.Output("full")), tmp_path / "a.h5"
     campaign.run(study, tmp_path / "b.h5", 1, stages=fakes.stages())
 
@@ -221,7 +212,7 @@ def test_stopped_while_histories_are_taken_in(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(f"tolstat.histories.HistoryParts.{step}", interrupt)
+        patch.setattr(f"tolstat.store.histories.HistoryParts.{step}", interrupt)
         with pytest.raises(campaign.Interrupted, match="40 of 40"):
             campaign.run(study, path, 1, stages=fakes.stages())
     campaign.run(study, path, 1, stages=fakes.stages())

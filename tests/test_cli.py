@@ -44,9 +44,7 @@ def invented_campaign():
     """`campaign.run` with a stand-in for the solver."""
     from tolstat import joint, sampling
 
-    stages = campaign.Stages(
-        sampling.draw, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, lambda: None
-    )
+    stages = campaign.Stages(sampling.draw, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, lambda: None)
     return partial(campaign.run, stages=stages)
 
 
@@ -67,9 +65,7 @@ def test_every_command_has_help_with_every_option_explained(command):
     options = [line for line in done.stdout.splitlines() if line.startswith("  --")]
     assert options or command == "status"
     for line in options:
-        assert re.search(r"--[\w-]+( \S+)?( / --[\w-]+)?\s{2,}\S", line + "  ." * line.endswith("report")), (
-            line
-        )
+        assert re.search(r"--[\w-]+( \S+)?( / --[\w-]+)?\s{2,}\S", line + "  ." * line.endswith("report")), line
     assert len(done.stdout.split("Options:")[0].strip().splitlines()) >= 3
 
 

@@ -44,7 +44,7 @@ to_spin, to_rate, bias = rotation.spin, rotation.unspin, rotation.spin_bias
 @numba.njit
 def free_body(t, q, v, out):
     """Euler's equations in rotation vectors: w' = J^-1 (-w x J w) in body axes, w turned to the axes of phi."""
-    phi, rate = (q[0], q[1], q[2]), (v[0], v[1], v[2])
+    rate = (v[0], v[1], v[2])
     back = (-q[0], -q[1], -q[2])
     w = to_spin(back, rate)  # T(-phi) phi': angular velocity in body axes
     push = bias(back, (-rate[0], -rate[1], -rate[2]))
@@ -167,7 +167,12 @@ def test_failure_is_a_status_and_nan(system, method):
 
 @pytest.mark.parametrize(
     ("change", "word"),
-    [({"q0": [[1.0]]}, "vectors"), ({"v0": [np.nan]}, "finite"), ({"steps": 0}, "steps"), ({"t_span": (1, 0)}, "grow")],
+    [
+        ({"q0": [[1.0]]}, "vectors"),
+        ({"v0": [np.nan]}, "finite"),
+        ({"steps": 0}, "steps"),
+        ({"t_span": (1, 0)}, "grow"),
+    ],
 )
 def test_senseless_arguments_are_refused(change, word):
     given = {"q0": [1.0], "v0": [0.0], "t_span": (0, 1), "steps": 10} | change

@@ -10,14 +10,16 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from tolstat import files
 from tolstat import joint as joints
-from tolstat import material
 from tolstat.errors import InputError
-from tolstat.joint import ARM_OF_PIN, ARM_TRIADS, PIN_TRIADS, Joint, Operation
+from tolstat.joint import Joint, Operation, material
+from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
+from tolstat.kernel.topology import ARM_OF_PIN
 from tolstat.schema import validate
 from tolstat.tables import ERROR_FIELDS, HOLES, MAX_STATIONS, PARAM, PINS, Law
 
-FILE = joints.data_dir() / "joints" / "cirelli2021.toml"
+FILE = files.data_dir() / "joints" / "cirelli2021.toml"
 MM = 1e-3
 
 
@@ -48,11 +50,7 @@ def faults(overrides, base="cirelli2021", folder=None):
 
 
 def test_every_key_names_its_source():
-    keys = [
-        line
-        for line in FILE.read_text(encoding="utf-8").splitlines()
-        if re.match(r"(# )?\w+ = [\"\[\d]", line)
-    ]
+    keys = [line for line in FILE.read_text(encoding="utf-8").splitlines() if re.match(r"(# )?\w+ = [\"\[\d]", line)]
     data = tomllib.loads(FILE.read_text(encoding="utf-8"))
     flat = sum(len(v) if isinstance(v, dict) else 1 for v in data.values())
     inside = len(data["bushing"]["cross"]) + len(data["bushing"]["fork"]) - 2

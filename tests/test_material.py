@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tolstat import joint as joints
-from tolstat import material
+from tolstat.joint import material
 
 TABLE_3_CROSS = {"k_x": 2.21e9, "k_y": 2.21e9, "k_z": 6.54e9, "k_bx": 5.90e5, "k_by": 5.90e5, "k_tz": 4.44e5}
 TABLE_3_FORK = {"k_x": 2.14e9, "k_y": 2.14e9, "k_z": 6.82e9, "k_bx": 2.32e5, "k_by": 1.91e6, "k_tz": 8.08e5}

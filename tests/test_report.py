@@ -138,9 +138,7 @@ def _overlapping(figure):
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda: exceedance.figure(
-            campaign(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in BUSHINGS})
-        ),
+        lambda: exceedance.figure(campaign(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in BUSHINGS})),
         lambda: exceedance.figure(campaign(limits={f"cross{i}.T": 16.0 + i for i in (1, 2, 3, 4)})),
         lambda: sweep.figure(swept(limits={"cross1.F": 800.0})),
         lambda: sweep.figure(swept(9)),
@@ -273,9 +271,7 @@ def test_colours_differ_for_dichromats():
     from matplotlib.colors import to_rgb
 
     linear = np.array([to_rgb(c) for c in style.COLOURS]) ** 2.2
-    to_lms = np.array(
-        [[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]]
-    )
+    to_lms = np.array([[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]])
     protan = np.array([[0.0, 2.02344, -2.52581], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     deutan = np.array([[1.0, 0.0, 0.0], [0.494207, 0.0, 1.24827], [0.0, 0.0, 1.0]])
     for loss in (protan, deutan):

@@ -67,9 +67,7 @@ def test_rows(make: Make, method: str) -> None:
 
 
 @settings(deadline=None, max_examples=15)
-@given(
-    st.sampled_from(["random", "sobol"]), st.integers(1, 70), st.integers(1, 70), st.integers(0, 2**63 - 1)
-)
+@given(st.sampled_from(["random", "sobol"]), st.integers(1, 70), st.integers(1, 70), st.integers(0, 2**63 - 1))
 def test_joint_i_does_not_depend_on_n(make: Make, method: str, n: int, more: int, seed: int) -> None:
     few = sampling.draw(make(OFFSET, DIAMETER, method=method, n=n, seed=seed))
     many = sampling.draw(make(OFFSET, DIAMETER, method=method, n=n + more, seed=seed))
@@ -119,9 +117,7 @@ def test_draws_follow_the_distributions(make: Make, method: str) -> None:
         ("operation.torque", stats.triang(0.5, 70, 60)),
     ]:
         assert stats.kstest(errors[name], dist.cdf).pvalue > 0.01, name
-    independent = np.corrcoef(
-        [errors[name] for name in ("pin1.offset_t", "pin3.diameter", "operation.torque")]
-    )
+    independent = np.corrcoef([errors[name] for name in ("pin1.offset_t", "pin3.diameter", "operation.torque")])
     assert np.abs(independent - np.eye(3)).max() < 0.05
 
 

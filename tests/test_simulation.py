@@ -104,7 +104,10 @@ SWAP_OUTPUT = {"pin1": "pin2", "pin2": "pin1", "hole3": "hole4", "hole4": "hole3
 
 
 def permuted(errors, swap):
-    return {f"{swap.get(name[:name.index('__')], name[:name.index('__')])}{name[name.index('__'):]}": value for name, value in errors.items()}
+    return {
+        f"{swap.get(name[: name.index('__')], name[: name.index('__')])}{name[name.index('__') :]}": value
+        for name, value in errors.items()
+    }
 
 
 class TestSymmetries:
@@ -284,7 +287,11 @@ par = par.view(np.recarray)
 
 def python(code, **environment):
     done = subprocess.run(
-        [sys.executable, "-c", PROBE + code], capture_output=True, text=True, env=os.environ | environment, check=False
+        [sys.executable, "-c", PROBE + code],
+        capture_output=True,
+        text=True,
+        env=os.environ | environment,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from tolstat import study, study_file, tables
+from tolstat import study, tables
 from tolstat.errors import InputError
 from tolstat.study import Study
-from tolstat.study_model import Solver
+from tolstat.study import file as study_file
+from tolstat.study.model import Solver
 from tolstat.tolerance import Normal, Rayleigh
 
 STUDIES = Path(__file__).parent.parent / "studies"
@@ -156,10 +157,7 @@ def test_radial_offset(tmp_path: Path) -> None:
     s = read(tmp_path, ("[[correlation]]", radial))
     assert s.tolerances["pin4.offset_radial"] == Rayleigh(pytest.approx(1e-4))
     (fault,) = faults(tmp_path, ("[[correlation]]", radial.replace("pin4", "pin1")))
-    assert (
-        "tolerances.pin1.offset_radial: pin1.offset_t is decided by tolerances.pin[12].offset_t already"
-        in fault
-    )
+    assert "tolerances.pin1.offset_radial: pin1.offset_t is decided by tolerances.pin[12].offset_t already" in fault
 
 
 def test_identity_holds_what_decides_the_numbers_and_nothing_else(tmp_path: Path) -> None:

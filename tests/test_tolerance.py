@@ -13,24 +13,20 @@ from scipy import stats
 
 from tolstat import tolerance
 from tolstat.errors import InputError
-from tolstat.joint import data_dir
+from tolstat.files import data_dir
+from tolstat.study.tolerance_entry import Site
+from tolstat.study.tolerance_kinds import KINDS, RADIAL_KINDS, distribution
 from tolstat.tolerance import Distribution
-from tolstat.tolerance_entry import Site
-from tolstat.tolerance_kinds import KINDS, RADIAL_KINDS, distribution
 
 ISO = data_dir() / "iso2768.csv"
-U = np.concatenate(
-    [10.0 ** np.arange(-15, -2), np.linspace(0.01, 0.99, 99), 1 - 10.0 ** np.arange(-3.0, -16, -1)]
-)
+U = np.concatenate([10.0 ** np.arange(-15, -2), np.linspace(0.01, 0.99, 99), 1 - 10.0 ** np.arange(-3.0, -16, -1)])
 
 bands = st.tuples(st.floats(-1e-3, 1e-3), st.floats(1e-6, 1e-3)).map(lambda b: (b[0], b[0] + b[1]))
 shares = st.floats(0.05, 0.95)
 cpks = st.floats(0.3, 3.0)
 
 
-def build(
-    data: dict[str, object], name: str = "pin1.offset_t", center: float = 0.0, unit: str = "m"
-) -> Distribution:
+def build(data: dict[str, object], name: str = "pin1.offset_t", center: float = 0.0, unit: str = "m") -> Distribution:
     return distribution(data, Site(name, unit, center, Path()), "study.toml", ("tolerances", name))
 
 
@@ -108,9 +104,7 @@ def test_cpk_is_reproduced_on_any_band(band: tuple[float, float], share: float, 
         (tolerance.Rayleigh(2.0), stats.rayleigh(scale=2.0)),
     ],
 )
-def test_ppf_inverts_scipys_distribution_function(
-    dist: Distribution, scipy_dist: stats.rv_continuous
-) -> None:
+def test_ppf_inverts_scipys_distribution_function(dist: Distribution, scipy_dist: stats.rv_continuous) -> None:
     u = U[(U > 1e-12) & (U < 1 - 1e-12)]
     x = dist.ppf(u)
     low = u < 0.5
@@ -133,9 +127,7 @@ def test_truncated_rayleigh_ends_at_its_radius() -> None:
 
 def test_measured_draws_each_value_equally_often() -> None:
     dist = tolerance.Measured.of([3.0, 1.0, 2.0, 2.0])
-    np.testing.assert_array_equal(
-        dist.ppf(np.array([1e-9, 0.25, 0.26, 0.5, 0.75, 0.76, 1.0])), [1, 1, 2, 2, 2, 3, 3]
-    )
+    np.testing.assert_array_equal(dist.ppf(np.array([1e-9, 0.25, 0.26, 0.5, 0.75, 0.76, 1.0])), [1, 1, 2, 2, 2, 3, 3])
     assert dist.describe() == tolerance.Measured.of([1.0, 2.0, 2.0, 3.0]).describe()
     assert dist.describe() != tolerance.Measured.of([1.0, 2.0, 3.0, 3.0]).describe()
 
@@ -149,9 +141,7 @@ LINEAR = {
 @pytest.mark.parametrize("grade", ["f", "m"])
 def test_iso2768_tables(grade: str) -> None:
     for size, deviation in (map(float, pair.split()) for pair in LINEAR[grade].split(",")):
-        assert tolerance.iso2768(ISO, "linear", grade, size * 1e-3) == pytest.approx(
-            deviation * 1e-3, rel=1e-12
-        )
+        assert tolerance.iso2768(ISO, "linear", grade, size * 1e-3) == pytest.approx(deviation * 1e-3, rel=1e-12)
     for leg, minutes in [(0.1, 60), (10, 60), (10.1, 30), (50, 30), (120, 20), (400, 10), (401, 5), (9e4, 5)]:
         found = tolerance.iso2768(ISO, "angular", grade, leg * 1e-3)
         assert found == pytest.approx(math.radians(minutes / 60), rel=1e-12)
@@ -167,18 +157,16 @@ def test_iso2768_outside_the_table(grade: str, size: float) -> None:
 
 def test_normal_entries() -> None:
     normal = {"distribution": "normal"}
-    assert build(normal | {"plus_minus": "0.1 mm", "cpk": 2.0}) == tolerance.Normal(
-        0.0, pytest.approx(1e-4 / 6)
-    )
+    assert build(normal | {"plus_minus": "0.1 mm", "cpk": 2.0}) == tolerance.Normal(0.0, pytest.approx(1e-4 / 6))
     asymmetric = build(normal | {"lower": "-0.02 mm", "upper": "0 mm", "truncate": True})
     assert asymmetric == tolerance.TruncatedNormal(
         pytest.approx(-1e-5), pytest.approx(1e-5 / 3), pytest.approx(-2e-5), 0.0
     )
     shifted = build(normal | {"lower": "-0.02 mm", "upper": "0 mm", "mean": "-0.005 mm", "cpk": 1.0})
     assert shifted == tolerance.Normal(pytest.approx(-5e-6), pytest.approx(5e-6 / 3))
-    assert build(
-        normal | {"mean": "100 N*m", "std": "5 N*m"}, "operation.torque", 90.0, "N*m"
-    ) == tolerance.Normal(100, 5)
+    assert build(normal | {"mean": "100 N*m", "std": "5 N*m"}, "operation.torque", 90.0, "N*m") == tolerance.Normal(
+        100, 5
+    )
     about = build(normal | {"plus_minus": "30 N*m"}, "operation.torque", 90.0, "N*m")
     assert about == tolerance.Normal(90.0, pytest.approx(10.0))
 

@@ -81,8 +81,7 @@ class Interrupted(Exception):
         self.path = path
         self.counts = counts
         super().__init__(
-            f"stopped: {counts.done} of {counts.total} joints are kept in {path}\n"
-            "  hint: run the same command to go on"
+            f"stopped: {counts.done} of {counts.total} joints are kept in {path}\n  hint: run the same command to go on"
         )
 
 

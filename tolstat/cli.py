@@ -26,9 +26,7 @@ if TYPE_CHECKING:
     from tolstat.store import Counts
     from tolstat.trace import CaseResult
 
-ABOUT = (
-    "Monte Carlo tolerance analysis of Cardan joints: which load is exceeded by which share of the joints."
-)
+ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which load is exceeded by which share of the joints."
 EPILOG = "Exit codes: 0 done, 1 internal error, 2 input that cannot be used, 130 interrupted."
 
 
@@ -83,9 +81,7 @@ def _options(
 
 @app.command()
 def simulate(
-    case: Annotated[
-        Path, typer.Argument(metavar="CASE", help="Case file (TOML): one joint with its errors.")
-    ],
+    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML): one joint with its errors.")],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="CSV", help="Write the trace of the last revolution.")
     ] = None,
@@ -112,9 +108,7 @@ def run(
         Path | None,
         typer.Option("--out", metavar="FILE", help="Result file; default STUDY.h5 in the current folder."),
     ] = None,
-    n: Annotated[
-        int | None, typer.Option("--n", metavar="N", help="Number of joints instead of the study's.")
-    ] = None,
+    n: Annotated[int | None, typer.Option("--n", metavar="N", help="Number of joints instead of the study's.")] = None,
     workers: Annotated[
         int | None, typer.Option("--workers", metavar="W", help="Processes; default one per core.")
     ] = None,
@@ -169,9 +163,7 @@ def status(
 @app.command()
 def export(
     file: ResultFile,
-    out: Annotated[
-        str, typer.Option("--csv", metavar="OUT", help="CSV file to write; - for standard output.")
-    ],
+    out: Annotated[str, typer.Option("--csv", metavar="OUT", help="CSV file to write; - for standard output.")],
 ) -> None:
     """Write all joints of a campaign as CSV.
 

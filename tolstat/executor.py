@@ -124,18 +124,14 @@ def _map_in_processes(
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _finished(
-    done: set[Future[ResultT]], running: dict[Future[ResultT], BlockT]
-) -> Iterator[tuple[BlockT, ResultT]]:
+def _finished(done: set[Future[ResultT]], running: dict[Future[ResultT], BlockT]) -> Iterator[tuple[BlockT, ResultT]]:
     """Yield the results of `done`, those that raise an exception last, and take them out of `running`."""
     for future in sorted(done, key=lambda future: future.exception() is not None):
         result = future.result()
         yield running.pop(future), result
 
 
-def _submit(
-    pool: ProcessPoolExecutor, function: Callable[[BlockT], ResultT], block: BlockT
-) -> Future[ResultT]:
+def _submit(pool: ProcessPoolExecutor, function: Callable[[BlockT], ResultT], block: BlockT) -> Future[ResultT]:
     """Submit a block; a worker that this starts inherits a blocked SIGINT until it can ignore it."""
     if not hasattr(signal, "pthread_sigmask"):
         return pool.submit(function, block)

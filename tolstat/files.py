@@ -1,4 +1,4 @@
-"""Files that are whole or not there: on the disk before they get their name."""
+"""Where the package keeps its data, and files that are whole or not there."""
 
 from __future__ import annotations
 
@@ -7,6 +7,13 @@ import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+
+def data_dir() -> Path:
+    """Directory of the data that comes with the package: in an installed wheel, or beside a checkout's."""
+    package = Path(__file__).parent
+    inside = package / "data"
+    return inside if inside.is_dir() else package.parent / "data"
 
 
 @contextmanager

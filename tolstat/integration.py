@@ -117,6 +117,7 @@ def integrate(
 @lru_cache(maxsize=32)
 def _bind(acceleration: Any, tangent: Any) -> Any:
     """Compile the march for one system; a system met again is not compiled again."""
-    from tolstat.kernel.march import build_march
+    from tolstat.kernel import march
 
-    return build_march(acceleration, tangent)
+    build: Any = march.build_march
+    return build(acceleration, tangent)

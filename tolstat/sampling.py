@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.joint import nominal_errors
-from tolstat.selection import columns_of
 from tolstat.study import Study
-from tolstat.study_model import SweepAxis
+from tolstat.study.model import SweepAxis
+from tolstat.study.selection import columns_of
 from tolstat.tables import ERROR_FIELDS
 
 Array = NDArray[np.float64]

@@ -41,9 +41,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
     except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            [Fault(str(path), f"is not TOML: {error}", "mend the syntax at that place")]
-        ) from error
+        raise InputError([Fault(str(path), f"is not TOML: {error}", "mend the syntax at that place")]) from error
 
 
 def dotted(location: Sequence[int | str]) -> str:

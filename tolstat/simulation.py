@@ -33,12 +33,14 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
     dict of str to HistorySpec
     """
     n = options.steps_per_rev
-    loads = "force e, t, z (N), torque e, t, z (N m) on the lump, of bushings cross 1-4, fork 1-4, in the base marker's axes"
+    loads = "force e, t, z (N), torque e, t, z (N m) of bushings cross 1-4, fork 1-4 on the lump, in base marker axes"
     if histories == "full":
         return {
             "loads": HistorySpec((n, 8, 6), "f4", "N, N*m", loads),
             "contact": HistorySpec((n, 4, 2), "f4", "N", "normal force on the outer and inner half of pins 1-4"),
-            "mode": HistorySpec((n, 4), "u1", "1", "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"),
+            "mode": HistorySpec(
+                (n, 4), "u1", "1", "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
+            ),
             "tau": HistorySpec((n,), "f8", "1", "speed ratio"),
         }
     if histories == "harmonics":

@@ -144,9 +144,7 @@ def _error_fields() -> tuple[Field, ...]:
             text = f"position error of the {kind} axis along {axis}"
             fields.append(Field(f"{feature}.offset_{axis}", "m", text))
         for axis in "tz":
-            fields.append(
-                Field(f"{feature}.tilt_{axis}", "rad", f"angular error of the {kind} axis about {axis}")
-            )
+            fields.append(Field(f"{feature}.tilt_{axis}", "rad", f"angular error of the {kind} axis about {axis}"))
         fields.append(Field(f"{feature}.diameter", "m", f"deviation of the {kind}'s diameter from nominal"))
     fields += [
         Field("operation.alpha", "rad", "misalignment of the shafts"),
@@ -191,9 +189,7 @@ PARAM_FIELDS = (
     Field("c_t", "N*s/m", "tangential contact damping (lubricant film)"),
     Field("delta_d", "m", "penetration over which contact damping rises"),
     Field("n_stations", "1", "contact stations per pin", "i8"),
-    Field(
-        "station_s", "m", "signed distance of each station from P along the pin axis", shape=(MAX_STATIONS,)
-    ),
+    Field("station_s", "m", "signed distance of each station from P along the pin axis", shape=(MAX_STATIONS,)),
     Field("station_weight", "1", "weight of each station; 1 at two stations, sum 2", shape=(MAX_STATIONS,)),
     Field("clearance", "m", "radial clearance c of each pin", shape=(4,)),
     Field("pin_point", "m", "P less the pin's reference point, in axes of C", shape=(4, 3)),

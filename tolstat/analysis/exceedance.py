@@ -110,9 +110,7 @@ def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
     return Sample(np.sort(load[valid]), int(failed.sum()), int(unsettled.sum()))
 
 
-def clopper_pearson(
-    count: ArrayLike, n: ArrayLike, confidence: float = 0.95
-) -> tuple[FloatArray, FloatArray]:
+def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
     """Two-sided exact interval of a binomial probability (Clopper and Pearson 1934).
 
     Parameters
@@ -148,9 +146,7 @@ def clopper_pearson(
     return lower, upper
 
 
-def at(
-    values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0.95, iid: bool = True
-) -> Exceedance:
+def at(values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0.95, iid: bool = True) -> Exceedance:
     """Share of the joints whose load is above one level.
 
     Parameters

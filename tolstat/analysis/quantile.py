@@ -43,9 +43,7 @@ class Quantile(NamedTuple):
     bound_upper: float
 
 
-def at(
-    values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0.95, iid: bool = True
-) -> Quantile:
+def at(values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0.95, iid: bool = True) -> Quantile:
     """Quantile of a load over the joints.
 
     Parameters

@@ -1,5 +1,7 @@
-"""Generalised-alpha (Chung, Hulbert 1993) in the form of Arnold and Bruels (2007), which meets the equations of motion
-at the new point itself and is of order 2 in q, v and a. rho_inf is the spectral radius at infinite frequency.
+"""Generalised-alpha (Chung, Hulbert 1993) in the form of Arnold and Bruels (2007).
+
+It meets the equations of motion at the new point itself and is of order 2 in q, v and a. rho_inf is the spectral
+radius at infinite frequency.
 """
 
 from tolstat.kernel._jit import njit
@@ -30,6 +32,4 @@ def accept(h, state, options):
     """Advance the algorithmic acceleration."""
     alpha_m, alpha_f, _, _ = parameters(options.rho_inf)
     for i in range(state.q.size):
-        state.aux[i] = (
-            (1 - alpha_f) * state.a[i] + alpha_f * state.a0[i] - alpha_m * state.aux[i]
-        ) / (1 - alpha_m)
+        state.aux[i] = ((1 - alpha_f) * state.a[i] + alpha_f * state.a0[i] - alpha_m * state.aux[i]) / (1 - alpha_m)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tolstat.kernel._jit import closure
-from tolstat.kernel.dense import build_dense, motion_size, make_dense_work
+from tolstat.kernel.dense import build_dense, make_dense_work, motion_size
 from tolstat.kernel.integrate import build_integrator, reset
 from tolstat.kernel.state import make_state
 

@@ -25,7 +25,14 @@ class Ring(NamedTuple):
 def make_ring(steps_per_rev: int) -> Ring:
     """Allocate, filled with NaN."""
     n = steps_per_rev
-    shapes = {"loads": (n, 8, 6), "contact": (n, 4, 2), "tau": (n,), "psi": (n,), "modulus": (n, 8, 2), "change": (n, 2)}
+    shapes = {
+        "loads": (n, 8, 6),
+        "contact": (n, 4, 2),
+        "tau": (n,),
+        "psi": (n,),
+        "modulus": (n, 8, 2),
+        "change": (n, 2),
+    }
     return Ring(mode=np.zeros((n, 4), np.uint8), **{name: np.full(shape, np.nan) for name, shape in shapes.items()})
 
 

@@ -122,7 +122,7 @@ def simulate_joint(par, options, work, state, ring, out):
     """
     clear_results(out)
     status = run(par, options, work, state, ring, out)
-    if status == OK or status == NOT_SETTLED:
+    if status in (OK, NOT_SETTLED):
         summarise(ring, out)
         for b in range(8):
             if not (out.F_max[b] < 1e300 and out.T_max[b] < 1e300):

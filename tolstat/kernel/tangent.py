@@ -1,9 +1,9 @@
 """Tangent of the residual: S = d(residual) / d(unknowns) when velocity and acceleration follow as cv dq and ca dq.
 
-Columns are increments of displacement and of attitude (du, dtheta in the frame's axes, attitude exp(dtheta x) R), not of
-the rotation vector; `linsolve.solve` converts. Levers and attitudes are the actual ones, so that a rigid motion of pins
-and hub together costs exactly nothing. Left out, each below a per cent of what stands beside it: turning of the loads
-themselves with the bodies, gyroscopic terms (2 Omega / cv of the inertia), and rates of levers.
+Columns are increments of displacement and of attitude (du, dtheta in the frame's axes, attitude exp(dtheta x) R),
+not of the rotation vector; `linsolve.solve` converts. Levers and attitudes are the actual ones, so that a rigid
+motion of pins and hub together costs exactly nothing. Left out, each a few per cent of what stands beside it at most:
+turning of the loads themselves with the bodies, gyroscopic terms (2 Omega / cv of the inertia), and rates of levers.
 """
 
 from tolstat.kernel._jit import njit
@@ -116,7 +116,11 @@ def bushing_tangent(i, cv, par, work):
 @njit
 def _restore(x, k, c, cv, first, base, lump, work):
     """Restoring force, in axes of the frame, of a displacement `x` in the base marker's axes."""
-    f = ((k[first] + cv * c[first]) * x[0], (k[first + 1] + cv * c[first + 1]) * x[1], (k[first + 2] + cv * c[first + 2]) * x[2])
+    f = (
+        (k[first] + cv * c[first]) * x[0],
+        (k[first + 1] + cv * c[first + 1]) * x[1],
+        (k[first + 2] + cv * c[first + 2]) * x[2],
+    )
     return turn(work.rot, base, turn_back(TRIAD, lump, f))
 
 

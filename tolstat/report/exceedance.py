@@ -235,9 +235,7 @@ def _limit_lines(ax: Axes, marked: dict[float, list[int]], unit: str) -> None:
         ax.text(place, 1.015, text, transform=ax.transAxes, ha=side, va="bottom", fontsize=9, color=colour)
 
 
-def _without_overlap(
-    labels: list[tuple[float, str, str]], new: tuple[float, str, str]
-) -> list[tuple[float, str, str]]:
+def _without_overlap(labels: list[tuple[float, str, str]], new: tuple[float, str, str]) -> list[tuple[float, str, str]]:
     """Append a label, joined to the one before where the two would touch (0.014 panel widths a letter)."""
     if not labels:
         return [new]

@@ -145,9 +145,7 @@ def load(results: NDArray[np.void], name: str) -> tuple[FloatArray, str]:
         return results["contact_max"][:, PINS.index(part), :].max(axis=1), "N"
     if name == "psi":
         return results["psi_max"], "1"
-    raise InputError(
-        [Fault(f"limits.{name}", "is not a load", "name cross1.F .. fork4.T, pin1.contact or psi")]
-    )
+    raise InputError([Fault(f"limits.{name}", "is not a load", "name cross1.F .. fork4.T, pin1.contact or psi")])
 
 
 def swept_axes(campaign: Campaign) -> list[Axis]:
@@ -174,9 +172,7 @@ def swept_axes(campaign: Campaign) -> list[Axis]:
     for names in groups.values():
         unit, factor = _DISPLAY[_ERROR_UNITS[names[0]]]
         values = campaign.errors[names[0]] * factor
-        values[np.abs(values) < 1e-12 * np.abs(values).max()] = (
-            0.0  # a sweep through zero misses it by rounding
-        )
+        values[np.abs(values) < 1e-12 * np.abs(values).max()] = 0.0  # a sweep through zero misses it by rounding
         axes.append(Axis(_label(names, campaign.patterns), unit, values))
     rank = {pattern: i for i, pattern in enumerate(campaign.patterns)}
     return sorted(axes, key=lambda axis: rank.get(axis.label, len(rank)))

@@ -78,9 +78,7 @@ def figure(campaign: Campaign) -> Figure:
     with style.settings():
         title = f"{campaign.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
         page, panels = style.panels(title, f"{campaign.head()}\n{_note(axes)}")
-        first = (
-            axes[0] if axes else Axis("joint", "", np.arange(1, len(campaign.results) + 1, dtype=np.float64))
-        )
+        first = axes[0] if axes else Axis("joint", "", np.arange(1, len(campaign.results) + 1, dtype=np.float64))
         for group, letter, ax in panels:
             ax.set_xlabel(_head(first))
             ax.xaxis.set_major_locator(MaxNLocator(6))
@@ -115,9 +113,7 @@ def _panel(ax: Axes, campaign: Campaign, axes: list[Axis], group: str, letter: s
         nominal = max(load(campaign.nominal, f"{group}{i}.{letter}")[0][0] for i in (1, 2, 3, 4))
         ax.axhline(nominal, color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0)), zorder=1.5)
     limits = {
-        campaign.limits[name]
-        for name in (f"{group}{i}.{letter}" for i in (1, 2, 3, 4))
-        if name in campaign.limits
+        campaign.limits[name] for name in (f"{group}{i}.{letter}" for i in (1, 2, 3, 4)) if name in campaign.limits
     }
     bottom, top = ax.get_ylim()
     for limit in sorted(limits):
@@ -145,9 +141,7 @@ def _line(
     ax.plot(x[order][loose], shown[loose], ls="", marker="o", ms=6.5, mfc="white", mec=colour, zorder=4)
     gone = ~np.isin(status, [Status.OK, Status.NOT_SETTLED, Status.PENDING])
     foot = np.full(int(gone.sum()), 0.02)
-    ax.plot(
-        x[order][gone], foot, ls="", marker="x", color=style.INK, transform=ax.get_xaxis_transform(), zorder=4
-    )
+    ax.plot(x[order][gone], foot, ls="", marker="x", color=style.INK, transform=ax.get_xaxis_transform(), zorder=4)
 
 
 def _combinations(axes: list[Axis]) -> list[tuple[str, Mask]]:
@@ -167,8 +161,7 @@ def _legend(page: Figure, campaign: Campaign, axes: list[Axis]) -> None:
     handles: list[Artist]
     if len(axes) < 2:
         handles = [
-            Line2D([], [], color=c, ls=d, marker="o", ms=3.2)
-            for c, d in zip(style.COLOURS, style.DASHES, strict=True)
+            Line2D([], [], color=c, ls=d, marker="o", ms=3.2) for c, d in zip(style.COLOURS, style.DASHES, strict=True)
         ]
         labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
     else:

@@ -54,9 +54,7 @@ def quantiles(table: pd.DataFrame) -> str:
     for name, part in table.groupby("load", sort=False):
         lines = part.sort_values("share").to_dict("records")
         last, unit = lines[-1], lines[-1]["unit"]
-        interval = (
-            "-" if math.isnan(last["lower"]) else f"{last['lower']:.4g} .. {_value(last['upper'], unit)}"
-        )
+        interval = "-" if math.isnan(last["lower"]) else f"{last['lower']:.4g} .. {_value(last['upper'], unit)}"
         rows.append(
             [
                 str(name),

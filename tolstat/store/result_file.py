@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tolstat import tables
 from tolstat.errors import Fault, StoreError
-from tolstat.provenance import git_commit, versions
+from tolstat.store.provenance import git_commit, versions
 from tolstat.tables import HistorySpec
 
 if TYPE_CHECKING:
@@ -26,9 +26,7 @@ FILETYPE = "tolstat campaign"
 SCHEMA_VERSION = 1
 
 
-def attributes(
-    study: Study, specs: Mapping[str, HistorySpec], dimensions: Mapping[str, int]
-) -> dict[str, Any]:
+def attributes(study: Study, specs: Mapping[str, HistorySpec], dimensions: Mapping[str, int]) -> dict[str, Any]:
     """Make the attributes of a new file: all that a reader needs beyond the tables.
 
     Parameters

@@ -9,16 +9,17 @@ from typing import Any, TypeVar
 
 from pydantic_core import PydanticCustomError
 
-from tolstat import joint, schema, selection, units
-from tolstat.correlation import Copula, assemble
+from tolstat import joint, schema, units
 from tolstat.errors import Fault, InputError, gather
 from tolstat.joint import Joint, Operation
 from tolstat.schema import read_toml
-from tolstat.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Claims, Entry
-from tolstat.study_model import MAX_ROWS, Correlation, Output, Sampling, Solver, SweepAxis, SweepEntry
+from tolstat.study import selection
+from tolstat.study.correlation import Copula, assemble
+from tolstat.study.model import MAX_ROWS, Correlation, Output, Sampling, Solver, SweepAxis, SweepEntry
+from tolstat.study.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Claims, Entry
+from tolstat.study.tolerance_entry import Site
+from tolstat.study.tolerance_kinds import distribution
 from tolstat.tolerance import Distribution
-from tolstat.tolerance_entry import Site
-from tolstat.tolerance_kinds import distribution
 
 ModelT = TypeVar("ModelT", bound=schema.Strict)
 
@@ -152,9 +153,7 @@ class StudyFile:
                     self._claims.claim(entry, names)
                 site = Site(names[0], UNITS[names[0]], 0.0, self.path.parent)
                 context = {"site": site}
-                read = schema.validate(
-                    SweepEntry, entry.value, self.place, prefix=entry.path, context=context
-                )
+                read = schema.validate(SweepEntry, entry.value, self.place, prefix=entry.path, context=context)
                 axes.append(SweepAxis(tuple(names), read.start, read.stop, read.points))
         return tuple(axes)
 
@@ -179,9 +178,7 @@ class StudyFile:
                 self._fault(("sweep",), "missing table", "add [sweep], or another sampling.method")
             for section in ("tolerances", "correlation"):
                 if self.data.get(section):
-                    self._fault(
-                        (section,), "has no effect in a sweep", "remove it, or change sampling.method"
-                    )
+                    self._fault((section,), "has no effect in a sweep", "remove it, or change sampling.method")
             points = math.prod(axis.points for axis in sweep)
             if points > MAX_ROWS:
                 self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
@@ -189,9 +186,7 @@ class StudyFile:
         if not self.data.get("tolerances"):
             self._fault(("tolerances",), "missing table: nothing scatters", "add [tolerances]")
         if "sweep" in self.data:
-            self._fault(
-                ("sweep",), f"has no effect with {sampling.method!r}", 'write sampling.method = "sweep"'
-            )
+            self._fault(("sweep",), f"has no effect with {sampling.method!r}", 'write sampling.method = "sweep"')
 
     def check_harmonics(self, output: Output, solver: Solver) -> None:
         """Find harmonics that the steps of a revolution cannot carry."""

@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from tolstat import material, units
-from tolstat.joint_sections import (
+from tolstat import units
+from tolstat.joint import material
+from tolstat.joint.sections import (
     NOT_NEGATIVE,
     POSITIVE,
     Array,
@@ -18,10 +19,9 @@ from tolstat.joint_sections import (
     Pin,
     Ratio,
     Stiffness,
-    fault,
     needed,
 )
-from tolstat.schema import Strict
+from tolstat.schema import Strict, refuse
 from tolstat.tables import MAX_STATIONS
 
 QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
@@ -58,14 +58,14 @@ class Contact(Strict):
     def _fits(cls, value: float, info: ValidationInfo) -> float:
         hole = info.data.get("D_H")
         if hole is not None and value > hole:
-            raise fault(f"a pin of {value:g} m does not go into a hole of {hole:g} m", "give D_P <= D_H")
+            raise refuse(f"a pin of {value:g} m does not go into a hole of {hole:g} m", "give D_P <= D_H")
         return value
 
     @field_validator("coefficients")
     @classmethod
     def _clearance(cls, value: str, info: ValidationInfo) -> str:
         if value == "fitted" and "D_P" in info.data and info.data["D_P"] == info.data.get("D_H"):
-            raise fault("eq. (3) has no value at D_H = D_P", 'give a clearance, or write "printed"')
+            raise refuse("eq. (3) has no value at D_H = D_P", 'give a clearance, or write "printed"')
         return value
 
     @field_validator("k1u", "k2u")
@@ -79,7 +79,7 @@ class Contact(Strict):
     def _point(cls, value: float | None, info: ValidationInfo) -> float | None:
         given = info.data.get("k1p", 0.0) is not None and info.data.get("k2p", 0.0) is not None
         if value is None and (info.data.get("coefficients") == "fitted" or not given):
-            raise fault("missing key, needed where k1p and k2p are not given", "add H, or both k1p and k2p")
+            raise refuse("missing key, needed where k1p and k2p are not given", "add H, or both k1p and k2p")
         return value
 
     @field_validator("fit_load")

@@ -11,10 +11,10 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
 
-from tolstat import material, units
-from tolstat.schema import Strict
+from tolstat import units
+from tolstat.joint import material
+from tolstat.schema import Strict, refuse
 
 Array = NDArray[np.float64]
 
@@ -34,21 +34,16 @@ Number = Annotated[units.Number, POSITIVE]
 Ratio = Annotated[units.Number, NOT_NEGATIVE]
 
 
-def fault(found: str, remedy: str) -> PydanticCustomError:
-    """Fault of a value that pydantic reports with the others of the file."""
-    return PydanticCustomError("joint", "{found}", {"found": found, "remedy": remedy})
-
-
 def _poisson(nu: float) -> float:
     if not 0.0 <= nu < 0.5:
-        raise fault(f"{nu:g} is no Poisson's ratio of a metal", "give a number from 0 to below 0.5")
+        raise refuse(f"{nu:g} is no Poisson's ratio of a metal", "give a number from 0 to below 0.5")
     return nu
 
 
 def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
     """No body has one principal moment above the sum of the two others."""
     if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
-        raise fault(f"no body has the moments of inertia {inertia}", "none may exceed the other two's sum")
+        raise refuse(f"no body has the moments of inertia {inertia}", "none may exceed the other two's sum")
     return inertia
 
 
@@ -59,7 +54,7 @@ def needed(value: object, info: ValidationInfo, selector: str, word: str, instea
     """Raise when a key is absent though its section's `selector` says `word`."""
     if value is None and info.data.get(selector) == word:
         remedy = f'add {info.field_name}, or write {selector} = "{instead}"'
-        raise fault(f'missing key, needed with {selector} = "{word}"', remedy)
+        raise refuse(f'missing key, needed with {selector} = "{word}"', remedy)
 
 
 class Material(Strict):
@@ -94,9 +89,7 @@ class Pin(Strict):
     def beam(self, of: Material) -> material.BeamStiffness:
         """Stiffness from geometry, eqs. (9)-(11)."""
         Jp = 2.0 * self.J if self.Jp is None else self.Jp
-        return material.beam_stiffness(
-            of.E, of.G, length=self.l, A=self.A, Jx=self.J, Jy=self.J, Jp=Jp, chi=self.chi
-        )
+        return material.beam_stiffness(of.E, of.G, length=self.l, A=self.A, Jx=self.J, Jy=self.J, Jp=Jp, chi=self.chi)
 
 
 class Arm(Strict):

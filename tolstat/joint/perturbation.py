@@ -8,25 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator
 
-from tolstat import material, units
-from tolstat.joint_contact import Contact
-from tolstat.joint_file import Joint, data_dir, load
-from tolstat.joint_sections import Array, fault
+from tolstat import units
+from tolstat.joint import material
+from tolstat.joint.contact import Contact
+from tolstat.joint.model import Joint
+from tolstat.joint.sections import Array
 from tolstat.kernel.topology import ARM, ARM_OF_PIN, PIN, TRIAD
-from tolstat.schema import Strict
+from tolstat.schema import Strict, refuse
 from tolstat.tables import ERROR, HOLES, PARAM, PINS, Law
-
-__all__ = [
-    "ARM_OF_PIN",
-    "ARM_TRIADS",
-    "PIN_TRIADS",
-    "Joint",
-    "Operation",
-    "data_dir",
-    "load",
-    "nominal_errors",
-    "perturb",
-]
 
 Table = NDArray[np.void]
 
@@ -40,7 +29,7 @@ ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
 
 def _steep(alpha: float) -> float:
     if not abs(alpha) < np.pi / 2:
-        raise fault(f"{np.degrees(alpha):g} deg cannot be run by a Cardan joint", "give less than 90 deg")
+        raise refuse(f"{np.degrees(alpha):g} deg cannot be run by a Cardan joint", "give less than 90 deg")
     return alpha
 
 
@@ -49,7 +38,7 @@ class Operation(Strict):
 
     alpha: Annotated[units.Angle, AfterValidator(_steep)]
     speed: Annotated[units.Speed, AfterValidator(units.positive)]
-    torque: Annotated[units.Torque, AfterValidator(units.not_negative)]
+    torque: units.Torque
 
 
 def nominal_errors(n: int, operation: Operation) -> Table:
@@ -154,8 +143,7 @@ def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
     """
     e, t, z = triad
     point = sum(
-        np.multiply.outer(errors[f"{feature}.offset_{name}"], axis)
-        for name, axis in zip("etz", triad, strict=True)
+        np.multiply.outer(errors[f"{feature}.offset_{name}"], axis) for name, axis in zip("etz", triad, strict=True)
     )
     about_t, about_z = errors[f"{feature}.tilt_t"], errors[f"{feature}.tilt_z"]
     angle = np.hypot(about_t, about_z)

@@ -8,8 +8,8 @@ from pydantic import Field, model_validator
 
 from tolstat import units
 from tolstat.schema import Strict, refuse
+from tolstat.study.tolerance_entry import Value
 from tolstat.tables import Method, Options, Start
-from tolstat.tolerance_entry import Value
 
 _DEFAULTS = Options()
 

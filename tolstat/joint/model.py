@@ -12,9 +12,10 @@ from pydantic import ValidationInfo, field_validator
 
 from tolstat import schema
 from tolstat.errors import Fault, InputError
-from tolstat.joint_contact import Contact
-from tolstat.joint_sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft, fault
-from tolstat.schema import Strict
+from tolstat.files import data_dir
+from tolstat.joint.contact import Contact
+from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
+from tolstat.schema import Strict, refuse
 
 
 class Joint(Strict):
@@ -38,7 +39,7 @@ class Joint(Strict):
     def _beside_the_centre(cls, value: Contact, info: ValidationInfo) -> Contact:
         cross = info.data.get("cross")
         if cross is not None and value.z >= 2.0 * cross.R:
-            raise fault(f"z = {value.z:g} m reaches past the joint centre", "give contact.z < 2 cross.R")
+            raise refuse(f"z = {value.z:g} m reaches past the joint centre", "give contact.z < 2 cross.R")
         return value
 
     @field_validator("contact")
@@ -47,7 +48,7 @@ class Joint(Strict):
         """Refuse a load range beyond which eq. (3) turns back: the logarithms of 2 D / b go below zero."""
         of = info.data.get("material")
         if value.coefficients == "fitted" and of is not None and not min(value.stiffness(of)) > 0.0:
-            raise fault("the fit to eq. (3) gives no stiffening contact", "give a smaller contact.fit_load")
+            raise refuse("the fit to eq. (3) gives no stiffening contact", "give a smaller contact.fit_load")
         return value
 
     @property
@@ -65,16 +66,7 @@ class Joint(Strict):
         return np.array([k.k_y, k.k_x, k.k_z, k.k_by, k.k_bx, k.k_tz])
 
 
-def data_dir() -> Path:
-    """Directory of the data that comes with the package: in an installed wheel, or beside a checkout's."""
-    package = Path(__file__).parent
-    inside = package / "data"
-    return inside if inside.is_dir() else package.parent / "data"
-
-
-def load(
-    base: str | Path, overrides: Mapping[str, Any], place: str, relative_to: Path | None = None
-) -> Joint:
+def load(base: str | Path, overrides: Mapping[str, Any], place: str, relative_to: Path | None = None) -> Joint:
     """Read a joint file and merge a case's own keys over it.
 
     Parameters
@@ -115,11 +107,7 @@ def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
     if str(base) in names:
         return folder / f"{base}.toml"
     close = difflib.get_close_matches(str(base), names, n=1)
-    known = (
-        f"did you mean {close[0]!r}?"
-        if close
-        else f"write one of {', '.join(names)}, or a path to a .toml file"
-    )
+    known = f"did you mean {close[0]!r}?" if close else f"write one of {', '.join(names)}, or a path to a .toml file"
     raise InputError([Fault(f"{place}: joint.base", f"no joint is named {str(base)!r}", known)])
 
 

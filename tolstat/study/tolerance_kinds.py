@@ -15,8 +15,16 @@ from pydantic import Field
 from tolstat import schema, tolerance, units
 from tolstat.errors import Fault, InputError
 from tolstat.schema import refuse
+from tolstat.study.tolerance_entry import (
+    Banded,
+    HalfBand,
+    Positive,
+    PositiveNumber,
+    Site,
+    ToleranceEntry,
+    Value,
+)
 from tolstat.tolerance import Distribution
-from tolstat.tolerance_entry import Banded, HalfBand, Positive, PositiveNumber, Site, ToleranceEntry, Value
 
 Truncate = Annotated[bool, Field(strict=True)]
 
@@ -37,9 +45,7 @@ class NormalEntry(Banded):
         lower, upper = self.needed_band(site)
         mean = 0.5 * (lower + upper) if self.mean is None else self.mean
         if not lower < mean < upper:
-            raise refuse(
-                "mean is outside the band, so that Cpk would not be positive", "give lower < mean < upper"
-            )
+            raise refuse("mean is outside the band, so that Cpk would not be positive", "give lower < mean < upper")
         sigma = tolerance.sigma_of(lower, upper, mean, 1.0 if self.cpk is None else self.cpk)
         if self.truncate:
             return tolerance.TruncatedNormal(mean, sigma, lower, upper)
@@ -125,11 +131,7 @@ class LogNormalEntry(Banded):
         low, high = math.log(lower - self.threshold), math.log(upper - self.threshold)
         mean = 0.5 * (low + high)
         sigma = tolerance.sigma_of(low, high, mean, 1.0 if self.cpk is None else self.cpk)
-        log = (
-            tolerance.TruncatedNormal(mean, sigma, low, high)
-            if self.truncate
-            else tolerance.Normal(mean, sigma)
-        )
+        log = tolerance.TruncatedNormal(mean, sigma, low, high) if self.truncate else tolerance.Normal(mean, sigma)
         return tolerance.LogNormal(self.threshold, log)
 
 
@@ -194,21 +196,15 @@ class MeasuredEntry(ToleranceEntry):
                 f"{path} cannot be read: {error}", "give a CSV file; its path starts from the study's folder"
             ) from error
         if self.column not in columns:
-            raise refuse(
-                f"{path} has no column {self.column!r}", schema.did_you_mean(self.column, list(columns))
-            )
+            raise refuse(f"{path} has no column {self.column!r}", schema.did_you_mean(self.column, list(columns)))
         values = []
         for number, cell in enumerate(cells, start=1):
             value = _number(cell)
             if value is None:
-                raise refuse(
-                    f"{path}: row {number} of {self.column!r} is {cell!r}", "give a finite number in each row"
-                )
+                raise refuse(f"{path}: row {number} of {self.column!r} is {cell!r}", "give a finite number in each row")
             values.append(value)
         if len(values) < 2:
-            raise refuse(
-                f"{path} has {len(values)} values in {self.column!r}", "give at least two measured parts"
-            )
+            raise refuse(f"{path} has {len(values)} values in {self.column!r}", "give at least two measured parts")
         return values
 
 

@@ -22,8 +22,15 @@ from numpy.typing import NDArray
 from tolstat import tables
 from tolstat.errors import StoreError
 from tolstat.files import writing
-from tolstat.histories import HistoryParts
-from tolstat.result_file import attributes, check_schema, create_table, fault, open_hdf5, pending_results
+from tolstat.store.histories import HistoryParts
+from tolstat.store.result_file import (
+    attributes,
+    check_schema,
+    create_table,
+    fault,
+    open_hdf5,
+    pending_results,
+)
 from tolstat.tables import HistorySpec, Simulation, Status
 
 if TYPE_CHECKING:

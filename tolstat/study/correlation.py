@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from tolstat.errors import Fault, InputError, gather
-from tolstat.selection import select
-from tolstat.study_model import Correlation
+from tolstat.study.model import Correlation
+from tolstat.study.selection import select
 
 Array = NDArray[np.float64]
 
@@ -91,9 +91,7 @@ def assemble(entries: Sequence[Correlation], toleranced: dict[str, str], place: 
         for pair in pairs:
             if pair in rho:
                 text = " and ".join(sorted(pair))
-                faults.append(
-                    Fault(where, f"{text} are correlated by an earlier entry", "keep one of the two")
-                )
+                faults.append(Fault(where, f"{text} are correlated by an earlier entry", "keep one of the two"))
             rho[pair] = entry.rho
     if faults:
         raise InputError(faults)
@@ -107,9 +105,7 @@ def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
         raise InputError([Fault(where, f"{pattern} has no correlation of its own", remedy)])
     names = select(pattern, toleranced)
     if not names:
-        raise InputError(
-            [Fault(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or leave it out")]
-        )
+        raise InputError([Fault(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or leave it out")])
     return names
 
 

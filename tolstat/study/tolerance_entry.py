@@ -13,7 +13,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 from pydantic import AfterValidator, BeforeValidator, ValidationInfo, model_validator
 
 from tolstat import schema, tolerance, units
-from tolstat.joint import data_dir
+from tolstat.files import data_dir
 from tolstat.schema import refuse
 from tolstat.tolerance import Distribution
 

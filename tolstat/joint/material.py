@@ -138,9 +138,7 @@ def contact_displacement(load: Array, D_H: float, D_P: float, E: float, nu: floa
     return np.asarray(compliance_factor(E, nu) * load / math.pi * logs)
 
 
-def fit_contact(
-    load_range: float, z: float, D_H: float, D_P: float, E: float, nu: float
-) -> tuple[float, float]:
+def fit_contact(load_range: float, z: float, D_H: float, D_P: float, E: float, nu: float) -> tuple[float, float]:
     """Fit F = k1 delta^2 + k2 delta, eq. (5), to eq. (3) over loads up to `load_range`.
 
     Least squares of the force at `FIT_LOADS` equally spaced loads above zero.
@@ -185,9 +183,7 @@ def point_coefficients(k1u: float, k2u: float, H: float) -> tuple[float, float]:
     return k1u / H**2, k2u / H
 
 
-def contact_damping(
-    xi: float, mass: float, *, length: float, A: float, J: float, E: float, rho: float
-) -> float:
+def contact_damping(xi: float, mass: float, *, length: float, A: float, J: float, E: float, rho: float) -> float:
     """Damping of a contact, eqs. (6)-(7): c = 2 xi m omega, omega that of the pin as a cantilever.
 
     Parameters

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tolstat.correlation import Copula
 from tolstat.joint import Joint, Operation
-from tolstat.study_file import StudyFile
-from tolstat.study_model import Output, Sampling, Solver, SweepAxis
+from tolstat.study.correlation import Copula
+from tolstat.study.file import StudyFile
+from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.tolerance import Distribution
 
 

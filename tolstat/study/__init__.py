@@ -1,0 +1,5 @@
+"""Studies and cases: the only reader of their TOML files."""
+
+from tolstat.study.study import Case, Study, load, load_case
+
+__all__ = ["Case", "Study", "load", "load_case"]

@@ -179,7 +179,7 @@ def test_base_that_cannot_be_found(tmp_path):
 
 def test_operation_is_validated():
     with pytest.raises(InputError) as caught:
-        validate(Operation, {"alpha": "90 deg", "speed": "0 rpm", "torque": "-1 N*m"}, "case.toml")
+        validate(Operation, {"alpha": "90 deg", "speed": "0 rpm", "torque": "nan N*m"}, "case.toml")
     assert [f.place for f in caught.value.faults] == [f"case.toml: {k}" for k in ("alpha", "speed", "torque")]
 
 

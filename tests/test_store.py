@@ -260,7 +260,7 @@ def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monk
     def interrupt(n: int) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tolstat.store.pending_results", interrupt)
+    monkeypatch.setattr("tolstat.store.result_store.pending_results", interrupt)
     with pytest.raises(KeyboardInterrupt):
         new_store(tmp_path / "a.h5", fakes.Study())
     assert list(tmp_path.iterdir()) == []
@@ -268,9 +268,9 @@ def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
     code = (
-        "import os, signal, pathlib, tolstat.store\n"
+        "import os, signal, pathlib, tolstat.store.result_store\n"
         "from tests import fakes, test_store\n"
-        "tolstat.store.pending_results = lambda n: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "tolstat.store.result_store.pending_results = lambda n: os.kill(os.getpid(), signal.SIGKILL)\n"
         f"test_store.new_store(pathlib.Path({str(tmp_path / 'a.h5')!r}), fakes.Study())"
     )
     ended = subprocess.run([sys.executable, "-c", code], env=fakes.environment(), check=False)

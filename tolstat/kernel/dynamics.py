@@ -110,7 +110,7 @@ def residual(t, q, v, a, par, options, work, out):
         The joint.
     options : Options
         ``start`` decides whether the resisting torque is ramped.
-    work : Work
+    work : record of WORK
         Rewritten.
     out : ndarray, shape (55,)
         N and N m.

@@ -22,7 +22,7 @@ def ideal_motion(theta, alpha, omega, work):
         Input angle and misalignment, rad.
     omega : float
         Input speed, rad/s.
-    work : Work
+    work : record of WORK
         Its ``frame_w``, ``frame_dw``, ``relative``, ``relative_w`` and ``shaft`` are written.
     """
     sa, ca = math.sin(alpha), math.cos(alpha)

@@ -11,7 +11,7 @@ from tolstat.kernel.equilibrium import build_equilibrium
 from tolstat.kernel.settle import Ring, closure_error, make_ring, record, summarise
 from tolstat.kernel.state import HALVINGS, ITERATIONS, STEPS, State, make_state
 from tolstat.kernel.topology import N_DOF, N_LUMPS, PSI
-from tolstat.kernel.work import Work, make_work
+from tolstat.kernel.work import make_work
 from tolstat.tables import RESULT, Options, Start, Status
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
@@ -113,7 +113,7 @@ def simulate_joint(par, options, work, state, ring, out):
         The joint.
     options : Options
         Numerical settings.
-    work, state : Work, State
+    work, state : record of WORK, State
         Scratch; nothing is carried over from one joint to the next.
     ring : Ring
         Samples of the last revolution.
@@ -139,7 +139,7 @@ def simulate_joint(par, options, work, state, ring, out):
 class Scratch(NamedTuple):
     """Everything a process needs to simulate one joint after the other."""
 
-    work: Work
+    work: np.record
     state: State
     ring: Ring
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tolstat import campaign
-from tolstat.tables import ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
+from tolstat.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
 
 SPECS = {
     "loads": HistorySpec((30, 8, 6), "f4", "N, N*m", "bushing loads"),
@@ -64,12 +64,24 @@ class Study:
     limits: dict[str, float] = field(default_factory=lambda: {"cross1.F": 700.0})
     name: str = "fake"
     text: str = "# a study\n[sampling]\nn = 40  # Größe\n"
+    variants: tuple[()] = ()
+    case_names: tuple[()] = ()
     joint: Dump = field(default_factory=lambda: Dump(material=Dump(E="2.1e11 Pa")))
 
     @property
     def sampling(self) -> Dump:
         """Table ``[sampling]`` of a study."""
         return Dump(method="random", n=self.n, seed=self.seed, nominal_first=True)
+
+    @property
+    def joints(self) -> tuple[Dump, ...]:
+        """One joint, of which all rows are variants without errors of their own."""
+        return (self.joint,)
+
+    @property
+    def design(self) -> np.ndarray:
+        """Row by row the only joint."""
+        return np.zeros(self.n, DESIGN)
 
     def identity(self) -> dict[str, Any]:
         """Return what decides the numbers."""

@@ -32,6 +32,7 @@ def status_table() -> str:
 def updated(text: str) -> str:
     """`text` of the document with its tables made anew."""
     content = {
+        "design": field_table(tables.DESIGN_COLUMNS),
         "errors": field_table(tables.ERROR_COLUMNS),
         "results": field_table(tables.RESULT_COLUMNS),
         "status": status_table(),

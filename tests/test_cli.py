@@ -120,7 +120,9 @@ def test_unusable_file_is_exit_code_2_with_a_remedy(tmp_path, args, content):
 @pytest.mark.parametrize("command", ["run", "simulate"])
 def test_malformed_input_is_exit_code_2_and_leaves_no_file(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
-    text = synthetic.STUDY.replace('"15 deg"', '"15 kg"').replace("seed", "sead")
+    text = synthetic.STUDY.replace('"15 deg"', '"15 kg"').replace("speed", "sped")
+    if command == "simulate":
+        text = text.split("[tolerances]")[0]
     Path("bad.toml").write_text(text, encoding="utf-8")
     done = call(command, "bad.toml")
     assert done.exit_code == 2
@@ -274,3 +276,21 @@ def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1].split() == ["fork4", "-", "-"]
     assert done.stderr.startswith("warning: newton_failed: a step failed")
+
+
+@pytest.mark.parametrize("arguments", [("simulate", "--out"), ("export", "--csv")])
+def test_no_output_replaces_its_input(tmp_path, arguments):
+    command, option = arguments
+    path = tmp_path / "given"
+    path.write_text("precious")
+    ended = call(command, path, option, path)
+    assert ended.exit_code == 2
+    assert "it is the input" in ended.stderr
+    assert path.read_text() == "precious"
+
+
+def test_a_folder_as_output_is_refused_before_the_work(tmp_path):
+    for target, word in ((tmp_path, "is a folder"), (tmp_path / "none" / "t.csv", "no such folder")):
+        ended = call("simulate", tmp_path / "case.toml", "--out", target)
+        assert ended.exit_code == 2
+        assert word in ended.stderr

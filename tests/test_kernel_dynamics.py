@@ -94,11 +94,11 @@ def test_residual_of_the_acceleration_is_zero(params, random_errors):
 def dense(work):
     """Tangent as one matrix."""
     s = np.zeros((N_DOF, N_DOF))
-    s[:6, :6] = work.diagonal[0]
+    s[:6, :6] = work.lump_block[0]
     for p in range(4):
         pin, arm = 6 * (PIN + p), 6 * (ARM + ARM_OF_PIN[p])
         i, j = slice(pin, pin + 6), slice(arm, arm + 6)
-        s[i, i], s[j, j] = work.diagonal[PIN + p], work.diagonal[ARM + ARM_OF_PIN[p]]
+        s[i, i], s[j, j] = work.lump_block[PIN + p], work.lump_block[ARM + ARM_OF_PIN[p]]
         s[:6, i], s[i, :6] = work.hub_pin[p], work.pin_hub[p]
         s[i, j], s[j, i] = work.pin_arm[p], work.arm_pin[p]
     for a in range(4):
@@ -149,7 +149,7 @@ def test_a_singular_block_is_reported(params):
     work = make_work()
     dynamics.forces(0.0, np.zeros(N_DOF), np.zeros(N_DOF), params()[0], work)
     tangent.assemble(2000.0, 4e6, params()[0], work)
-    work.diagonal[5, 0, 0] = 0.0
+    work.lump_block[5, 0, 0] = 0.0
     assert not linsolve.factorise(work)
-    work.diagonal[5, 0, 0] = np.nan
+    work.lump_block[5, 0, 0] = np.nan
     assert not linsolve.factorise(work)

@@ -207,8 +207,13 @@ def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> Non
         ResultStore.open(text)
     with pytest.raises(StoreError, match=r"none.h5: is not there"):
         ResultStore.open(tmp_path / "none.h5")
-    with pytest.raises(StoreError, match="is not there"):
+    with pytest.raises(StoreError, match="is a folder"):
         ResultStore.open(tmp_path)
+    empty = tmp_path / "empty.h5"
+    empty.touch()
+    with pytest.raises(StoreError, match=r"empty.h5: is not an HDF5 file"):
+        ResultStore.open(empty, "r+")
+    assert empty.stat().st_size == 0
     foreign = tmp_path / "foreign.h5"
     h5py.File(foreign, "w").close()
     with pytest.raises(StoreError, match="of type None"):
@@ -301,7 +306,7 @@ def test_wrong_blocks_are_bugs(tmp_path: Path, study: fakes.Study) -> None:
 def test_document_is_up_to_date() -> None:
     text = format_tables.DOCUMENT.read_text(encoding="utf-8")
     assert text == format_tables.updated(text), "run: python -m tests.format_tables"
-    for name in ("errors", "results", "status"):
+    for name in ("design", "errors", "results", "status"):
         assert f"<!-- table: {name} -->\n| " in text
 
 

@@ -11,13 +11,15 @@ from datetime import date
 from pathlib import Path
 
 import pytest
+from pydantic_core import PydanticCustomError
 
 from tolstat import study, tables
 from tolstat.errors import InputError
-from tolstat.study import Study
+from tolstat.study import Study, load_case
 from tolstat.study import file as study_file
 from tolstat.study.model import Solver
 from tolstat.tolerance import Normal, Rayleigh
+from tolstat.units import to_si
 
 STUDIES = Path(__file__).parent.parent / "studies"
 
@@ -142,8 +144,8 @@ def test_a_case_is_read(tmp_path: Path) -> None:
         "pin2.diameter": pytest.approx(-1e-5),
     }
     assert case.solver == Solver()
-    with pytest.raises(InputError, match="sampling: unknown key"):
-        study.load_case(write(tmp_path, text=CASE + "[sampling]\nn = 3\n"))
+    with pytest.raises(InputError, match="limits: unknown key"):
+        study.load_case(write(tmp_path, text=CASE + "[limits]\npsi = 1e-3\n"))
 
 
 def test_a_joint_beside_the_study(tmp_path: Path) -> None:
@@ -202,21 +204,21 @@ MALFORMED = {
     "missing number": (("n = 8", ""), "sampling: missing key n"),
     "negative tolerance": (
         ('plus_minus = "0.1 mm"', 'plus_minus = "-0.1 mm"'),
-        "plus_minus: -0.0001 (SI) must be positive",
+        "plus_minus: '-0.1 mm' must be positive",
     ),
-    "cpk 0": (("cpk = 1.0", "cpk = 0"), "tolerances.pin[12].offset_t.cpk: 0 (SI) must be positive"),
+    "cpk 0": (("cpk = 1.0", "cpk = 0"), "tolerances.pin[12].offset_t.cpk: 0 must be positive"),
     "unknown feature": (('"hole*.tilt_z"', '"hloe*.tilt_z"'), "tolerances.hloe*.tilt_z: selects nothing"),
     "unknown error": (('"hole*.tilt_z"', '"hole*.tilt_x"'), "tolerances.hole*.tilt_x: selects nothing"),
     "not positive definite": (
         ("[sampling]", '[[correlation]]\nbetween = ["hole*.tilt_z"]\nrho = -0.5\n[sampling]'),
         "correlation: not positive definite: those of hole1.tilt_z, hole2.tilt_z, hole3.tilt_z, hole4.tilt_z",
     ),
-    "n = 0": (("n = 8", "n = 0"), "sampling.n: 0: Input should be greater than or equal to 1"),
+    "n = 0": (("n = 8", "n = 0"), "sampling.n: 0: should be greater than or equal to 1"),
     "unknown base joint": (('"cirelli2021"', '"cirelli2012"'), "joint.base: no joint is named 'cirelli2012'"),
     "unreadable base joint": (('"cirelli2021"', '"nowhere.toml"'), "nowhere.toml: cannot be read"),
     "NaN": (("rho = 0.6", "rho = nan"), "correlation[0].rho: nan is not a finite number"),
     "NaN with unit": (('"0.1 deg"', '"nan deg"'), "errors.pin3.tilt_z: 'nan deg' is not a finite number"),
-    "rho of 1": (("rho = 0.6", "rho = 1"), "correlation[0].rho: 1: Input should be less than 1"),
+    "rho of 1": (("rho = 0.6", "rho = 1"), "correlation[0].rho: 1: should be less than 1"),
     "pair without tolerance": (('"pin2.offset_t"]', '"pin3.offset_t"]'), "'pin3.offset_t' has no tolerance"),
     "one name": ((', "pin2.offset_t"]', "]"), "correlation[0].between: names one error only, pin1.offset_t"),
     "mixed kinds": (
@@ -239,7 +241,7 @@ MALFORMED = {
         ("harmonics = 12", "harmonics = 46"),
         "output.harmonics: 46 harmonics from 90 steps",
     ),
-    "number as text": (("n = 8", 'n = "8"'), "sampling.n: '8': Input should be a valid integer"),
+    "number as text": (("n = 8", 'n = "8"'), "sampling.n: '8': should be a valid integer"),
     "sweep without method": (("[sampling]", "[sweep]\n[sampling]"), "sweep: has no effect with 'random'"),
 }
 
@@ -366,3 +368,36 @@ def test_no_value_anywhere_gives_anything_but_faults(
         monkeypatch.setattr(study_file, "read_toml", lambda _, data=data: data)
         with contextlib.suppress(InputError):
             study.load(path)
+
+
+@pytest.mark.parametrize("text", ["0,1 mm", "1,5 mm", "1 000 N", "10**10**10 mm", "1_000 mm", "mm", "", "0.1 mm;"])
+def test_what_is_no_number_with_a_unit_is_not_guessed(text: str) -> None:
+    with pytest.raises(PydanticCustomError, match="is not a number with a unit"):
+        to_si(text, "m")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("0.1 mm", "m", 1e-4),
+        (" -.5mm ", "m", -5e-4),
+        ("1.2e+06 N/mm", "N/m", 1.2e9),
+        ("7.5e7 N/mm^2", "N/m^2", 7.5e13),
+        ("100 N·m", "N*m", 100.0),
+        ("1 um", "m", 1e-6),
+        ("5 µm", "m", 5e-6),
+        ("0.5 °", "rad", math.radians(0.5)),
+        ("30 kg*m^2", "kg*m^2", 30.0),
+        ("5 %", "1", 0.05),
+        ("0.5", "1", 0.5),
+    ],
+)
+def test_quantities_are_read(text: str, unit: str, value: float) -> None:
+    assert to_si(text, unit) == pytest.approx(value, rel=1e-14)
+
+
+def test_a_study_is_not_a_case_and_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(GOOD)
+    with pytest.raises(InputError, match="is a study, not a case of one joint\n  hint: run it with: tolstat run"):
+        load_case(path)

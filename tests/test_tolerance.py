@@ -227,7 +227,7 @@ def test_measured_entry_reads_a_column(tmp_path: Path) -> None:
         ({"distribution": "normal"}, "no band"),
         (
             {"distribution": "normal", "plus_minus": "0.1 mm", "cpk": 0},
-            "pin1.offset_t.cpk: 0 (SI) must be positive",
+            "pin1.offset_t.cpk: 0 must be positive",
         ),
         ({"distribution": "normal", "plus_minus": "0.1 mm", "std": "1 mm", "cpk": 1}, "std and cpk"),
         ({"distribution": "normal", "plus_minus": "0.1 mm", "std": "1 mm"}, "truncate and a band"),

@@ -20,7 +20,7 @@ from tolstat.errors import Fault, InputError, StoreError
 from tolstat.executor import WorkerDied, available_workers, map_blocks
 from tolstat.progress import Reporter
 from tolstat.store import Counts, ResultStore
-from tolstat.tables import HistorySpec, Options, Simulation
+from tolstat.tables import PARAM, HistorySpec, Options, Simulation
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -135,7 +135,7 @@ def run(
         pending = store.pending()
         workers = workers or available_workers()
         size = block or default_block(len(pending), workers)
-        blocks = _blocks(pending, size, partial(_parameters, stages.perturb, study.joint, store.errors()))
+        blocks = _blocks(pending, size, partial(_parameters, stages.perturb, study, store.errors()))
         function = partial(_simulate, stages.simulate, study.solver.options(), _history_options(study))
         counts = store.counts()
         try:
@@ -242,9 +242,15 @@ def _blocks(
 
 
 def _parameters(
-    perturb: Callable[..., NDArray[np.void]], joint: Any, errors: NDArray[np.void], rows: NDArray[np.intp]
+    perturb: Callable[..., NDArray[np.void]], study: Study, errors: NDArray[np.void], rows: NDArray[np.intp]
 ) -> NDArray[np.void]:
-    return perturb(joint, errors[rows])
+    """Parameters of `rows`, (m,) table PARAM, each from the joint of its own variant."""
+    params = np.empty(len(rows), PARAM)
+    variant = study.design["variant"][rows]
+    for number in np.unique(variant):
+        here = variant == number
+        params[here] = perturb(study.joints[number], errors[rows[here]])
+    return params
 
 
 def _simulate(

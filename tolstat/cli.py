@@ -92,8 +92,13 @@ def simulate(
     The loads are those of the last revolution, cross bushings 1 to 4 and fork bushings 1 to 4.
     """
     from tolstat import study, trace
+    from tolstat.files import check_target
 
-    result = trace.simulate_case(study.load_case(case))
+    if out is not None:
+        check_target(out, case)
+    loaded = study.load_case(case)
+    _announce_compilation()
+    result = trace.simulate_case(loaded)
     summary = result.summary()
     typer.echo(_json(summary) if as_json else _case_text(summary))
     _judge(summary)
@@ -108,9 +113,11 @@ def run(
         Path | None,
         typer.Option("--out", metavar="FILE", help="Result file; default STUDY.h5 in the current folder."),
     ] = None,
-    n: Annotated[int | None, typer.Option("--n", metavar="N", help="Number of joints instead of the study's.")] = None,
+    n: Annotated[
+        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints instead of the study's.")
+    ] = None,
     workers: Annotated[
-        int | None, typer.Option("--workers", metavar="W", help="Processes; default one per core.")
+        int | None, typer.Option("--workers", metavar="W", min=1, help="Processes; default one per core.")
     ] = None,
     report: Annotated[bool, typer.Option(help="Write and print the report at the end.")] = True,
 ) -> None:
@@ -173,8 +180,11 @@ def export(
     """
     import sys
 
+    from tolstat.files import check_target
     from tolstat.store import ResultStore
 
+    if out != "-":
+        check_target(Path(out), file)
     with ResultStore.open(file) as store:
         frame = store.to_pandas(units=True)
     if out == "-":
@@ -213,9 +223,17 @@ def _tell(report: Report) -> None:
         _say(f"wrote {path}")
 
 
+def _announce_compilation() -> None:
+    from tolstat.simulation import is_compiled
+
+    if not is_compiled():
+        _say("compiling the kernels for this machine: half a minute to a minute, this once")
+
+
 def _campaign(plan: Any, path: Path, workers: int | None) -> Counts:
     from tolstat import campaign, progress
 
+    _announce_compilation()
     with progress.reporter() as reporter:
         return campaign.run(plan, path, workers=workers, progress=reporter)
 

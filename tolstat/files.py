@@ -8,12 +8,31 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from tolstat.errors import Fault, InputError
+
 
 def data_dir() -> Path:
     """Directory of the data that comes with the package: in an installed wheel, or beside a checkout's."""
     package = Path(__file__).parent
     inside = package / "data"
     return inside if inside.is_dir() else package.parent / "data"
+
+
+def check_target(path: Path, *inputs: Path) -> None:
+    """Check, before the work whose result it shall hold, that a file can be written.
+
+    Raises
+    ------
+    InputError
+        When `path` is a folder, its folder is not there, or it is one of `inputs`.
+    """
+    place = str(path)
+    if path.is_dir():
+        raise InputError([Fault(place, "cannot be written: is a folder", "give the path of a file")])
+    if not path.parent.is_dir():
+        raise InputError([Fault(place, "cannot be written: no such folder", "make the folder first")])
+    if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
+        raise InputError([Fault(place, "cannot be written: it is the input", "give another name")])
 
 
 @contextmanager

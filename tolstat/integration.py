@@ -51,7 +51,7 @@ def integrate(
     rho_inf: float = 0.8,
     newton_tol: float = 1e-10,
     newton_max_iter: int = 12,
-    max_halvings: int = 10,
+    max_halvings: int = 16,
 ) -> Trajectory:
     """Integrate q'' = f(t, q, q') with a fixed step.
 

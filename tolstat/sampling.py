@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from tolstat.joint import nominal_errors
 from tolstat.study import Study
+from tolstat.study.design import Design, sobol
 from tolstat.study.model import SweepAxis
 from tolstat.study.selection import columns_of
 from tolstat.tables import ERROR_FIELDS
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]
-
-SOBOL_BITS = 30
 
 
 def draw(study: Study) -> Table:
@@ -44,6 +43,8 @@ def draw(study: Study) -> Table:
         samples[name] = value
     if study.sampling.method == "sweep":
         _fill_grid(samples, study.sweep)
+    elif study.listed is not None:
+        _fill_listed(samples, study.listed)
     else:
         _fill_scatter(samples, study)
     return table
@@ -66,6 +67,14 @@ def _fill_grid(samples: Table, axes: Sequence[SweepAxis]) -> None:
             samples[name] = value.ravel()
 
 
+def _fill_listed(samples: Table, design: Design) -> None:
+    """Point of the grid and errors of the case of each row."""
+    for values, index in ((design.points, design.point()), (tuple(design.cases.values()), design.table["case"])):
+        for number, fixed in enumerate(values):
+            for name, value in fixed.items():
+                samples[name][index == number] = value
+
+
 def _fill_scatter(samples: Table, study: Study) -> None:
     columns = list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
     u = _uniforms(columns, samples.size, study.sampling.method, study.sampling.seed)
@@ -85,7 +94,7 @@ def _fill_scatter(samples: Table, study: Study) -> None:
 def _uniforms(names: Sequence[str], n: int, method: str, seed: int) -> dict[str, Array]:
     """Probabilities in (0, 1), independent from name to name; shape (n,) each."""
     if method == "sobol":
-        points = _sobol(n, seed)
+        points = sobol(n, len(ERROR_FIELDS), seed)
         return {name: points[:, dimensions()[name]] for name in names}
     if method == "lhs":
         return {name: _stratified(n, _stream(seed, f"lhs {name}")) for name in names}
@@ -104,12 +113,3 @@ def _stratified(n: int, stream: np.random.Generator) -> Array:
     """One value in each of n equal intervals, in random order (Latin hypercube of one dimension)."""
     u = (stream.permutation(n) + stream.random(n)) / n
     return np.clip(u, 2.0**-54, 1 - 2.0**-53)
-
-
-def _sobol(n: int, seed: int) -> Array:
-    """Scrambled Sobol' points of all errors, shape (n, len(ERROR_FIELDS)), at the middle of their cells."""
-    from scipy.stats import qmc
-
-    engine = qmc.Sobol(len(ERROR_FIELDS), scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
-    points: Array = engine.random_base2(max(n - 1, 0).bit_length())[:n]
-    return points + 2.0 ** -(SOBOL_BITS + 1)

@@ -120,7 +120,7 @@ def _fault(e: Any, model: type[BaseModel], place: str, prefix: tuple[int | str, 
     where = f"{place}: {path}" if path else place
     context = e.get("ctx", {})
     if "remedy" in context:
-        return Fault(where, context["found"], context["remedy"])
+        return Fault(where, context["found"].replace("{input}", repr(e["input"])), context["remedy"])
     if e["type"] == "extra_forbidden":
         return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), _keys_at(model, e["loc"][:-1])))
     if e["type"] == "missing":
@@ -128,7 +128,7 @@ def _fault(e: Any, model: type[BaseModel], place: str, prefix: tuple[int | str, 
     if e["type"] in ("literal_error", "enum"):
         return Fault(where, f"{e['input']!r} is not allowed", f"write one of {context['expected']}")
     remedy = _REMEDIES.get(e["type"], "give a value of the kind asked for").format(**context)
-    return Fault(where, f"{e['input']!r}: {e['msg']}", remedy)
+    return Fault(where, f"{e['input']!r}: {e['msg'].removeprefix('Input ')}", remedy)
 
 
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:

@@ -134,6 +134,15 @@ def simulate_rows(
     return Simulation(results.view(np.ndarray), kept)
 
 
+def is_compiled() -> bool:
+    """Whether compiled kernels lie in the cache, so that `warm_up` only has to load them."""
+    from pathlib import Path
+
+    from tolstat.kernel._jit import CACHE_DIRECTORY
+
+    return any(Path(CACHE_DIRECTORY).rglob("simulate.simulate_joint*.nbc"))
+
+
 def warm_up() -> None:
     """Compile the kernels, or load them from the cache, by simulating a joint that has no clearance to run in."""
     from tolstat.kernel.simulate import simulate_joint

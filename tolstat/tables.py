@@ -41,7 +41,8 @@ STATUS_TEXT = {
     Status.NOT_SETTLED: "closure error still above solver.settle_tol after solver.max_revs; results stored",
     Status.NEWTON_FAILED: "a step failed at the smallest sub-step; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
-    Status.OUTSIDE_MODEL: "negative clearance (an interference fit has no contact law here); results are NaN",
+    Status.OUTSIDE_MODEL: "negative clearance (interference fit), |alpha| of 90 deg or more, no speed, or stiffness "
+    "not positive: the model has no meaning there; results are NaN",
 }
 
 
@@ -111,7 +112,7 @@ class Options(NamedTuple):
     settle_tol: float = 1e-4
     newton_tol: float = 1e-6
     newton_max_iter: int = 12
-    max_halvings: int = 10
+    max_halvings: int = 16
     rho_inf: float = 0.8
 
 
@@ -122,6 +123,22 @@ class HistorySpec(NamedTuple):
     dtype: str
     unit: str
     description: str
+
+
+class Variant(NamedTuple):
+    """One of the joints that the cases are run with.
+
+    Attributes
+    ----------
+    family : str
+        Name under which the study lists it; other variants may share it.
+    values : dict
+        What makes it this joint, by dotted key of a joint file: keys that the study writes for it, and all others in
+        which it differs from the study's joint. SI floats, words for choices.
+    """
+
+    family: str
+    values: dict[str, Any]
 
 
 class Simulation(NamedTuple):
@@ -233,6 +250,14 @@ RESULT_FIELDS = (
     Field("psi_max", "1", "largest |Psi|, relative error of the speed ratio, eq. (13)"),
 )
 
+DESIGN_FIELDS = (
+    Field("variant", "1", "index of the joint's variant in the attribute design", "i4"),
+    Field("case", "1", "index of the joint's errors among the cases of the attribute design; 0 has none", "i4"),
+    Field("group", "1", "joints of one group differ in their case only; the one without errors comes first", "i4"),
+)
+"""What each joint of a study that lists its joints is (``sampling.method = "cases"``)."""
+
+DESIGN = dtype_of(DESIGN_FIELDS)
 ERROR = dtype_of(ERROR_FIELDS)
 PARAM = dtype_of(PARAM_FIELDS)
 RESULT = dtype_of(RESULT_FIELDS)
@@ -274,5 +299,10 @@ def _result_columns() -> tuple[Column, ...]:
     return tuple(columns)
 
 
-ERROR_COLUMNS = tuple(Column(f.name, f.unit, f.description, f.dtype, f.name, ()) for f in ERROR_FIELDS)
+def _scalar_columns(fields: tuple[Field, ...]) -> tuple[Column, ...]:
+    return tuple(Column(f.name, f.unit, f.description, f.dtype, f.name, ()) for f in fields)
+
+
+DESIGN_COLUMNS = _scalar_columns(DESIGN_FIELDS)
+ERROR_COLUMNS = _scalar_columns(ERROR_FIELDS)
 RESULT_COLUMNS = _result_columns()

@@ -7,10 +7,11 @@ pydantic validates, so that a wrong or missing unit is one fault among the other
 from __future__ import annotations
 
 import math
+import re
 import sys
 import tokenize
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import GetCoreSchemaHandler
@@ -48,11 +49,28 @@ def registry() -> pint.UnitRegistry[float]:
     return pint.UnitRegistry()
 
 
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)(?![a-z]))"
+    r"\s*(?P<unit>|[A-Za-zµμ°%][\w µμ°%*/^().·-]{0,40})\s*",
+    re.ASCII | re.IGNORECASE,
+)
+"""A number and a unit. Anything else is refused: pint would read "1,5 mm" as 15 mm and "0,1 mm" as nothing."""
+
+
+@lru_cache(maxsize=1024)
+def _parsed(text: str) -> Any:
+    """Read a text as a quantity, None if it is none; remembered, as variants of a joint have most values in common."""
+    found = _QUANTITY.fullmatch(text)
+    if found is None:
+        return None
+    return registry().Quantity(float(found["number"]), found["unit"].replace("·", "*") or "dimensionless")
+
+
 _NOT_PARSED = (
     *(ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError, AssertionError, LookupError),
     tokenize.TokenError,
 )
-"""What pint's parser raises for a text that is no quantity, besides its own errors."""
+"""What pint's parser raises for a text that is no unit, besides its own errors."""
 
 
 def _fault(found: str, unit: str) -> PydanticCustomError:
@@ -91,27 +109,34 @@ def to_si(value: object, unit: str) -> float:
             raise _fault(f"{value!r} is not a finite number", unit)
         return float(value)
     try:
-        quantity: Any = registry().Quantity(value)
-        if unit == "1":
-            if quantity.unitless or str(quantity.units) == "percent":
-                si = float(quantity.to("").magnitude)
-            else:
-                raise _fault(f"{value!r} has a unit where a pure number is expected", unit)
-        else:
-            if quantity.unitless:
-                raise _fault(f"{value!r} has no unit", unit)
-            if unit == "rad/s" and "hertz" in str(quantity.units):
-                raise _fault(f"{value!r} is ambiguous (1 Hz may mean 1 rad/s or 2 pi rad/s)", unit)
-            si = float(quantity.to(unit).magnitude)
+        quantity = _parsed(value)
+        si = math.nan if quantity is None else _convert(quantity, unit, value)
+    except PydanticCustomError:
+        raise
     except pint.DimensionalityError as error:
         raise _fault(f"{value!r} cannot be a value in {unit}", unit) from error
     except pint.UndefinedUnitError as error:
         raise _fault(f"{value!r} has an unknown unit", unit) from error
     except (pint.PintError, *_NOT_PARSED) as error:
         raise _fault(f"{value!r} is not a number with a unit", unit) from error
+    if quantity is None:
+        comma = ", with a decimal point" if "," in value else ""
+        raise _fault(f"{value!r} is not a number with a unit{comma}", unit)
     if not math.isfinite(si):
         raise _fault(f"{value!r} is not a finite number", unit)
     return si
+
+
+def _convert(quantity: Any, unit: str, value: str) -> float:
+    if unit == "1":
+        if not (quantity.unitless or str(quantity.units) == "percent"):
+            raise _fault(f"{value!r} has a unit where a pure number is expected", unit)
+        return float(quantity.to("").magnitude)
+    if quantity.unitless:
+        raise _fault(f"{value!r} has no unit", unit)
+    if unit == "rad/s" and "hertz" in str(quantity.units):
+        raise _fault(f"{value!r} is ambiguous (1 Hz may mean 1 rad/s or 2 pi rad/s)", unit)
+    return float(quantity.to(unit).magnitude)
 
 
 @dataclass(frozen=True)
@@ -136,22 +161,29 @@ class Quantity:
         )
 
 
+def _sign(must: str, remedy: str) -> PydanticCustomError:
+    # `schema` puts the value as it was written before the sentence
+    return PydanticCustomError("sign", "{found}", {"found": f"{{input}} {must}", "remedy": remedy})
+
+
 def positive(value: float) -> float:
     """Validate a quantity that must be greater than zero."""
     if not value > 0:
-        found = f"{value:g} (SI) must be positive"
-        raise PydanticCustomError("sign", "{found}", {"found": found, "remedy": "give a value above zero"})
+        raise _sign("must be positive", "give a value above zero")
     return value
 
 
 def not_negative(value: float) -> float:
     """Validate a quantity that must not be less than zero."""
     if value < 0:
-        raise PydanticCustomError(
-            "sign",
-            "{found}",
-            {"found": f"{value:g} (SI) must not be negative", "remedy": "give zero or a value above it"},
-        )
+        raise _sign("must not be negative", "give zero or a value above it")
+    return value
+
+
+def not_zero(value: float) -> float:
+    """Validate a quantity of either sign."""
+    if value == 0:
+        raise _sign("must not be zero", "give a value other than zero")
     return value
 
 

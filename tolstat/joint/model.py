@@ -66,7 +66,13 @@ class Joint(Strict):
         return np.array([k.k_y, k.k_x, k.k_z, k.k_by, k.k_bx, k.k_tz])
 
 
-def load(base: str | Path, overrides: Mapping[str, Any], place: str, relative_to: Path | None = None) -> Joint:
+def load(
+    base: str | Path,
+    overrides: Mapping[str, Any],
+    place: str,
+    relative_to: Path | None = None,
+    section: str = "joint",
+) -> Joint:
     """Read a joint file and merge a case's own keys over it.
 
     Parameters
@@ -79,6 +85,8 @@ def load(base: str | Path, overrides: Mapping[str, Any], place: str, relative_to
         What faults of `base` and `overrides` are reported at: the case file's name.
     relative_to : Path, optional
         Folder that a relative path is taken from; the working directory by default.
+    section : str
+        Key path of `base` and `overrides` in the case's file.
 
     Returns
     -------
@@ -90,12 +98,12 @@ def load(base: str | Path, overrides: Mapping[str, Any], place: str, relative_to
     InputError
         With every fault: those of the joint file under its name, those of `overrides` under `place`.
     """
-    path = _find(base, place, relative_to)
+    path = _find(base, f"{place}: {section}", relative_to)
     data = schema.read_toml(path)
     try:
-        return schema.validate(Joint, _merged(data, overrides), place)
+        return schema.validate(Joint, merged(data, overrides), place)
     except InputError as error:
-        raise InputError(_attributed(error.faults, data, path, place)) from error
+        raise InputError(_attributed(error.faults, data, path, place, section)) from error
 
 
 def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
@@ -108,20 +116,23 @@ def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
         return folder / f"{base}.toml"
     close = difflib.get_close_matches(str(base), names, n=1)
     known = f"did you mean {close[0]!r}?" if close else f"write one of {', '.join(names)}, or a path to a .toml file"
-    raise InputError([Fault(f"{place}: joint.base", f"no joint is named {str(base)!r}", known)])
+    raise InputError([Fault(f"{place}.base", f"no joint is named {str(base)!r}", known)])
 
 
-def _merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    merged = dict(data)
+def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Put the keys of `over` in place of those of `data`, table by table."""
+    result = dict(data)
     for key, value in over.items():
-        below = merged.get(key)
+        below = result.get(key)
         if isinstance(below, Mapping) and isinstance(value, Mapping):
-            value = _merged(below, value)
-        merged[key] = value
-    return merged
+            value = merged(below, value)
+        result[key] = value
+    return result
 
 
-def _attributed(faults: tuple[Fault, ...], data: Mapping[str, Any], path: Path, place: str) -> list[Fault]:
+def _attributed(
+    faults: tuple[Fault, ...], data: Mapping[str, Any], path: Path, place: str, section: str
+) -> list[Fault]:
     """Report the faults that the joint file has by itself under its name, the others under `place`."""
     try:
         schema.validate(Joint, data, str(path))
@@ -131,5 +142,5 @@ def _attributed(faults: tuple[Fault, ...], data: Mapping[str, Any], path: Path, 
     attributed = []
     for f in faults:
         key = f.place.removeprefix(f"{place}: ")
-        attributed.append(own.get((key, f.found)) or Fault(f"{place}: joint.{key}", f.found, f.remedy))
+        attributed.append(own.get((key, f.found)) or Fault(f"{place}: {section}.{key}", f.found, f.remedy))
     return attributed

@@ -34,10 +34,13 @@ def _steep(alpha: float) -> float:
 
 
 class Operation(Strict):
-    """Operating point: misalignment (rad), speed of the input shaft (rad/s), resisting torque (N*m)."""
+    """Operating point: misalignment (rad), speed of the input shaft (rad/s), resisting torque (N*m).
+
+    Both may be negative: the joint turns the other way, the torque drives.
+    """
 
     alpha: Annotated[units.Angle, AfterValidator(_steep)]
-    speed: Annotated[units.Speed, AfterValidator(units.positive)]
+    speed: Annotated[units.Speed, AfterValidator(units.not_zero)]
     torque: units.Torque
 
 

@@ -23,6 +23,9 @@ from tolstat.kernel.topology import (
     TRIAD,
 )
 from tolstat.kernel.vector import add, axpy, cross, put, row, scale, sub, turn, turn_back
+from tolstat.tables import Start
+
+RAMP = int(Start.RAMP)
 
 
 @njit
@@ -124,7 +127,7 @@ def residual(t, q, v, a, par, options, work, out):
         for k in range(3):
             out[i + k] = f[k] - work.force[body, k]
             out[i + 3 + k] = torque[k] - work.force[body, 3 + k]
-    resisting = resisting_torque(t, par, options.start == 0)
+    resisting = resisting_torque(t, par, options.start == RAMP)
     out[PSI] = par.Js * (work.shaft[1] + a[PSI]) - work.force[OUTPUT_SHAFT, 5] + resisting
 
 
@@ -145,5 +148,5 @@ def acceleration(t, q, v, par, options, work, out):
         for k in range(3):
             out[i + k] = (work.force[body, k] - f[k]) / mass
             out[i + 3 + k] = ddphi[k]
-    resisting = resisting_torque(t, par, options.start == 0)
+    resisting = resisting_torque(t, par, options.start == RAMP)
     out[PSI] = (work.force[OUTPUT_SHAFT, 5] - resisting) / par.Js - work.shaft[1]

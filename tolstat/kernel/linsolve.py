@@ -63,6 +63,16 @@ def solve_columns(blocks, b, columns, c):
 
 
 @njit
+def solve_row(blocks, b, rows, r, scratch):
+    """Solve the 6 x 6 matrix `b` for the right-hand side ``rows[r]``, in place."""
+    for i in range(6):
+        scratch[i] = rows[r, i]
+    solve_block(blocks, b, 6, scratch, 0)
+    for i in range(6):
+        rows[r, i] = scratch[i]
+
+
+@njit
 def subtract_product(out, o, left, a, right, b):
     """out[o] -= left[a] right[b], all 6 x 6 (``out[o]`` may be larger)."""
     for i in range(6):
@@ -81,7 +91,7 @@ def factorise(work):
     bool
         False when a block is singular or not finite.
     """
-    d, core = work.diagonal, work.core
+    d, core = work.lump_block, work.core
     good = True
     for i in range(6):
         core[0, i, 6] = core[0, 6, i] = 0.0
@@ -94,11 +104,8 @@ def factorise(work):
             work.pin_psi[p, i] = work.psi_pin[p, i] = 0.0
         subtract_product(d, pin, work.pin_arm, p, work.arm_pin, p)
         if a >= 2:  # output fork
+            solve_row(d, arm, work.arm_psi, a, work.solution)
             for i in range(6):
-                work.solution[i] = work.arm_psi[a, i]
-            solve_block(d, arm, 6, work.solution, 0)
-            for i in range(6):
-                work.arm_psi[a, i] = work.solution[i]
                 core[0, 6, 6] -= work.psi_arm[a, i] * work.arm_psi[a, i]
             for i in range(6):
                 for k in range(6):
@@ -108,11 +115,8 @@ def factorise(work):
         solve_columns(d, pin, work.pin_hub, p)
         subtract_product(d, HUB, work.hub_pin, p, work.pin_hub, p)
         if a >= 2:
+            solve_row(d, pin, work.pin_psi, p, work.solution)
             for i in range(6):
-                work.solution[i] = work.pin_psi[p, i]
-            solve_block(d, pin, 6, work.solution, 0)
-            for i in range(6):
-                work.pin_psi[p, i] = work.solution[i]
                 core[0, 6, 6] -= work.psi_pin[p, i] * work.pin_psi[p, i]
             for i in range(6):
                 for k in range(6):
@@ -130,7 +134,7 @@ def solve(q, work):
 
     Increments of attitude are converted to increments of the rotation vectors in `q`, shape (55,).
     """
-    x, d = work.solution, work.diagonal
+    x, d = work.solution, work.lump_block
     rest = x[PSI]
     for p in range(4):
         pin, a = 6 * (PIN + p), ARM_OF_PIN[p]

@@ -19,8 +19,9 @@ NOT_FINITE, OUTSIDE_MODEL = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL)
 RAMP = int(Start.RAMP)
 CHECKS_PER_REV = 12
 """How often a revolution the closure error is looked at, once two revolutions are recorded."""
-MAX_SUBSTEPS = 20
-"""Bound on the work of a joint, in sub-steps per step of the longest run allowed: no joint can hang a campaign."""
+MAX_ITERATIONS = 40
+"""Bound on the work of a joint, in Newton iterations per step of the longest run allowed: no joint can hang a
+campaign. Joints that never settle take some 8 to 10."""
 SMALLEST_FORCE = 1e-3
 """Scale (N) of the stopping test of a joint that neither turns nor carries."""
 
@@ -38,6 +39,16 @@ def factorise(t, q, v, a, cv, ca, par, options, work):
 newton, advance = integrate.build_integrator(residual, factorise, solve)
 equilibrium = build_equilibrium(residual, newton, integrate.scaled_size)
 reset = integrate.reset
+
+
+@njit
+def inside_model(par):
+    """Whether the model has a meaning for a joint; written so that NaN has none."""
+    good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
+    good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0 and par.k2u > 0 and par.k2p > 0
+    for pin in range(4):
+        good = good and par.clearance[pin] >= 0
+    return good
 
 
 @njit
@@ -70,9 +81,8 @@ def clear_results(out):
 @njit
 def run(par, options, work, state, ring, out):
     """Integrate until settled; return a status. ``out.closure`` and ``out.revolutions`` are written."""
-    for pin in range(4):
-        if par.clearance[pin] < 0:
-            return OUTSIDE_MODEL
+    if not inside_model(par):
+        return OUTSIDE_MODEL
     set_scale(par, state)
     state.q0[:] = 0.0
     state.v0[:] = 0.0
@@ -98,7 +108,7 @@ def run(par, options, work, state, ring, out):
             out.closure = closure_error(ring)
             if out.closure <= options.settle_tol:
                 return OK
-        if state.counters[STEPS] > MAX_SUBSTEPS * n * options.max_revs:
+        if state.counters[ITERATIONS] > MAX_ITERATIONS * n * options.max_revs:
             return NEWTON_FAILED
     return NOT_SETTLED
 

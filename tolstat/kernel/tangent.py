@@ -8,7 +8,7 @@ turning of the loads themselves with the bodies, gyroscopic terms (2 Omega / cv 
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.bushing import markers
-from tolstat.kernel.contact import smooth_step, smooth_step_slope
+from tolstat.kernel.contact import MODE_LAW, smooth_step, smooth_step_slope
 from tolstat.kernel.dynamics import mass_of
 from tolstat.kernel.topology import (
     ARM,
@@ -42,7 +42,7 @@ UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 @njit
 def clear(work):
     """Set all blocks of the tangent to zero."""
-    work.diagonal[:] = 0.0
+    work.lump_block[:] = 0.0
     work.hub_pin[:] = 0.0
     work.pin_hub[:] = 0.0
     work.pin_arm[:] = 0.0
@@ -56,7 +56,7 @@ def clear(work):
 def inertia_tangent(body, ca, par, work):
     """Add ca M of a lump to its diagonal block."""
     mass, inertia = mass_of(body, par)
-    block = work.diagonal
+    block = work.lump_block
     for j in range(3):
         block[body, j, j] += ca * mass
         u = turn(TRIAD, body, turn_back(work.rot, body, UNIT[j]))
@@ -96,12 +96,12 @@ def bushing_tangent(i, cv, par, work):
             f_lump = _restore(by_lump, k, c, cv, 0, base, lump, work)
             f_base = _restore(by_base, k, c, cv, 0, base, lump, work)
         on_lump_by_lump = add(torque, cross(lever, f_lump))
-        column(work.diagonal, lump, j, f_lump, on_lump_by_lump, 1.0)
+        column(work.lump_block, lump, j, f_lump, on_lump_by_lump, 1.0)
         if base == HUB:
             pin = lump - PIN
             column(work.pin_hub, pin, j, f_base, add(torque, cross(lever, f_base)), -1.0)
             column(work.hub_pin, pin, j, f_lump, add(torque, cross(base_lever, f_lump)), -1.0)
-            column(work.diagonal, HUB, j, f_base, add(torque, cross(base_lever, f_base)), 1.0)
+            column(work.lump_block, HUB, j, f_base, add(torque, cross(base_lever, f_base)), 1.0)
         elif base == OUTPUT_SHAFT:  # of the shaft only rotation about z is free
             arm = lump - ARM
             work.psi_arm[arm, j] -= torque[2] + cross(base_lever, f_lump)[2]
@@ -148,10 +148,10 @@ def _add_dyad(pin, left, right, work):
     body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
     for i in range(6):
         for j in range(6):
-            work.diagonal[body, i, j] += left[i] * right[j]
+            work.lump_block[body, i, j] += left[i] * right[j]
             work.pin_arm[pin, i, j] += left[i] * right[6 + j]
             work.arm_pin[pin, i, j] += left[6 + i] * right[j]
-            work.diagonal[arm, i, j] += left[6 + i] * right[6 + j]
+            work.lump_block[arm, i, j] += left[6 + i] * right[6 + j]
 
 
 @njit
@@ -180,12 +180,12 @@ def contact_tangent(pin, cv, par, work):
         for i in range(12):
             right[0, i] = mn * n[i] + mm * m[i]
         _add_dyad(pin, m, right[0], work)
-        if j < 2 and station[EXCESS] != 0:
+        if par.law == MODE_LAW:
             by_delta, by_m = work.mode_weight[pin, 1 + 2 * j], work.mode_weight[pin, 2 + 2 * j]
             for i in range(12):
                 left[1, i] += station[EXCESS] * n[i]
                 right[1, i] += by_delta * n[i] + by_m * m[i]
-    if work.mode_weight[pin, 0] > 0 and par.n_stations == 2:
+    if par.law == MODE_LAW and work.mode_weight[pin, 0] > 0:
         _add_dyad(pin, left[1], right[1], work)
 
 

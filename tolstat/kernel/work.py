@@ -32,7 +32,7 @@ FIELDS = {
     "mode": (4,),  # contact mode of each pin
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
     "mode_weight": (4, 5),  # w of the law `mode`, then dw/d(delta_a, m_a, delta_b, m_b)
-    "diagonal": (N_LUMPS, 6, 6),  # blocks of the tangent, factorised in place
+    "lump_block": (N_LUMPS, 6, 6),  # blocks of the tangent, factorised in place
     "hub_pin": (4, 6, 6),  # rows of the hub, columns of pin p
     "pin_hub": (4, 6, 6),
     "pin_arm": (4, 6, 6),  # rows of pin p, columns of its arm

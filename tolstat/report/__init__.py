@@ -1,6 +1,7 @@
 """Reports of a result file: a table to read, pictures, and their numbers as CSV.
 
-A campaign of random joints gets load exceedance; a sweep gets loads against the swept value.
+A campaign of random joints gets load exceedance; a sweep gets loads against the swept value; a list of cases
+gets its table, or the page of the paper's study when its cases are the paper's.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
 
     For ``FILE.h5`` it writes ``FILE_exceedance.png``, ``.svg`` and ``.csv`` (the curves),
     ``FILE_quantiles.csv`` and, where the study sets limits, ``FILE_limits.csv``; for a sweep
-    ``FILE_sweep.png``, ``.svg`` and ``.csv``.
+    ``FILE_sweep.png``, ``.svg`` and ``.csv``; for a list of cases ``FILE_cases.csv`` and, where they are those of
+    the paper's tables, the page ``FILE_paper.html`` and its tables ``FILE_tables.csv``.
 
     Parameters
     ----------
@@ -74,10 +76,12 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
         When the folder cannot be written to.
     """
     path = Path(path)
-    with ResultStore.open(path) as store:
-        campaign = read(store)
     stem = (Path(out_dir) if out_dir is not None else path.parent) / path.stem
     try:
+        with ResultStore.open(path) as store:
+            if store.case_names:
+                return _cases(store, stem)
+            campaign = read(store)
         return _sweep(campaign, stem) if campaign.method == "sweep" else _exceedance(campaign, stem)
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
@@ -105,6 +109,22 @@ def _sweep(campaign: Campaign, stem: Path) -> Report:
     files = style.save(sweep.figure(campaign), stem.with_name(f"{stem.name}_sweep"))
     files.append(_csv(sweep.table(campaign), stem, "sweep"))
     return Report(text.plain(sweep.worst(campaign)), campaign.head(), files)
+
+
+def _cases(store: ResultStore, stem: Path) -> Report:
+    from tolstat.report import cases, paper, paper_source
+
+    full = cases.table(store)
+    files = [_csv(full, stem, "cases")]
+    counts = store.counts()
+    notes = f"{counts.done} of {counts.total} joints, {counts.failed} failed, {counts.not_settled} not settled"
+    if not paper_source.matching(store):
+        return Report(text.plain(cases.worst(full)), notes, files)
+    study = paper_source.read(store)
+    page = stem.with_name(f"{stem.name}_paper.html")
+    paper.write(study, page)
+    files = [page, _csv(paper.entries(study), stem, "tables"), *files]
+    return Report(paper.summary(study), notes, files)
 
 
 def _csv(frame: pd.DataFrame, stem: Path, what: str) -> Path:

@@ -70,7 +70,7 @@ def plain(table: pd.DataFrame) -> str:
     """Text of any frame, numbers to five digits, headed by its columns."""
     rows = [[str(column) for column in table.columns]]
     for line in table.itertuples(index=False):
-        rows.append([f"{x:.5g}" if isinstance(x, float) else str(x) for x in line])
+        rows.append([("-" if math.isnan(x) else f"{x:.5g}") if isinstance(x, float) else str(x) for x in line])
     return align(rows)
 
 

@@ -1,5 +1,6 @@
 """The result file of a campaign; it knows tables, not physics."""
 
-from tolstat.store.result_store import Counts, ResultStore
+from tolstat.store.counts import Counts
+from tolstat.store.result_store import ResultStore
 
 __all__ = ["Counts", "ResultStore"]

@@ -19,7 +19,7 @@ def versions() -> dict[str, str]:
 
 
 def git_commit() -> str:
-    """Commit of the checkout that the package is run from, with ``-dirty`` after it if files differ from it.
+    """Commit of the checkout that the package was installed or is run from, ``-dirty`` after it if files differ.
 
     Returns
     -------
@@ -27,7 +27,11 @@ def git_commit() -> str:
         Empty when the package is not the top of a git checkout: an environment may lie inside the repository
         of something else, whose commit says nothing about this code.
     """
-    root = Path(tolstat.__file__).resolve().parent.parent
+    package = Path(tolstat.__file__).resolve().parent
+    recorded = package / "_commit.txt"
+    if recorded.is_file():  # written when a wheel is built from a checkout
+        return recorded.read_text(encoding="ascii").strip()
+    root = package.parent
     top = _git(root, "rev-parse", "--show-toplevel")
     if not top or Path(top).resolve() != root:
         return ""

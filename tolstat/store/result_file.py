@@ -44,6 +44,7 @@ def attributes(study: Study, specs: Mapping[str, HistorySpec], dimensions: Mappi
         "joint": study.joint.model_dump(mode="json"),
         "options": study.solver.options()._asdict(),
         "limits": study.limits,
+        "design": {"cases": study.case_names, "variants": [variant._asdict() for variant in study.variants]},
         "sampling": sampling | {"dimensions": dict(dimensions)},
         "versions": versions(),
         "histories": specs,
@@ -94,6 +95,11 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
     StoreError
         When it is not there, not HDF5, damaged, without permission, or held by a writer; it says which.
     """
+    if path.is_dir():
+        raise fault(path, "is a folder", "give the path of a file")
+    if mode != "r" and path.is_file() and not h5py.is_hdf5(path):
+        # opening an empty file for writing would make it one
+        raise fault(path, "is not an HDF5 file", "give a file that tolstat run has made")
     try:
         # Readers take no lock: the writer changes numbers only, so they may look at a campaign under way.
         return h5py.File(path, mode, locking=False if mode == "r" else "best-effort")

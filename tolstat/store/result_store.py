@@ -13,7 +13,7 @@ import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from tolstat import tables
 from tolstat.errors import StoreError
 from tolstat.files import writing
+from tolstat.store.counts import Counts
 from tolstat.store.histories import HistoryParts
 from tolstat.store.result_file import (
     attributes,
@@ -31,7 +32,7 @@ from tolstat.store.result_file import (
     open_hdf5,
     pending_results,
 )
-from tolstat.tables import HistorySpec, Simulation, Status
+from tolstat.tables import HistorySpec, Simulation, Status, Variant
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,37 +40,6 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 LABELS = np.array([s.label for s in Status], dtype=object)
-NO_RESULTS = (Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL)
-
-
-class Counts(NamedTuple):
-    """How far a campaign is.
-
-    Attributes
-    ----------
-    total : int
-        Joints of the campaign.
-    done : int
-        Joints that are not pending.
-    not_settled : int
-        Joints among them whose last revolution does not close.
-    failed : int
-        Joints among them without results.
-    """
-
-    total: int
-    done: int
-    not_settled: int
-    failed: int
-
-    def after(self, status: NDArray[np.uint8]) -> Counts:
-        """Count further joints that have ended with `status`, (m,)."""
-        return Counts(
-            self.total,
-            self.done + int(np.count_nonzero(status != Status.PENDING)),
-            self.not_settled + int(np.count_nonzero(status == Status.NOT_SETTLED)),
-            self.failed + int(np.count_nonzero(np.isin(status, NO_RESULTS))),
-        )
 
 
 class ResultStore:
@@ -89,6 +59,10 @@ class ResultStore:
         The joint as resolved, solver options, sampling (with ``dimensions``), versions of what ran.
     limits : dict of str to float
         Limits of the study in SI units, ``{"cross1.F": 700.0}``.
+    case_names : tuple of str
+        Cases of a study that lists its joints, ``"ideal"`` first; empty for other methods.
+    variants : tuple of Variant
+        Family and values (dotted key of the joint to SI value or word) of each of its joints; empty likewise.
     created, git_commit : str
         Time of creation (UTC) and commit of the code, if known.
     history_specs : dict of str to HistorySpec
@@ -109,6 +83,9 @@ class ResultStore:
         self.sampling: dict[str, Any] = json.loads(attrs["sampling"])
         self.versions: dict[str, str] = json.loads(attrs["versions"])
         self.limits: dict[str, float] = json.loads(attrs["limits"])
+        design: dict[str, Any] = json.loads(attrs["design"])
+        self.case_names: tuple[str, ...] = tuple(design["cases"])
+        self.variants = tuple(Variant(**variant) for variant in design["variants"])
         specs: dict[str, Any] = json.loads(attrs["histories"])
         self.history_specs = {k: HistorySpec(tuple(shape), *rest) for k, (shape, *rest) in specs.items()}
         self.n = int(file["results/status"].shape[0])
@@ -153,6 +130,8 @@ class ResultStore:
         try:
             with writing(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
                 file.attrs.update(attributes(study, specs, dimensions or {}))
+                if study.case_names:
+                    create_table(file.create_group("design"), tables.DESIGN_COLUMNS, study.design)
                 create_table(file.create_group("errors"), tables.ERROR_COLUMNS, errors)
                 pending = pending_results(len(errors))
                 create_table(file.create_group("results"), tables.RESULT_COLUMNS, pending)
@@ -287,6 +266,19 @@ class ResultStore:
             finally:
                 self._file = open_hdf5(self.path, "r+")
         self._parts.remove()
+
+    def design(self) -> NDArray[np.void]:
+        """Variant, case and group of every joint, (n,) table DESIGN.
+
+        Raises
+        ------
+        StoreError
+            When the study does not list its joints.
+        """
+        if "design" not in self._file:
+            remedy = 'give the file of a study with sampling.method = "cases"'
+            raise fault(self.path, "has no list of cases and variants", remedy)
+        return self._read("design", tables.DESIGN_COLUMNS, tables.DESIGN)
 
     def errors(self) -> NDArray[np.void]:
         """Errors of every joint, (n,) table ERROR."""

@@ -7,14 +7,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic_core import PydanticCustomError
-
-from tolstat import joint, schema, units
+from tolstat import joint, schema
 from tolstat.errors import Fault, InputError, gather
 from tolstat.joint import Joint, Operation
 from tolstat.schema import read_toml
-from tolstat.study import selection
+from tolstat.study import listing, selection
 from tolstat.study.correlation import Copula, assemble
+from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Correlation, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Claims, Entry
 from tolstat.study.tolerance_entry import Site
@@ -22,6 +21,11 @@ from tolstat.study.tolerance_kinds import distribution
 from tolstat.tolerance import Distribution
 
 ModelT = TypeVar("ModelT", bound=schema.Strict)
+
+SCATTER = ("tolerances", "correlation", "errors")
+"""Sections that say which joints there are, for the methods that draw; the first is needed."""
+SECTIONS_OF = {"sweep": ("sweep", "errors"), "cases": ("case", "grid", "variant")}
+"""The same for the other methods."""
 
 
 class StudyFile:
@@ -75,7 +79,8 @@ class StudyFile:
     def model(self, section: str, model: type[ModelT], *, required: bool = False) -> ModelT | None:
         """Section that is one model; with its defaults where the file has none."""
         if required and section not in self.data:
-            self._fault((section,), "missing table", f"add [{section}]")
+            one_joint = "; a case of one joint is run with: tolstat simulate" if section == "sampling" else ""
+            self._fault((section,), "missing table", f"add [{section}]{one_joint}")
             return None
         with gather(self._faults):
             return schema.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
@@ -97,18 +102,9 @@ class StudyFile:
 
     def errors(self) -> dict[str, float]:
         """``[errors]``: the errors that every joint has."""
-        fixed: dict[str, float] = {}
-        names = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
-        for entry in self._entries("errors"):
-            if entry.pattern.startswith("operation."):
-                self._fault(entry.path, "is not an error", f"set {entry.path[-1]} in [operation]")
-                continue
-            with gather(self._faults):
-                selected = selection.resolve(entry, names, self.place)
-                value = self._quantity(entry, names[selected[0]])
-                self._claims.claim(entry, selected)
-                fixed |= dict.fromkeys(selected, value)
-        return fixed
+        with gather(self._faults):
+            return selection.fixed_errors(self._table("errors"), ("errors",), self.place, self._claims)
+        return {}
 
     def tolerances(self, operation: Operation | None) -> dict[str, Distribution]:
         """``[tolerances]``: how each error scatters."""
@@ -165,28 +161,34 @@ class StudyFile:
             with gather(self._faults):
                 names = selection.resolve(entry, LIMIT_UNITS, self.place)
                 claims.claim(entry, names)
-                value = self._quantity(entry, LIMIT_UNITS[names[0]])
+                value = selection.quantity(entry, LIMIT_UNITS[names[0]], self.place)
                 if value <= 0:
                     self._fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")
                 limits |= dict.fromkeys(names, value)
         return limits
 
-    def check_scatter(self, sampling: Sampling, sweep: tuple[SweepAxis, ...]) -> None:
+    def listed(self, nominal: Joint | None) -> Design | None:
+        """``[grid]``, ``[[case]]`` and ``[[variant]]``: joints listed one by one, variants of `nominal`."""
+        with gather(self._faults):
+            return listing.read(self.data, nominal, self.place, self.path.parent)
+        return None
+
+    def check_method(self, sampling: Sampling, sweep: tuple[SweepAxis, ...]) -> None:
         """Find what does not go with the sampling method."""
-        if sampling.method == "sweep":
-            if not self.data.get("sweep"):
-                self._fault(("sweep",), "missing table", "add [sweep], or another sampling.method")
-            for section in ("tolerances", "correlation"):
-                if self.data.get(section):
-                    self._fault((section,), "has no effect in a sweep", "remove it, or change sampling.method")
-            points = math.prod(axis.points for axis in sweep)
-            if points > MAX_ROWS:
-                self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
-            return
-        if not self.data.get("tolerances"):
-            self._fault(("tolerances",), "missing table: nothing scatters", "add [tolerances]")
-        if "sweep" in self.data:
-            self._fault(("sweep",), f"has no effect with {sampling.method!r}", 'write sampling.method = "sweep"')
+        used = SECTIONS_OF.get(sampling.method, SCATTER)
+        needed = used[0]
+        if not self.data.get(needed):
+            header = "[[case]]" if needed == "case" else f"[{needed}]"
+            found = "missing table: nothing scatters" if used is SCATTER else "missing table"
+            self._fault((needed,), found, f"add {header}, or another sampling.method")
+        known = dict.fromkeys((*SCATTER, *(name for names in SECTIONS_OF.values() for name in names)))
+        for section in known:
+            if section not in used and section in self.data:
+                remedy = "remove it, or write another sampling.method"
+                self._fault((section,), f"has no effect with {sampling.method!r}", remedy)
+        points = math.prod(axis.points for axis in sweep)
+        if points > MAX_ROWS:
+            self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
 
     def check_harmonics(self, output: Output, solver: Solver) -> None:
         """Find harmonics that the steps of a revolution cannot carry."""
@@ -205,15 +207,7 @@ class StudyFile:
     def _entries(self, section: str) -> list[Entry]:
         return list(selection.entries(self._table(section), section))
 
-    def _quantity(self, entry: Entry, unit: str) -> float:
-        try:
-            return units.to_si(entry.value, unit)
-        except PydanticCustomError as error:
-            context = error.context or {}
-            where = f"{self.place}: {schema.dotted(entry.path)}"
-            raise InputError([Fault(where, context["found"], context["remedy"])]) from error
-
-    def _fault(self, path: tuple[str, ...], found: str, remedy: str) -> None:
+    def _fault(self, path: tuple[int | str, ...], found: str, remedy: str) -> None:
         self._faults.append(Fault(f"{self.place}: {schema.dotted(path)}", found, remedy))
 
 

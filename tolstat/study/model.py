@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -54,26 +55,36 @@ class Sampling(Strict):
     Attributes
     ----------
     n : int, optional
-        Number of joints, the nominal one not counted; a sweep has its number from its points.
+        Number of joints, the nominal one not counted; a sweep has its number from its points, cases from their list.
     method : str
-        ``random``, ``sobol``, ``lhs``, or ``sweep``.
+        ``random``, ``sobol``, ``lhs``; ``sweep``: a grid of errors; ``cases``: joints listed one by one.
     seed : int
         Seed of all draws.
     nominal_first : bool
-        Whether row 0 is the joint without errors, kept out of the statistics.
+        Whether row 0 is the joint without errors, kept out of the statistics. Never with ``cases``, where each
+        group of joints has its own.
     """
 
-    method: Literal["random", "sobol", "lhs", "sweep"] = "random"
+    method: Literal["random", "sobol", "lhs", "sweep", "cases"] = "random"
     n: Annotated[int, Field(strict=True, ge=1, le=MAX_ROWS)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Flag = True
 
+    @model_validator(mode="before")
+    @classmethod
+    def _ideal_in_each_group(cls, data: Any) -> Any:
+        listed = isinstance(data, Mapping) and data.get("method") == "cases"
+        return {"nominal_first": False, **data} if listed else data
+
     @model_validator(mode="after")
-    def _n_or_sweep(self) -> Self:
-        if self.method == "sweep" and self.n is not None:
-            raise refuse("n is given for a sweep", "leave n out: [sweep] says how many points")
-        if self.method != "sweep" and self.n is None:
+    def _n_where_drawn(self) -> Self:
+        drawn = self.method not in ("sweep", "cases")
+        if not drawn and self.n is not None:
+            raise refuse(f"n is given with {self.method!r}", "leave n out: the file lists the joints")
+        if drawn and self.n is None:
             raise refuse("missing key n", "add n, the number of joints, for example n = 1024")
+        if self.method == "cases" and self.nominal_first:
+            raise refuse("nominal_first with 'cases'", "leave it out: each group of joints has the ideal one")
         return self
 
 
@@ -92,6 +103,60 @@ class Correlation(Strict):
 
     between: Annotated[list[str], Field(min_length=1)]
     rho: Annotated[Number, Field(gt=-1, lt=1)]
+
+
+class CaseEntry(Strict):
+    """One ``[[case]]``: the joint with these errors."""
+
+    name: Annotated[str, Field(min_length=1)]
+    errors: Annotated[dict[str, Any], Field(min_length=1)]
+
+
+class Range(Strict):
+    """One entry of ``vary``: a key of the joint goes from `start` to `stop`, as the file writes them."""
+
+    start: Annotated[Any, Field(alias="from")]
+    stop: Annotated[Any, Field(alias="to")]
+
+
+class VariantEntry(Strict):
+    """One ``[[variant]]``: another joint, or a family of them.
+
+    Attributes
+    ----------
+    name : str
+        Name of the family; entries of one name make one family.
+    joint : dict
+        Keys in place of those of ``[joint]``, which may name another `base` too.
+    points : int, optional
+        Number of joints of a family; needed with `vary`.
+    design : str
+        ``line``: all keys of `vary` go from one end to the other together; ``sobol``: a scrambled Sobol' sequence
+        fills the box.
+    seed : int
+        Seed of the scrambling.
+    vary : dict
+        Keys of the joint that the family varies, and how far.
+    cases : list of str, optional
+        The cases that are run; all without it. The joint without errors is always run.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    joint: Annotated[dict[str, Any], Field(default_factory=dict)]
+    points: Annotated[int, Field(strict=True, ge=2, le=10_000)] | None = None
+    design: Literal["line", "sobol"] = "line"
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
+    vary: Annotated[dict[str, Any], Field(default_factory=dict)]
+    cases: list[str] | None = None
+
+    @model_validator(mode="after")
+    def _family(self) -> Self:
+        if bool(self.vary) != (self.points is not None):
+            given, lacking = ("vary", "points") if self.vary else ("points", "vary")
+            raise refuse(f"{given} without {lacking}", f"add {lacking}")
+        if self.seed and self.design != "sobol":
+            raise refuse("seed without a random design", 'leave it out, or write design = "sobol"')
+        return self
 
 
 class SweepEntry(Strict):

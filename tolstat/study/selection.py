@@ -10,9 +10,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
-from tolstat.errors import Fault, InputError
+from pydantic_core import PydanticCustomError
+
+from tolstat.errors import Fault, InputError, gather
 from tolstat.schema import did_you_mean, dotted
 from tolstat.tables import BUSHINGS, ERROR_FIELDS, HOLES, PINS
+from tolstat.units import to_si
 
 UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 """SI unit of every error, in the order of the table."""
@@ -35,25 +38,84 @@ class Entry(NamedTuple):
     ----------
     pattern : str
         The name or pattern, dotted.
-    path : tuple of str
+    path : tuple of str and int
         Key path in the file.
     value : object
         What the file says.
     """
 
     pattern: str
-    path: tuple[str, ...]
+    path: tuple[int | str, ...]
     value: Any
 
 
-def entries(table: Mapping[str, Any], section: str) -> Iterator[Entry]:
-    """Entries of a table whose keys are names, written quoted or dotted."""
+def entries(table: Mapping[str, Any], *section: int | str) -> Iterator[Entry]:
+    """Entries of the table at the key path `section` whose keys are names, written quoted or dotted."""
     for key, value in table.items():
-        if "." not in key and isinstance(value, Mapping):
+        if key.isidentifier() and isinstance(value, Mapping):
             for name, inner in value.items():
-                yield Entry(f"{key}.{name}", (section, key, name), inner)
+                yield Entry(f"{key}.{name}", (*section, key, name), inner)
         else:
-            yield Entry(key, (section, key), value)
+            yield Entry(key, (*section, key), value)
+
+
+def quantity(entry: Entry, unit: str, place: str) -> float:
+    """Value of an entry in `unit`.
+
+    Raises
+    ------
+    InputError
+        When it is no such quantity.
+    """
+    try:
+        return to_si(entry.value, unit)
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise InputError([Fault(f"{place}: {dotted(entry.path)}", context["found"], context["remedy"])]) from error
+
+
+def fixed_errors(
+    table: Mapping[str, Any], section: Sequence[int | str], place: str, claims: Claims
+) -> dict[str, float]:
+    """Read a table of errors that are given, not drawn.
+
+    Parameters
+    ----------
+    table : mapping
+        Names or patterns to quantities.
+    section : sequence
+        Key path of the table in its file.
+    place : str
+        File that faults name.
+    claims : Claims
+        What decides which error; the entries' names are added.
+
+    Returns
+    -------
+    dict
+        Error name to deviation (SI).
+
+    Raises
+    ------
+    InputError
+        With every fault of the table.
+    """
+    fixed: dict[str, float] = {}
+    faults: list[Fault] = []
+    names = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
+    for entry in entries(table, *section):
+        if entry.pattern.startswith("operation."):
+            where = f"{place}: {dotted(entry.path)}"
+            faults.append(Fault(where, "is not an error", f"set {entry.path[-1]} in [operation]"))
+            continue
+        with gather(faults):
+            selected = resolve(entry, names, place)
+            value = quantity(entry, names[selected[0]], place)
+            claims.claim(entry, selected)
+            fixed |= dict.fromkeys(selected, value)
+    if faults:
+        raise InputError(faults)
+    return fixed
 
 
 def select(pattern: str, names: Iterable[str]) -> list[str]:

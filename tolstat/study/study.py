@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.errors import Fault, InputError
 from tolstat.joint import Joint, Operation
 from tolstat.study.correlation import Copula
+from tolstat.study.design import Design, flat
 from tolstat.study.file import StudyFile
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
+from tolstat.tables import DESIGN, Variant
 from tolstat.tolerance import Distribution
 
 
@@ -64,6 +69,8 @@ class Study(Case):
         How many, and how they are drawn.
     sweep : tuple of SweepAxis
         Axes of a grid, the last running fastest; empty unless ``sampling.method`` is ``sweep``.
+    listed : Design, optional
+        The joints listed one by one; None unless ``sampling.method`` is ``cases``.
     limits : dict
         Result name (``cross1.F``, ``fork2.T``, ``pin1.contact``, ``psi``) to limit (SI).
     output : Output
@@ -75,11 +82,34 @@ class Study(Case):
     tolerances: dict[str, Distribution] = field(default_factory=dict)
     copula: Copula = field(default_factory=Copula)
     sweep: tuple[SweepAxis, ...] = ()
+    listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Nominal joint of each variant."""
+        return self.listed.joints if self.listed else (self.joint,)
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """What makes each of `joints`; empty where joints are not listed."""
+        return self.listed.variants if self.listed else ()
+
+    @property
+    def case_names(self) -> tuple[str, ...]:
+        """Names of the cases, the one without errors first; empty where joints are not listed."""
+        return tuple(self.listed.cases) if self.listed else ()
+
+    @property
+    def design(self) -> NDArray[np.void]:
+        """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where joints are not listed."""
+        return self.listed.table if self.listed else np.zeros(self.rows, DESIGN)
 
     @property
     def samples(self) -> int:
         """Number of joints, the nominal one not counted."""
+        if self.listed:
+            return len(self.listed.table)
         return self.sampling.n or math.prod(axis.points for axis in self.sweep)
 
     @property
@@ -104,15 +134,7 @@ class Study(Case):
             "sweep": [[list(axis.names), axis.start, axis.stop, axis.points] for axis in self.sweep],
             "output": self.output.model_dump(),
         }
-        return dict(_flat(parts, ""))
-
-
-def _flat(value: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
-    for key, inner in value.items():
-        if isinstance(inner, Mapping):
-            yield from _flat(inner, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", list(inner) if isinstance(inner, tuple) else inner
+        return dict(flat(parts | (self.listed.identity() if self.listed else {})))
 
 
 def load_case(path: str | Path) -> Case:
@@ -124,6 +146,8 @@ def load_case(path: str | Path) -> Case:
         With every fault of the file.
     """
     file = StudyFile(Path(path), ("joint", "operation", "errors", "solver"))
+    if "sampling" in file.data:
+        raise InputError([Fault(file.place, "is a study, not a case of one joint", "run it with: tolstat run")])
     joint = file.joint()
     operation = file.model("operation", Operation, required=True)
     solver = file.model("solver", Solver)
@@ -137,7 +161,7 @@ def load_case(path: str | Path) -> Case:
 
 SECTIONS = (
     *("joint", "operation", "solver", "errors", "tolerances", "correlation"),
-    *("sampling", "sweep", "limits", "output"),
+    *("sampling", "sweep", "grid", "case", "variant", "limits", "output"),
 )
 
 
@@ -174,8 +198,9 @@ def load(path: str | Path, n: int | None = None) -> Study:
     sweep = file.sweep()
     limits = file.limits()
     output = file.model("output", Output)
+    listed = file.listed(joint) if sampling is not None and sampling.method == "cases" else None
     if sampling is not None:
-        file.check_scatter(sampling, sweep)
+        file.check_method(sampling, sweep)
     if output is not None and solver is not None:
         file.check_harmonics(output, solver)
     file.finish()
@@ -196,5 +221,6 @@ def load(path: str | Path, n: int | None = None) -> Study:
         tolerances=tolerances,
         copula=copula,
         sweep=sweep,
+        listed=listed,
         limits=limits,
     )

@@ -178,12 +178,15 @@ class MeasuredEntry(ToleranceEntry):
     distribution: Literal["measured"]
     file: str
     column: str
-    unit: str = "1"
+    unit: str | None = None
 
     def build(self, site: Site) -> tolerance.Measured:
         """See `ToleranceEntry.build`."""
-        factor = units.to_si(1.0 if self.unit == "1" else f"1 {self.unit}", site.unit)
-        return tolerance.Measured.of(factor * value for value in self._column(site.folder / self.file))
+        values = self._column(site.folder / self.file)
+        if self.unit is None and site.unit != "1":
+            raise refuse("missing key unit", 'add the unit of the column, for example unit = "mm"')
+        factor = units.to_si(1.0 if self.unit is None else f"1 {self.unit}", site.unit)
+        return tolerance.Measured.of(factor * value for value in values)
 
     def _column(self, path: Path) -> list[float]:
         try:
@@ -227,7 +230,7 @@ KINDS: dict[str, type[ToleranceEntry]] = {
 RADIAL_KINDS: dict[str, type[ToleranceEntry]] = {"rayleigh": RayleighEntry}
 
 
-def distribution(data: object, site: Site, place: str, path: tuple[str, ...]) -> Distribution:
+def distribution(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> Distribution:
     """Distribution that an entry means.
 
     Parameters

@@ -1,0 +1,112 @@
+"""Joints listed one by one: every variant of the joint, at every point of a grid, with the errors of every case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.joint import Joint
+from tolstat.tables import DESIGN, Variant
+
+IDEAL = "ideal"
+"""Name of the case without errors, the first of every list."""
+
+SOBOL_BITS = 30
+
+
+@dataclass(frozen=True)
+class Design:
+    """What the rows of a study are.
+
+    Attributes
+    ----------
+    variants : tuple of Variant
+        In the order of the file, families expanded.
+    joints : tuple of Joint
+        The joint of each variant.
+    cases : dict
+        Name of a case to its errors (SI), `IDEAL` first.
+    points : tuple of dict
+        Points of the grid: error name to value (SI).
+    table : ndarray, (rows,), dtype DESIGN
+        Variant, case and group of each row. A group is a variant at a point of the grid.
+    """
+
+    variants: tuple[Variant, ...]
+    joints: tuple[Joint, ...]
+    cases: dict[str, dict[str, float]]
+    points: tuple[dict[str, float], ...]
+    table: NDArray[np.void]
+
+    def point(self) -> NDArray[np.intp]:
+        """Index of each row's point of the grid, (rows,)."""
+        return np.asarray(self.table["group"], np.intp) % len(self.points)
+
+    def identity(self) -> dict[str, Any]:
+        """Everything in it that decides the numbers, nested by key."""
+        families = [[name, len(list(members))] for name, members in groupby(v.family for v in self.variants)]
+        return {
+            "grid": list(self.points),
+            "case": self.cases,
+            "variants": families,
+            "variant": {
+                f"{number} {variant.family}": variant.values | {"cases": self._run(number)}
+                for number, variant in enumerate(self.variants)
+            },
+        }
+
+    def _run(self, variant: int) -> list[int]:
+        return [int(case) for case in np.unique(self.table["case"][self.table["variant"] == variant])]
+
+
+def table(cases: Sequence[Sequence[int]], points: int) -> NDArray[np.void]:
+    """Make the rows of a design: for each variant, for each point of the grid, for each case.
+
+    Parameters
+    ----------
+    cases : sequence of sequence of int
+        For each variant the cases that are run with it, in order.
+    points : int
+        Points of the grid.
+
+    Returns
+    -------
+    ndarray, (rows,), dtype DESIGN
+    """
+    rows = [
+        (variant, case, variant * points + point)
+        for variant, listed in enumerate(cases)
+        for point in range(points)
+        for case in listed
+    ]
+    return np.array(rows, DESIGN)
+
+
+def sobol(n: int, dimensions: int, seed: int) -> NDArray[np.float64]:
+    """Scrambled Sobol' points in the unit cube, (n, dimensions), at the middle of their cells."""
+    from scipy.stats import qmc
+
+    engine = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
+    points: NDArray[np.float64] = engine.random_base2(max(n - 1, 0).bit_length())[:n]
+    return points + 2.0 ** -(SOBOL_BITS + 1)
+
+
+def cube(design: str, n: int, dimensions: int, seed: int) -> list[list[float]]:
+    """Points of a family in the unit cube, n lists of `dimensions`: on its diagonal (``line``), or all over it."""
+    if design == "sobol":
+        return [[float(share) for share in point] for point in sobol(n, dimensions, seed)]
+    return [[number / (n - 1)] * dimensions for number in range(n)]
+
+
+def flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Leaves of nested tables by dotted key; tuples as lists, as JSON has them."""
+    for key, inner in value.items():
+        if isinstance(inner, Mapping):
+            yield from flat(inner, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", list(inner) if isinstance(inner, tuple) else inner

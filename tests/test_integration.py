@@ -5,13 +5,14 @@ from __future__ import annotations
 import numba
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 from tolstat.integration import integrate
 from tolstat.kernel import rotation
 from tolstat.tables import Status
 
-METHODS = ("bdf2", "generalized_alpha")
+METHODS = ("bdf2", "generalized_alpha", "tr_bdf2")
 
 
 @numba.njit
@@ -137,7 +138,7 @@ def test_a_given_tangent_gives_the_same_solution():
     np.testing.assert_allclose(given.q, plain.q, atol=1e-9)
 
 
-@pytest.mark.parametrize(("method", "loss"), [("bdf2", 0.06), ("generalized_alpha", 0.01)])
+@pytest.mark.parametrize(("method", "loss"), [("bdf2", 0.06), ("generalized_alpha", 0.01), ("tr_bdf2", 0.01)])
 def test_an_impact_gives_back_its_energy(method, loss):
     """Restitution 1 in truth; at 8 steps a contact the methods lose a few per cent of the speed at most."""
     contact = np.pi / 1e3
@@ -157,6 +158,79 @@ def test_a_step_too_long_for_newton_is_halved_and_counted(method):
     assert np.isfinite(r.q).all()
 
 
+@numba.njit
+def van_der_pol(t, q, v, out):
+    out[0] = 1000 * (1 - q[0] ** 2) * v[0] - q[0]
+
+
+@numba.njit
+def pleiades(t, q, v, out):
+    """Seven stars in a plane, of mass 1 to 7 (Hairer, Norsett, Wanner: Solving ODEs I, II.10)."""
+    for i in range(7):
+        out[i] = out[7 + i] = 0.0
+        for j in range(7):
+            if j != i:
+                dx, dy = q[j] - q[i], q[7 + j] - q[7 + i]
+                cubed = (dx * dx + dy * dy) ** 1.5
+                out[i] += (j + 1) * dx / cubed
+                out[7 + i] += (j + 1) * dy / cubed
+
+
+@numba.njit
+def quadratic_impact(t, q, v, out):
+    out[0] = -1e8 * q[0] ** 2 if q[0] > 0 else 0.0
+
+
+def test_van_der_pol_at_mu_1000():
+    """Published solution at t = 2000 (Test Set for IVP Solvers, problem vdpol with mu = 1000)."""
+    expected = 1.706167732170469, -8.928097010248125e-4
+    errors = []
+    for rtol in (1e-4, 1e-6, 1e-8):
+        r = integrate(van_der_pol, [2.0], [0.0], (0, 2000), 100, "tr_bdf2", rtol=rtol, atol=1e-9, max_halvings=24)
+        assert r.status == Status.OK
+        errors.append(max(abs(r.q[-1, 0] / expected[0] - 1), abs(r.v[-1, 0] / expected[1] - 1)))
+    assert errors[0] < 1e-3
+    assert errors[1] < 1e-4
+    assert errors[2] < 1e-5
+
+
+def test_pleiades():
+    """Published solution at t = 3 (Hairer, Norsett, Wanner: Solving ODEs I, II.10), checked with scipy's DOP853 too."""
+    q0 = [3, 3, -1, -3, 2, -2, 2, 3, -3, 2, 0, 0, -4, 4]
+    v0 = [0, 0, 0, 0, 0, 1.75, -1.5, 0, 0, 0, -1.25, 1, 0, 0]
+    expected = [
+        *(0.3706139143970502, 3.237284092057233, -3.222559032418324, 0.6597091455775310, 0.3425581707156584),
+        *(1.562172101400631, -0.7003092922212495),
+        *(-3.943437585517392, -3.271380973972550, 5.225081843456543, -2.590612434977470, 1.198213693392275),
+        *(-0.2429682344935824, 1.091449240428980),
+    ]
+
+    def first_order(t, y):
+        out = np.empty(14)
+        pleiades(t, y[:14], y[14:], out)
+        return np.concatenate([y[14:], out])
+
+    truth = solve_ivp(first_order, (0, 3), [*q0, *v0], "DOP853", rtol=1e-12, atol=1e-12).y[:14, -1]
+    np.testing.assert_allclose(truth, expected, atol=1e-6)
+    r = integrate(pleiades, q0, v0, (0, 3), 30, "tr_bdf2", rtol=1e-7, atol=1e-9, max_halvings=20)
+    np.testing.assert_allclose(r.q[-1], expected, atol=1e-3)
+    fixed = integrate(pleiades, q0, v0, (0, 3), 60_000, "generalized_alpha", rho_inf=1.0)
+    np.testing.assert_allclose(fixed.q[-1], expected, atol=5e-3)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_contact_time_of_a_quadratic_spring(method):
+    """Contact lasts 2 * 1.40218 delta_max / v, delta_max^3 = 3 m v^2 / (2 k), and gives the speed back."""
+    speed = 1.0
+    deepest = (3 * speed**2 / (2 * 1e8)) ** (1 / 3)
+    lasting = 2 * 1.4021821053254543 * deepest / speed
+    r = integrate(quadratic_impact, [0.0], [speed], (0, 1.2 * lasting), 2400, method)
+    assert r.q.max() == pytest.approx(deepest, rel=1e-4)
+    assert -r.v[-1, 0] == pytest.approx(speed, rel=1e-4)
+    leaving = np.interp(0.0, -r.q[1200:, 0], r.t[1200:])
+    assert leaving == pytest.approx(lasting, rel=1e-4)
+
+
 @pytest.mark.parametrize("system", [exploding, broken])
 @pytest.mark.parametrize("method", METHODS)
 def test_failure_is_a_status_and_nan(system, method):
@@ -171,6 +245,8 @@ def test_failure_is_a_status_and_nan(system, method):
         ({"q0": [[1.0]]}, "vectors"),
         ({"v0": [np.nan]}, "finite"),
         ({"steps": 0}, "steps"),
+        ({"method": "euler"}, "none of"),
+        ({"rtol": 1e-3}, "only tr_bdf2"),
         ({"t_span": (1, 0)}, "grow"),
     ],
 )

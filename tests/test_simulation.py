@@ -162,7 +162,7 @@ def test_ramp_and_static_start_settle_to_the_same_revolution(params):
     np.testing.assert_allclose(a["loads"], b["loads"], atol=2e-5 * np.abs(b["loads"]).max())
 
 
-METHODS = pytest.mark.parametrize("method", [Method.BDF2, Method.GENERALIZED_ALPHA])
+METHODS = pytest.mark.parametrize("method", list(Method))
 TIGHT = {"settle_tol": 1e-7, "newton_tol": 1e-9, "max_revs": 40}
 
 
@@ -175,7 +175,7 @@ def test_load_histories_of_a_joint_whose_contacts_stay_are_of_order_two(params, 
         coarse = full(par, steps_per_rev=steps, method=int(method), **TIGHT)[1]["loads"]
         errors.append(np.sqrt(np.mean((coarse - fine[:: 1440 // steps])[..., :3] ** 2)))
     slopes = np.log2(np.array(errors[:-1]) / errors[1:])
-    np.testing.assert_allclose(slopes, 2.0, atol=0.3)
+    assert (slopes > 1.7).all(), (errors, slopes)
 
 
 @METHODS

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.tables import Method, Options, Status
 
-MethodName = Literal["generalized_alpha", "bdf2"]
+MethodName = Literal["generalized_alpha", "bdf2", "tr_bdf2"]
 
 
 class Trajectory(NamedTuple):
@@ -49,6 +49,8 @@ def integrate(
     tangent: Callable[..., None] | None = None,
     *,
     rho_inf: float = 0.8,
+    rtol: float = 0.0,
+    atol: float = 1e-12,
     newton_tol: float = 1e-10,
     newton_max_iter: int = 12,
     max_halvings: int = 16,
@@ -65,13 +67,16 @@ def integrate(
         First and last time.
     steps : int
         Steps of the output grid.
-    method : {"generalized_alpha", "bdf2"}
-        Both of order 2; generalised-alpha with spectral radius `rho_inf` at infinite frequency keeps energy better,
-        BDF2 is L-stable.
+    method : {"generalized_alpha", "bdf2", "tr_bdf2"}
+        All of order 2; generalised-alpha with spectral radius `rho_inf` at infinite frequency keeps energy better, the
+        others are L-stable. TR-BDF2 has an error estimate, see `rtol`.
     tangent : jitted function (t, q, v, dq, dv) -> None, optional
         Writes the derivatives of q'' by q and by v, each (n, n); differences are used without it.
     rho_inf : float
         Numerical dissipation of generalised-alpha, 0 (strongest) to 1 (none).
+    rtol, atol : float
+        With `rtol` above zero, ``"tr_bdf2"`` halves a step until the estimated error of every unknown and velocity y is
+        below ``atol + rtol |y|``. Other methods have no estimate.
     newton_tol : float
         Newton stops when the residual is below this, relative to the motion in the step (seen as an acceleration).
     newton_max_iter : int
@@ -96,13 +101,18 @@ def integrate(
         raise ValueError(f"t_span {t_span} must grow and steps {steps} be at least 1")
     if not 0 <= rho_inf <= 1:
         raise ValueError(f"rho_inf {rho_inf} must lie between 0 and 1")
-    number = {"generalized_alpha": Method.GENERALIZED_ALPHA, "bdf2": Method.BDF2}[method]
+    if method.upper() not in Method.__members__:
+        raise ValueError(f"method {method!r} is none of {', '.join(m.name.lower() for m in Method)}")
+    if (rtol > 0 and method != "tr_bdf2") or rtol < 0 or atol < 0:
+        raise ValueError("rtol and atol must not be negative, and only tr_bdf2 can keep them")
     options = Options(
-        method=int(number),
+        method=int(Method[method.upper()]),
         newton_tol=newton_tol,
         newton_max_iter=newton_max_iter,
         max_halvings=max_halvings,
-        rho_inf=rho_inf,
+        rho_inf=float(rho_inf),
+        rtol=float(rtol),
+        atol=float(atol),
     )
     march = _bind(acceleration, tangent)
     points = np.full((steps + 1, 3, len(q)), np.nan)

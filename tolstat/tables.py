@@ -60,6 +60,7 @@ class Method(IntEnum):
 
     BDF2 = 0
     GENERALIZED_ALPHA = 1
+    TR_BDF2 = 2
 
 
 class Start(IntEnum):
@@ -114,6 +115,8 @@ class Options(NamedTuple):
     newton_max_iter: int = 12
     max_halvings: int = 16
     rho_inf: float = 0.8
+    rtol: float = 0.0
+    atol: float = 0.0
 
 
 class HistorySpec(NamedTuple):

@@ -8,9 +8,6 @@ Euler. Algebraic order 2, L-stable.
 from tolstat.kernel._jit import njit
 from tolstat.kernel.state import H_OLD
 
-MAX_RATIO = 2.0
-"""Largest ratio of a step to the one before."""
-
 
 @njit
 def predict(h, state, options):
@@ -28,8 +25,3 @@ def predict(h, state, options):
         state.v[i] = cv * guess + (c1 * state.q0[i] + c2 * state.q1[i]) / h
         state.a[i] = cv * state.v[i] + (c1 * state.v0[i] + c2 * state.v1[i]) / h
     return cv, cv * cv
-
-
-@njit
-def accept(h, state, options):
-    """Nothing beyond the two last points is remembered."""

@@ -4,38 +4,57 @@
 with `predict` (write a trial point that obeys the method's formulas, return how velocity and acceleration follow the
 unknowns) and `accept` (remember what the next step needs).
 
-The output grid is kept: a step that Newton cannot solve is halved, at most ``options.max_halvings`` times; steps grow
-again by factors of two where the grid allows. An unconverged point is never accepted.
+The output grid is kept: a step that Newton cannot solve, or whose estimated error is above the tolerance where the
+method has an estimate, is halved, at most ``options.max_halvings`` times; steps grow again by factors of two where the
+grid allows. An unconverged point is never accepted.
 """
 
-from tolstat.kernel import bdf2, generalized_alpha
+from tolstat.kernel import bdf2, generalized_alpha, trbdf2
 from tolstat.kernel._jit import closure, njit
 from tolstat.kernel.state import CV_FACTORISED, FACTORISATIONS, H_OLD, HALVINGS, ITERATIONS, STEPS
 from tolstat.tables import Method
 
-BDF2 = int(Method.BDF2)
+BDF2, GENERALIZED_ALPHA, TR_BDF2 = int(Method.BDF2), int(Method.GENERALIZED_ALPHA), int(Method.TR_BDF2)
 SLOW = 0.2
 """Contraction per iteration above which the tangent is renewed."""
 ROUNDOFF = 10 * 2.0**-52
+ERROR_TO_GROW = 0.1
+"""Estimated error, in units of the tolerance, below which a step may be doubled."""
+MAX_RATIO = 2.0
+"""Largest ratio of a step to the one before, for BDF2's stability and where the error is controlled."""
 START_LEVEL = 4
 """BDF2 has no past at its first step, which is implicit Euler over 1/16 of the step."""
 
-bdf2_predict, bdf2_accept = bdf2.predict, bdf2.accept
+bdf2_predict = bdf2.predict
 alpha_predict, alpha_accept = generalized_alpha.predict, generalized_alpha.accept
+tr_predict, keep_stage, estimate = trbdf2.predict, trbdf2.keep_stage, trbdf2.error
 
 
 @njit
-def predict(h, state, options):
-    """Trial point of the method in use."""
+def stages(options):
+    """Number of stages of the method in use."""
+    return trbdf2.STAGES if options.method == TR_BDF2 else 1
+
+
+@njit
+def predict(h, stage, state, options):
+    """Trial point of the method in use; returns cv, ca and the share of the step that the stage reaches."""
+    if options.method == TR_BDF2:
+        if stage > 0:
+            keep_stage(state)
+        cv, ca = tr_predict(h, stage, state, options)
+        return cv, ca, (trbdf2.GAMMA if stage == 0 else 1.0)
     if options.method == BDF2:
-        return bdf2_predict(h, state, options)
-    return alpha_predict(h, state, options)
+        cv, ca = bdf2_predict(h, state, options)
+    else:
+        cv, ca = alpha_predict(h, state, options)
+    return cv, ca, 1.0
 
 
 @njit
 def accept(h, state, options):
     """Make the trial point the last accepted one."""
-    if options.method != BDF2:
+    if options.method == GENERALIZED_ALPHA:
         alpha_accept(h, state, options)
     for i in range(state.q.size):
         state.q1[i], state.v1[i] = state.q0[i], state.v0[i]
@@ -121,6 +140,15 @@ def build_integrator(residual, factorise, solve, size=scaled_size):
         return False
 
     @closure
+    def attempt(t, h, par, options, work, state):
+        for stage in range(stages(options)):
+            cv, ca, share = predict(h, stage, state, options)
+            if not newton(t + share * h, cv, ca, par, options, work, state):
+                return False, 0.0
+        error = estimate(h, state, options) if options.method == TR_BDF2 and options.rtol > 0 else 0.0
+        return error <= 1, error
+
+    @closure
     def advance(t, h, par, options, work, state):
         whole = 1 << options.max_halvings  # the step is counted in parts of its smallest sub-step
         done = level = 0
@@ -128,16 +156,18 @@ def build_integrator(residual, factorise, solve, size=scaled_size):
             level = min(START_LEVEL, options.max_halvings)
         while done < whole:
             h_old = state.memory[H_OLD]
-            if options.method == BDF2 and h_old > 0:
-                while level < options.max_halvings and h / (1 << level) > 1.0001 * bdf2.MAX_RATIO * h_old:
+            if h_old > 0 and (options.method == BDF2 or options.rtol > 0):
+                while level < options.max_halvings and h / (1 << level) > 1.0001 * MAX_RATIO * h_old:
                     level += 1
             part = h / (1 << level)
-            cv, ca = predict(part, state, options)
-            if newton(t + h * (done / whole) + part, cv, ca, par, options, work, state):
+            good, error = attempt(t + h * (done / whole), part, par, options, work, state)
+            if good:
                 accept(part, state, options)
                 done += whole >> level
-                while level > 0 and done % (whole >> (level - 1)) == 0:
+                # a longer step where the grid allows it, and where it would not be refused for its error
+                while level > 0 and done % (whole >> (level - 1)) == 0 and error < ERROR_TO_GROW:
                     level -= 1
+                    error *= 8
             else:
                 level += 1
                 state.counters[HALVINGS] += 1

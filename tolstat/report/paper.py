@@ -176,7 +176,10 @@ def _value(key: str, value: Any) -> str:
 
 
 def _number(value: float, form: str) -> str:
-    return form % value if np.isfinite(value) else "–"
+    if not np.isfinite(value):
+        return "–"
+    text = form % value
+    return text if float(text) else form.replace("+", "") % 0.0  # no "-0.0"
 
 
 def _picture(figure: Figure) -> str:

@@ -24,7 +24,7 @@ Flag = Annotated[bool, Field(strict=True)]
 class Solver(Strict):
     """``[solver]``: numerical settings, the same for every joint."""
 
-    method: Literal["bdf2", "generalized_alpha"] = "bdf2"
+    method: Literal["bdf2", "generalized_alpha", "tr_bdf2"] = "bdf2"
     start: Literal["static", "ramp"] = "static"
     steps_per_rev: Annotated[int, Field(strict=True, ge=12, le=20_000)] = _DEFAULTS.steps_per_rev
     max_revs: Annotated[int, Field(strict=True, ge=1, le=1000)] = _DEFAULTS.max_revs

@@ -20,6 +20,7 @@ class CommitHook(BuildHookInterface):
             commit = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout
         except (OSError, subprocess.SubprocessError):
             return
-        path = Path(tempfile.mkdtemp()) / "_commit.txt"
+        self._folder = tempfile.TemporaryDirectory()  # removed with this hook, when the wheel is made
+        path = Path(self._folder.name) / "_commit.txt"
         path.write_text(commit, encoding="ascii")
         build_data["force_include"][str(path)] = "tolstat/_commit.txt"

@@ -68,11 +68,22 @@ def smooth_step(x):
     return x * x * (3 - 2 * x)
 
 
+def contact_mode(stations):
+    """Name of the contact mode by Figure 3 of the paper, from direction and penetration of each station."""
+    sides = [n for n, delta in stations if delta > 0]
+    if not sides:
+        return "NONE"
+    if any(a @ b < 0 for a in sides for b in sides):
+        return "TWO_POINT"
+    return "UNIFORM" if len(sides) == len(stations) else "ONE_POINT"
+
+
 def forces(t, q, v, par):
-    """World force and torque about the reference point of every body; also the loads of the bushings."""
+    """World force and torque about the reference point of every body, loads of the bushings, contact modes."""
     body, velocity, spin = motion(t, q, v, np.zeros(55), par)
     force = {name: np.zeros(6) for name in body.position}
     loads = np.zeros((8, 6))
+    modes: list[str] = []
 
     def apply(name, f, torque, point):
         force[name] += np.concatenate([f, torque + np.cross(point - body.position[name], f)])
@@ -121,6 +132,7 @@ def forces(t, q, v, par):
             slip = velocity[pin] + np.cross(spin[pin], point - body.position[pin])
             slip = slip - velocity[arm] - np.cross(spin[arm], point - body.position[arm])
             stations.append((point, g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p - 1], slip))
+        modes.append(contact_mode([(n, delta) for _, n, delta, _ in stations]))
         w = 1.0
         if par.law == 1:
             w = 0.0
@@ -143,12 +155,12 @@ def forces(t, q, v, par):
             f = -pressing * n - par.c_t * ramp * tangential
             apply(pin, f, np.zeros(3), point)
             apply(arm, -f, np.zeros(3), point)
-    return force, loads
+    return force, loads, modes
 
 
 def imbalance(t, q, v, a, par, resisting):
     """World momentum rates less forces and torques of every lump, and of the shaft about its axis."""
-    force, _ = forces(t, q, v, par)
+    force, _, _ = forces(t, q, v, par)
     h = 1e-6
     lumps = ["hub"] + [f"pin{k}" for k in (1, 2, 3, 4)] + [f"arm{k}" for k in (1, 2, 3, 4)]
     momentum = []

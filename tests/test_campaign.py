@@ -234,8 +234,17 @@ def test_another_study_is_refused_with_the_keys(tmp_path: Path) -> None:
         "  hint: use another --out, or delete the file"
     )
     assert path.read_bytes() == before
-    same = fakes.Study(limits={}, text="# another comment", name="moved")
-    assert campaign.run(same, path, 1, stages=fakes.stages()).done == 40
+
+
+def test_edited_limits_are_taken_over_and_nothing_is_simulated_again(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    before, stages = datasets(path), fakes.stages(fakes.simulate_or_raise)
+    same = fakes.Study(limits={"fork1.T": 40.0}, text="# another comment", name="moved")
+    assert campaign.run(same, path, 1, stages=stages).done == 40
+    with ResultStore.open(path) as store:
+        assert (store.limits, store.study_text, store.study_name) == ({"fork1.T": 40.0}, "# another comment", "moved")
+    assert datasets(path) == before
 
 
 def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -161,6 +161,41 @@ def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path)
     assert call("export", path, "--csv", "-").stdout == out.read_text(encoding="utf-8")
 
 
+CASES = (
+    synthetic.STUDY.partition("[tolerances]")[0]
+    + """
+[sampling]
+method = "cases"
+[[case]]
+name = "a"
+errors.hole4.offset_t = "0.1 mm"
+[[variant]]
+name = "plain"
+[[variant]]
+name = "clearance"
+points = 2
+vary.contact.D_P = { from = "76.0 mm", to = "75.6 mm" }
+"""
+)
+
+
+def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
+    out = tmp_path / "all.csv"
+    call("export", synthetic.store(tmp_path, CASES), "--csv", out)
+    table = pd.read_csv(out, header=[0, 1], index_col=0)
+    names = ["case", "variant", "family", "group"]
+    assert list(table.columns[:5]) == [*((name, "1") for name in names), (ERROR_COLUMNS[0].name, "m")]
+    assert table.columns[-1] == (RESULT_COLUMNS[-1].name, "1")
+    with ResultStore.open(tmp_path / "small.h5") as store:
+        assert list(store.to_pandas().columns[:4]) == names
+        assert table[names].to_numpy().tolist() == [
+            [store.case_names[joint["case"]], joint["variant"], store.variants[joint["variant"]].family, joint["group"]]
+            for joint in store.design()
+        ]
+    assert set(table["family", "1"]) == {"plain", "clearance"}
+    assert (table["case", "1"] == "a").equals(table["hole4.offset_t", "m"] == 1e-4)
+
+
 def test_export_to_a_folder_that_is_not_there(tmp_path):
     done = call("export", synthetic.store(tmp_path), "--csv", tmp_path / "no" / "all.csv")
     assert done.exit_code == 2
@@ -185,6 +220,18 @@ def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
         "cross1.F", "fork1.T", "fork2.T", "fork3.T", "fork4.T", "pin1.contact", "psi"
     ]  # fmt: skip
     assert f"wrote {tmp_path / 'small_exceedance.png'}" in done.stderr
+
+
+def test_report_makes_the_folder_it_is_to_write_to(tmp_path):
+    folder = tmp_path / "new" / "folder"
+    done = call("report", synthetic.store(tmp_path), "--out", folder)
+    assert done.exit_code == 0, done.stderr
+    assert (folder / "small_exceedance.csv").is_file()
+    for file, target, word in (("none.h5", "other", "is not there"), ("small.h5", "small.toml", "cannot be made")):
+        done = call("report", tmp_path / file, "--out", tmp_path / target)
+        assert done.exit_code == 2
+        assert word in done.stderr
+    assert not (tmp_path / "other").exists()
 
 
 def test_run_ends_with_the_report_and_goes_on_where_it_was(study):

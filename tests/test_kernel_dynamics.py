@@ -10,7 +10,7 @@ from tolstat.kernel import dynamics, linsolve, tangent
 from tolstat.kernel.motion import ideal_motion
 from tolstat.kernel.topology import ARM, ARM_OF_PIN, N_DOF, PIN, PSI
 from tolstat.kernel.work import make_work
-from tolstat.tables import Law, Options
+from tolstat.tables import Law, Mode, Options
 
 OPTIONS = Options()
 STATIONS = {Law.UNIFORM: 2, Law.POINT: 2, Law.MODE: 2, Law.SLICED: 5}
@@ -65,8 +65,22 @@ def test_loads_are_those_of_the_naive_twin(params, random_errors, law):
     work = make_work()
     dynamics.forces(t, q, v, par, work)
     assert (work.contact.sum(axis=1) > 100).all(), "the test wants every pin in contact"
-    _, loads = naive.forces(t, q, v, par)
+    _, loads, _ = naive.forces(t, q, v, par)
     np.testing.assert_allclose(work.load, loads, rtol=1e-6, atol=1e-4 * np.abs(loads).max())
+
+
+@pytest.mark.parametrize("law", [Law.MODE, Law.SLICED])
+def test_contact_modes_are_those_of_the_naive_twin(params, random_errors, law):
+    seen = set()
+    for seed in range(12):
+        par, t, q, v = loaded(params, random_errors, law, seed)
+        par.clearance[:] = 1e-5 * 2.0 ** (seed % 5)
+        work = make_work()
+        dynamics.forces(t, q, v, par, work)
+        modes = [Mode(m).name for m in work.mode]
+        assert modes == naive.forces(t, q, v, par)[2]
+        seen |= set(modes)
+    assert seen == set(Mode.__members__), "the test wants to see every mode"
 
 
 @pytest.mark.parametrize("law", list(Law))

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from tolstat import ideal
-from tolstat.analysis import paper, paper_choices, paper_spectra, paper_statics
+from tolstat.analysis import paper, paper_choices, paper_distances, paper_spectra, paper_statics
 from tolstat.files import data_dir
 from tolstat.tables import BUSHINGS, RESULT, Status
 
@@ -102,28 +102,50 @@ def test_the_nearest_direction_is_found_and_a_perfect_model_has_no_distance():
     matches = paper.nearest(value, case, where, cases)
     assert [m.case for m in matches] == ["Pos fork +t", "Ang fork -t", "Pos cross +t", "Ang cross -t"] * 2
     assert [m.row for m in matches] == list(range(8))
-    found = paper.distances(paper.tabulated(value, matches))
-    assert [d.table for d in found] == [4, 5, 6, 7, 0]
+    found = paper_distances.distances(paper.tabulated(value, matches))
+    assert [d.table for d in found] == [4, 5, 6, 7, 0, -1]
     for d in found:
         assert (d.median, d.mean, d.worst) == (0.0, 0.0, 0.0)
         assert d.correlation == pytest.approx(1.0)
+    assert all(m.ties == () for m in matches)
     fit = paper_choices.fits(value, np.zeros(len(case), "i4"), case, where, cases)[0]
     assert fit.objective == 0.0
     assert fit.cases == tuple(m.case for m in matches[:4])
+
+
+def test_with_the_sign_a_decrease_is_no_increase_and_ties_are_named():
+    table = paper.printed()
+    cases = ("ideal", *(f"{name} {direction}" for name in table.cases for direction in ("-t", "+t", "+z")))
+    rows = [(3 * c + 1 + k, a) for a in (0, 1) for c in range(4) for k in range(3)]
+    factor = (-1.0, 0.5, 0.5)  # the right size with the wrong sign; half of it with the right sign, twice
+    value = np.array([factor[(number - 1) % 3] * table.gamma[(number - 1) // 3, a] for number, a in rows])
+    case, where = np.array([number for number, _ in rows], "i4"), table.alpha[[a for _, a in rows]]
+    by_modulus = paper.nearest(value, case, where, cases)
+    by_sign = paper.nearest(value, case, where, cases, signed=True)
+    assert [m.case for m in by_modulus] == [f"{name} -t" for name in table.cases] * 2
+    assert [m.case for m in by_sign] == [f"{name} +t" for name in table.cases] * 2
+    assert [m.ties for m in by_sign] == [(f"{name} +z",) for name in table.cases] * 2
+    assert by_sign[0].distance == pytest.approx(0.5 * table.gamma[0, 0].mean())
+    whole = paper_distances.distances(paper.tabulated(value, by_modulus), signed=True)[4]
+    assert whole.mean == pytest.approx(2.0 * table.gamma.mean())
+    assert whole.correlation == pytest.approx(-1.0)
 
 
 def test_distances_against_numpy_and_scipy():
     rng = np.random.default_rng(5)
     table = paper.printed()
     made = table.gamma + rng.normal(0.0, 3.0, table.gamma.shape)
-    four = paper.distances(made)[0]
+    four = paper_distances.distances(made)[0]
     x, y = np.abs(made[:, 0, :4]).ravel(), table.gamma[:, 0, :4].ravel()
     assert four.median == np.median(np.abs(x - y))
     assert four.worst == np.abs(x - y).max()
     assert four.correlation == pytest.approx(np.corrcoef(stats.rankdata(x), stats.rankdata(y))[0, 1])
-    nothing = paper.distances(np.zeros_like(made))[-1]
+    *_, nothing, output = paper_distances.distances(np.zeros_like(made))
     assert nothing.mean == pytest.approx(paper_choices.no_effect()) == pytest.approx(table.gamma.sum() / 128)
     assert np.isnan(nothing.correlation)
+    side = [BUSHINGS.index(name) for name in ("cross1", "cross2", "fork3", "fork4")]
+    assert output.mean == pytest.approx(table.gamma[:, :, side].mean())
+    assert [d.label for d in (four, nothing, output)] == ["Table 4", "all four", "output side only"]
 
 
 def test_sweeps_and_searches_are_told_apart():
@@ -183,3 +205,20 @@ def test_position_errors_of_table_4_contradict_statics():
     assert [name for name, c in found.items() if not c.possible] == ["Pos fork", "Pos cross"]
     assert found["Pos fork"].axial == pytest.approx(np.sqrt(1.178**2 - 1.002**2))
     assert (found["Pos cross"].low, found["Pos cross"].high) == (0.6, 17.0)
+
+
+def test_exclusions_over_joints_name_the_ranges_of_each_verdict():
+    """A bushing marker further out sees less torque: less is left to trade for axial force."""
+    arms = np.array([0.0164, 0.0364, 0.0564])
+    force, lever = 600.0, 0.0838
+    ideals = [paper_statics.Loads(force, 50.0 - arm * 50.0 / lever, 100.0, arm) for arm in arms]
+    single = [paper_statics.contradictions(ideal) for ideal in ideals]
+    for c, line in enumerate(paper_statics.exclusions(ideals, arms / 0.0728)):
+        out = [not joint[c].possible for joint in single]
+        assert line.excluded == sum(out)
+        assert line.joints == 3
+        assert line.allowed == (min(j[c].allowed for j in single), max(j[c].allowed for j in single))
+        ends = [float(f(arms[out])) / 0.0728 if any(out) else np.nan for f in (np.min, np.max) if any(out)]
+        assert_allclose(line.out, ends or [np.nan] * 2)
+        assert np.isnan(line.room).all() == all(out)
+    assert {line.case: line.excluded for line in paper_statics.exclusions(ideals, arms)}["Ang fork"] == 0

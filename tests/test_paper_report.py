@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from tolstat import campaign, files, report, study
-from tolstat.report import paper_checks, paper_source
+from tolstat.report import paper_checks, paper_equations, paper_source
 from tolstat.report.paper import context
 from tolstat.store import ResultStore
 from tolstat.tables import Status
@@ -64,25 +64,27 @@ def test_all_joints_of_the_first_variant_settle(small):
 
 
 def test_answers_to_the_paper_s_statements(small):
-    assert {a.key: a.yes for a in small.answers()} == {
+    assert {a.key: a.yes for a in small.answers} == {
         "output_side": False,  # an offset along z loads all eight bushings alike
         "input_springs": False,
         "one_pin": False,
         "angular_torque": True,
         "force_size": True,
         "torque_size": True,
+        "together": False,  # a tilt about z raises forces, one about t torques
         "milder_force": False,
         "milder_torque": False,
         "spectrum": False,  # odd orders come up
         "marginal": True,
         "psi_grows": True,
+        "analytic": True,
         "settling": True,
         "settling_printed": False,
     }
 
 
 def test_figures_in_the_answers(small):
-    said = {a.key: a.figures for a in small.answers()}
+    said = {a.key: a.figures for a in small.answers}
     assert "largest increase +15.2 % (Ang fork +z at 15°)" in said["force_size"]
     assert "largest increase +28.9 % (Ang cross -t at 15°)" in said["torque_size"]
     assert "at most 1.6 % in 32 of 40 joints" in said["output_side"]
@@ -108,23 +110,42 @@ def test_distances_from_the_printed_tables(small):
     found = {d.table: d for d in context(small)["distances"]}
     assert found[0].mean == pytest.approx(3.62, abs=0.02)
     assert found[0].worst == pytest.approx(18.5, abs=0.1)
+    assert found[-1].mean == pytest.approx(6.90, abs=0.03)
     assert found[0].correlation == pytest.approx(0.66, abs=0.02)
     assert {m.case for m in small.matches} >= {"Ang fork +z", "Ang cross -z"}
 
 
 def test_mobility_and_misprints(small):
-    rows = {(r[0], r[1]): r[2:] for r in paper_checks.mobility(small)}
+    rows = {(r[0], r[1]): r[2:] for r in paper_equations.mobility(small)}
     assert rows["RRRR", "ideal"] == (-2, 20, "17", "1")
     assert rows["RCCC", "ideal"] == (1, 17, "17", "1")
-    said = " ".join(f"{c.printed} {c.computed}" for c in paper_checks.misprints(small.joint))
+    said = " ".join(f"{c.printed} {c.computed}" for c in paper_checks.misprints(small))
     for text in ("1.18e+04 N s/m", "3.73e+08", "28956 mm", "8.78e-12", "38.0 mm"):
         assert text in said
 
 
-def test_rigid_linkage_and_flexible_joint_pass_the_same_couple_at_rest(small):
-    for row in paper_checks.linkage(small):
-        rel = 1e-4 if row.alpha == 0.0 else 0.03  # inertia of the output shaft
-        assert row.couple_flexible == pytest.approx(row.couple_rigid, rel=rel)
+def test_rigid_linkage_with_inertia_and_flexible_joint_pass_the_same_couple(small):
+    rows = paper_equations.linkage(small)
+    assert [row.printed for row in rows[:5]] == ["ideal", "Pos fork", "Ang fork", "Pos cross", "Ang cross"]
+    for row in rows:
+        assert row.couple_flexible == pytest.approx(row.couple_inertia, rel=1e-4 if row.alpha == 0.0 else 0.01)
+        quasi = pytest.approx(row.couple_rigid, rel=0.01)
+        assert (row.couple_flexible == quasi) == (row.alpha == 0.0)  # the shaft's inertia counts
+
+
+def test_a_law_changes_single_loads_and_misprints_say_their_effect(small):
+    (law,) = small.laws
+    assert law.name == "mode"
+    effects = {m.what.split(",")[0]: m.effect for m in paper_checks.misprints(small)}
+    assert "instead of 2.3 revolutions" in effects["ρ"]
+    assert effects["clearance"].startswith("0.76 mm (radially 0.50 mm run): Pos 3.0 → ")
+
+
+def test_statics_excludes_by_the_lever_that_each_joint_has(small):
+    found = {x.case: x for x in small.exclusions()}
+    assert all(x.joints == 6 for x in found.values())
+    assert found["Pos fork"].excluded == found["Pos cross"].excluded == 6
+    assert found["Pos fork"].out[0] < 0.5 < found["Pos fork"].out[1]
 
 
 class Page(HTMLParser):
@@ -183,3 +204,29 @@ def test_other_cases_get_a_plain_table(result, tmp_path):
     expected = 100.0 * (table["cross1.T [N*m]"][1] / table["cross1.T [N*m]"][0] - 1.0)
     assert table["cross1.Gamma_T [%]"][1] == pytest.approx(expected)
     assert "bent" in built.table
+
+
+def test_another_joint_is_shown_beside_printed_constants(result, tmp_path):
+    """The first variant's joint counts, a third misalignment does no harm, and without a search there is no section."""
+    whole = result.with_suffix(".toml").read_text(encoding="utf-8")
+    head = whole[: whole.index("[[variant]]")].replace('["0 deg", "15 deg"]', '["0 deg", "30 deg", "15 deg"]')
+    own = 'joint.cross.r_b = "30 mm"\njoint.bushing.fork.k_x = "1e9 N/m"\njoint.contact.k1u = "5e7 N/mm^2"\n'
+    (tmp_path / "own.toml").write_text(f'{head}[[variant]]\nname = "own"\n{own}', encoding="utf-8")
+    campaign.run(study.load(tmp_path / "own.toml"), tmp_path / "own.h5", workers=1)
+    with ResultStore.open(tmp_path / "own.h5") as store:
+        own_study = paper_source.read(store)
+    assert own_study.joint.cross.r_b == 0.03
+    assert own_study.base.cross.r_b == 0.03641
+    assert (len(own_study.results), own_study.joints) == (42, 63)
+    assert own_study.main.couple[own_study.ideal(0.0)] == pytest.approx(100.0, rel=1e-5)
+    shown = context(own_study)
+    rows = {row.name: row.values for row in shown["equations"]["stiffness"] + shown["equations"]["contact"]}
+    assert rows["k_x [N/m]"][3:5] == (2.14e9, 1e9)
+    assert rows["k1u [N/m²]"][:2] == (7.5e13, 5e13)
+    assert shown["search"] is None
+    built = report.build(tmp_path / "own.h5")
+    page = Page()
+    page.feed(built.files[0].read_text(encoding="utf-8"))
+    assert "Does any choice" not in page.text
+    assert "7.5e+13" in page.text
+    assert "-0.0 " not in page.text

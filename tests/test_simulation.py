@@ -287,7 +287,7 @@ PROBE = """
 import numpy as np
 from tolstat import joint
 from tolstat.kernel import dynamics, simulate
-from tolstat.tables import Options
+from tolstat.tables import RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), joint.nominal_errors(1, operation))
 par = par.view(np.recarray)
@@ -323,7 +323,7 @@ def test_nothing_is_allocated_per_step():
 from numba.core.runtime import _nrt_python, rtsys
 _nrt_python.memsys_enable_stats()
 work, state, ring = simulate.make_scratch(Options())
-out = simulate.make_results(1)
+out = np.zeros(1, RESULT).view(np.recarray)
 counts = []
 for revolutions in (2, 2, 4):
     before = rtsys.get_allocation_stats().alloc

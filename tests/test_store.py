@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import errno
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +18,7 @@ import tolstat
 from tests import fakes, format_tables
 from tolstat import campaign, tables
 from tolstat.errors import StoreError
-from tolstat.store import Counts, ResultStore
+from tolstat.store import Counts, ResultStore, provenance
 from tolstat.tables import Simulation, Status
 
 
@@ -63,7 +66,7 @@ def test_attributes_tell_where_the_numbers_come_from(tmp_path: Path, study: fake
         assert store.sampling["seed"] == study.seed
         assert store.limits == {"cross1.F": 700.0}
         assert store.versions["tolstat"] == tolstat.__version__
-        assert {"python", "numpy", "numba", "scipy", "h5py"} <= store.versions.keys()
+        assert {"sources", "python", "numpy", "numba", "scipy", "h5py"} <= store.versions.keys()
         assert store.created.endswith("+00:00")
 
 
@@ -110,7 +113,7 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
 def test_counts(tmp_path: Path, study: fakes.Study) -> None:
     rows = np.arange(4)
     part = simulation(study, rows)
-    part.results["status"] = [Status.OK, Status.NOT_SETTLED, Status.NOT_FINITE, Status.NEWTON_FAILED]
+    part.results["status"] = [Status.OK, Status.NOT_SETTLED, Status.NOT_FINITE, Status.OUTSIDE_MODEL]
     with new_store(tmp_path / "a.h5", study) as store:
         store.write(rows, part)
         assert store.counts() == Counts(total=12, done=4, not_settled=1, failed=2)
@@ -136,48 +139,44 @@ def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
     assert not (changed & ~may_change).any()
 
 
-def test_finished_file_holds_the_histories(tmp_path: Path, study: fakes.Study) -> None:
-    path, rows = tmp_path / "a.h5", np.arange(12)
+def in_another_process(path: Path, code: str) -> str:
+    """Run code on a result file opened for writing as `store`; gives what it prints, or why it cannot be opened."""
+    program = (
+        "from tolstat.errors import StoreError\nfrom tolstat.store import ResultStore\n"
+        f"try:\n    with ResultStore.open({str(path)!r}, 'r+') as store: {code}\n"
+        "except StoreError as error: print(error)"
+    )
+    python, environment = [sys.executable, "-c", program], fakes.environment()
+    return subprocess.run(python, capture_output=True, text=True, check=True, env=environment).stdout
+
+
+def test_limits_are_replaced_whole_or_not_at_all(
+    tmp_path: Path, study: fakes.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.h5"
     with new_store(path, study) as store:
-        store.write(rows[5:], simulation(study, rows[5:]))
-        store.finish()
-        assert (tmp_path / "a.h5.parts").is_dir()
-        store.write(rows[:5], simulation(study, rows[:5]))
-        before = store.histories("loads")
-        store.finish()
-        store.finish()
-        assert not (tmp_path / "a.h5.parts").exists()
-        np.testing.assert_array_equal(store.histories("loads"), before)
-        picked = store.histories("mode", np.array([7, 2, 7]))
-    expected = simulation(study, rows).histories
-    np.testing.assert_array_equal(before, expected["loads"])
-    np.testing.assert_array_equal(picked, expected["mode"][[7, 2, 7]])
-    with h5py.File(path) as file:
-        for name, spec in fakes.SPECS.items():
-            dataset = file["histories"][name]
-            assert dataset.compression == "gzip"
-            assert dataset.attrs["units"] == spec.unit
-            np.testing.assert_array_equal(dataset[...], expected[name])
-    assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
+        store.write(np.arange(5), simulation(study, np.arange(5)))
+    before = path.read_bytes()
+    other = dataclasses.replace(study, limits={"fork1.T": 40.0}, text="# edited", name="b")
 
+    def full(*args: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-def test_rows_that_lost_their_histories_are_pending_again(tmp_path: Path, study: fakes.Study) -> None:
-    rows = np.arange(6)
-    with new_store(tmp_path / "a.h5", study) as store:
-        store.write(rows[:4], simulation(study, rows[:4]))
-        store.write(rows[4:], simulation(study, rows[4:]))
-    (tmp_path / "a.h5.parts" / "00000000.h5").unlink()
-    with ResultStore.open(tmp_path / "a.h5", "r+") as store:
-        assert np.flatnonzero(store.status()).tolist() == [4, 5]
-
-
-def test_a_damaged_part_is_named(tmp_path: Path, study: fakes.Study) -> None:
-    with new_store(tmp_path / "a.h5", study) as store:
-        store.write(np.arange(4), simulation(study, np.arange(4)))
-    part = tmp_path / "a.h5.parts" / "00000000.h5"
-    part.write_bytes(b"nothing")
-    with pytest.raises(StoreError, match=r"00000000.h5: is damaged\n  hint: delete it"):
-        ResultStore.open(tmp_path / "a.h5", "r+")
+    with ResultStore.open(path, "r+") as store, monkeypatch.context() as patch:
+        patch.setattr("os.replace", full)
+        store.judge_by(study)
+        with pytest.raises(StoreError, match=r"cannot be replaced: No space left on device\n  hint: make room"):
+            store.judge_by(other)
+        assert store.limits == study.limits
+    assert path.read_bytes() == before
+    with ResultStore.open(path, "r+") as store:
+        store.judge_by(other)
+        assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
+    with ResultStore.open(path) as store:
+        assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
+        assert store.identity == study.identity()
+        assert store.errors().tobytes() == fakes.draw(study).tobytes()
+        assert store.counts().done == 5
 
 
 @pytest.mark.parametrize(
@@ -233,18 +232,13 @@ def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> Non
 
 def test_one_writer_and_any_readers(tmp_path: Path, study: fakes.Study) -> None:
     path = tmp_path / "a.h5"
-    code = (
-        "import sys; from tolstat.store import ResultStore; from tolstat.errors import StoreError\n"
-        f"with ResultStore.open({str(path)!r}) as store: print(store.counts().done)\n"
-        f"try: ResultStore.open({str(path)!r}, 'r+')\n"
-        "except StoreError as error: print(error)"
-    )
+    code = f"from tolstat.store import ResultStore\nprint(ResultStore.open({str(path)!r}).counts().done)"
     with new_store(path, study) as store:
         store.write(np.arange(5), simulation(study, np.arange(5)))
-        python = [sys.executable, "-c", code]
-        environment = fakes.environment()
-        answer = subprocess.run(python, capture_output=True, text=True, check=True, env=environment).stdout
-    assert answer.startswith(f"5\n{path}: is being written by another process\n  hint: ")
+        python, environment = [sys.executable, "-c", code], fakes.environment()
+        assert subprocess.run(python, capture_output=True, check=True, env=environment).stdout == b"5\n"
+        answer = in_another_process(path, "print('opened')")
+    assert answer.startswith(f"{path}: is being written by another process\n  hint: ")
 
 
 def test_create_replaces_nothing(tmp_path: Path, study: fakes.Study) -> None:
@@ -283,6 +277,21 @@ def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
     assert not (tmp_path / "a.h5").exists()
     counts = campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
     assert counts.done == 40
+
+
+def test_other_sources_of_the_same_version_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, package = tmp_path / "a.h5", tmp_path / "tolstat"
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    shutil.copytree(Path(tolstat.__file__).parent, package)
+    monkeypatch.setattr("tolstat.__file__", str(package / "__init__.py"))
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())  # the same code in another place
+    for name in ("kernel/contact.py", "joint/material.py", "tolerance.py"):
+        (package / name).write_text("# edited")
+        says = (
+            f"a.h5: was begun by other code\n    sources: hash .* in the file, {provenance.source_hash()} now\n  hint: "
+        )
+        with pytest.raises(StoreError, match=says):
+            campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
 
 
 def test_wrong_blocks_are_bugs(tmp_path: Path, study: fakes.Study) -> None:

@@ -127,7 +127,8 @@ def test_solver_defaults_are_those_of_the_kernel() -> None:
     changed = Solver(method="generalized_alpha", start="ramp", rho_inf=0.5).options()
     assert changed.method == tables.Method.GENERALIZED_ALPHA
     assert changed.start == tables.Start.RAMP
-    assert set(Solver.model_fields) == set(tables.Options._fields)
+    # the error control of tr_bdf2 is for systems of the user's own, see tolstat.integrate
+    assert set(Solver.model_fields) == set(tables.Options._fields) - {"rtol", "atol"}
 
 
 def test_number_of_joints_from_the_command_line(tmp_path: Path) -> None:

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import tolstat
 from tolstat.errors import Fault, InputError, StoreError
 from tolstat.executor import WorkerDied, available_workers, map_blocks
 from tolstat.progress import Reporter
 from tolstat.store import Counts, ResultStore
+from tolstat.store.provenance import versions
 from tolstat.tables import PARAM, HistorySpec, Options, Simulation
 
 if TYPE_CHECKING:
@@ -102,7 +102,8 @@ def run(
     study : Study
         The study.
     out : str or Path
-        Result file; made if it does not exist, otherwise its pending rows are done.
+        Result file; made if it does not exist, otherwise its pending rows are done, and limits, text and name of the
+        study taken over.
     workers : int, optional
         Processes; without it as many as there are cores. 1 computes in this process.
     block : int, optional
@@ -122,7 +123,7 @@ def run(
     InputError
         When `workers` or `block` is less than one.
     StoreError
-        When the file is of another study (it names the keys that differ) or cannot be used.
+        When the file is of another study or was begun by other code (it names what differs), or cannot be used.
     Interrupted
         When Ctrl-C was pressed.
     WorkerDied
@@ -203,6 +204,7 @@ def _create_or_resume(study: Study, path: Path, stages: Stages) -> ResultStore:
     store = ResultStore.open(path, "r+")
     try:
         _check_same(store, study)
+        store.judge_by(study)
     except StoreError:
         store.close()
         raise
@@ -211,12 +213,18 @@ def _create_or_resume(study: Study, path: Path, stages: Stages) -> ResultStore:
 
 def _check_same(store: ResultStore, study: Study) -> None:
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
-    version = store.versions["tolstat"]
-    if version != tolstat.__version__:
-        differing.append(f"tolstat: version {version} in the file, {tolstat.__version__} now")
+    found, remedy = "is the result file of another study", "use another --out, or delete the file"
+    if not differing:
+        began = f"commit {store.git_commit}" if store.git_commit else "the code that began it"
+        found, remedy = "was begun by other code", f"use another --out, or go on with {began}"
+    now = versions()
+    for name, noun in (("tolstat", "version"), ("sources", "hash")):
+        held = store.versions.get(name, "unknown")
+        if held != now[name]:
+            differing.append(f"{name}: {noun} {held} in the file, {now[name]} now")
     if differing:
-        found = "is the result file of another study\n    " + "\n    ".join(differing)
-        raise StoreError(str(Fault(str(store.path), found, "use another --out, or delete the file")))
+        lines = "\n    ".join([found, *differing])
+        raise StoreError(str(Fault(str(store.path), lines, remedy)))
 
 
 def _check_at_least_one(**numbers: int | None) -> None:

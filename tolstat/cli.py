@@ -174,7 +174,8 @@ def export(
 ) -> None:
     """Write all joints of a campaign as CSV.
 
-    One row a joint: its errors, then its results, in SI units. The first line names the columns, the second
+    One row a joint: its errors, then its results, in SI units; before them the case and variant that it is,
+    if the study lists its joints. The first line names the columns, the second
     gives their units: pandas reads it with header=[0, 1]. Joints that are pending or failed have their row
     too; what is not known is empty.
     """
@@ -199,7 +200,8 @@ def export(
 def report_command(
     file: ResultFile,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files; default that of FILE.")
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for the files, made if need be; default that of FILE."),
     ] = None,
 ) -> None:
     """Print and draw which loads are exceeded.
@@ -208,7 +210,11 @@ def report_command(
     study without limits gets the quantiles of every bushing load, a sweep its loads against the swept value.
     """
     from tolstat.report import build
+    from tolstat.store import ResultStore
 
+    if out is not None:
+        ResultStore.open(file).close()  # a file that cannot be read leaves no folder behind
+        _make_folder(out)
     _tell(build(file, out))
 
 
@@ -221,6 +227,14 @@ def _tell(report: Report) -> None:
     _say(report.notes)
     for path in report.files:
         _say(f"wrote {path}")
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        found = f"cannot be made a folder: {error.strerror or error}"
+        raise InputError([Fault(str(path), found, "name another folder with --out")]) from error
 
 
 def _announce_compilation() -> None:

@@ -119,9 +119,7 @@ def simulate_rows(
     rows = params.view(np.recarray)
     results = np.zeros(len(params), RESULT).view(np.recarray)
     specs = history_specs(options, histories, n_harmonics)
-    kept: dict[str, NDArray[Any]] = {
-        name: np.full((len(params), *s.shape), np.nan if s.dtype[0] == "f" else 0, s.dtype) for name, s in specs.items()
-    }
+    kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
     for i in range(len(params)):
         simulate_joint(rows[i], options, work, state, ring, results[i])
         if kept and results[i].status in (Status.OK, Status.NOT_SETTLED):

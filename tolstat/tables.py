@@ -35,11 +35,14 @@ class Status(IntEnum):
         return self.name.lower()
 
 
+FAILED = (Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL)
+"""States of a joint that has no results."""
+
 STATUS_TEXT = {
     Status.PENDING: "not simulated yet",
     Status.OK: "settled; results valid",
     Status.NOT_SETTLED: "closure error still above solver.settle_tol after solver.max_revs; results stored",
-    Status.NEWTON_FAILED: "a step failed at the smallest sub-step; results are NaN",
+    Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or the joint took too many; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
     Status.OUTSIDE_MODEL: "negative clearance (interference fit), |alpha| of 90 deg or more, no speed, or stiffness "
     "not positive: the model has no meaning there; results are NaN",
@@ -126,6 +129,11 @@ class HistorySpec(NamedTuple):
     dtype: str
     unit: str
     description: str
+
+    def blank(self, n: int) -> NDArray[Any]:
+        """Make the history of `n` joints that have none, (n, ...): NaN (0 for integers) throughout."""
+        dtype = np.dtype(self.dtype)
+        return np.full((n, *self.shape), np.nan if dtype.kind == "f" else 0, dtype)
 
 
 class Variant(NamedTuple):

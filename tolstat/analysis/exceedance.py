@@ -88,8 +88,9 @@ def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
     values : array_like, shape (n,)
         Load of each joint, any unit.
     status : array_like of int, shape (n,)
-        `tables.Status` of each joint. Pending joints are left out: when a joint is simulated has nothing
-        to do with its load. A value that is not finite counts as failed whatever its status.
+        `tables.Status` of each joint. Pending joints are left out: rows are simulated in their order, so that the
+        missing ones are the last, but for those in work, where hard joints take longer. A value that is not finite
+        counts as failed whatever its status.
 
     Returns
     -------

@@ -1,7 +1,8 @@
 """The tables of Cirelli, Rossi, Valentini and Pennestri (2021) against joints simulated here.
 
-The paper prints no sign with any error it reports, and neither direction nor sign of the errors it puts in. Each of its
-cases is therefore compared, by the modulus of Gamma, with every direction that a study runs, and the nearest is named.
+The paper prints no sign with any error it reports, though its eq. (14) has one, and neither direction nor sign of the
+errors it puts in. Each of its cases is therefore compared with every direction that a study runs, and the nearest is
+named: by the modulus of Gamma, and with its sign, as if each printed value were an increase.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ INPUT_SIDE = tuple(BUSHINGS.index(name) for name in ("cross3", "cross4", "fork1"
 CROSS, FORK = slice(0, 4), slice(4, 8)
 SAME_ALPHA = 1e-6
 """Misalignments (rad) that differ by less are the same."""
+TIE = 0.01
+"""Distances that differ by no more are a tie, percentage points."""
 
 
 class Printed(NamedTuple):
@@ -60,7 +63,10 @@ class Match(NamedTuple):
     case : str
         Its name, ``"Ang fork +z"``.
     distance : float
-        Mean of ``| |Gamma| - printed |`` over the sixteen loads, percentage points.
+        Mean of ``| |Gamma| - printed |`` over the sixteen loads, percentage points; of ``| Gamma - printed |`` where
+        signs were compared.
+    ties : tuple of str
+        Other directions that are no further away than `TIE` more.
     """
 
     printed: str
@@ -68,26 +74,7 @@ class Match(NamedTuple):
     row: int
     case: str
     distance: float
-
-
-class Distance(NamedTuple):
-    """How far a table is from the printed one, over its 32 entries.
-
-    Attributes
-    ----------
-    table : int
-        Number of the printed table; 0 stands for all four.
-    median, mean, worst : float
-        Of the absolute differences, percentage points.
-    correlation : float
-        Spearman's rank correlation.
-    """
-
-    table: int
-    median: float
-    mean: float
-    worst: float
-    correlation: float
+    ties: tuple[str, ...] = ()
 
 
 def printed() -> Printed:
@@ -138,12 +125,17 @@ def covers(cases: tuple[str, ...], alpha: Array) -> bool:
     return has_alpha and all(directions(name, cases) for name in table.cases)
 
 
-def misfit(value: Array, target: Array) -> Array:
-    """Mean of ``| |value| - target |`` over the last two axes (bushing, load), percentage points."""
-    return np.asarray(np.abs(np.abs(value) - target).mean(axis=(-2, -1)))
+def misfit(value: Array, target: Array, signed: bool = False) -> Array:
+    """Mean over the last two axes (bushing, load) of ``| |value| - target |``, percentage points.
+
+    With `signed` of ``| value - target |``: what is printed without a sign is then an increase.
+    """
+    return np.asarray(np.abs((value if signed else np.abs(value)) - target).mean(axis=(-2, -1)))
 
 
-def nearest(value: Array, case: NDArray[np.int32], alpha: Array, cases: tuple[str, ...]) -> list[Match]:
+def nearest(
+    value: Array, case: NDArray[np.int32], alpha: Array, cases: tuple[str, ...], signed: bool = False
+) -> list[Match]:
     """Direction nearest to each printed case at each misalignment.
 
     Parameters
@@ -156,6 +148,8 @@ def nearest(value: Array, case: NDArray[np.int32], alpha: Array, cases: tuple[st
         Misalignment of each row, rad.
     cases : tuple of str
         Names of the cases.
+    signed : bool
+        Compare Gamma with its sign, as eq. (14) has it; else its modulus.
 
     Returns
     -------
@@ -166,10 +160,13 @@ def nearest(value: Array, case: NDArray[np.int32], alpha: Array, cases: tuple[st
     for a, angle in enumerate(table.alpha):
         for c, name in enumerate(table.cases):
             rows = np.flatnonzero(np.isin(case, directions(name, cases)) & (np.abs(alpha - angle) < SAME_ALPHA))
-            far = misfit(value[rows], table.gamma[c, a])
+            far = misfit(value[rows], table.gamma[c, a], signed)
             if np.isfinite(far).any():
                 best = int(np.nanargmin(far))
-                found.append(Match(name, float(angle), int(rows[best]), cases[case[rows[best]]], float(far[best])))
+                close = [k for k in np.flatnonzero(far <= far[best] + TIE) if k != best]
+                ties = tuple(cases[case[rows[k]]] for k in close)
+                direction = cases[case[rows[best]]]
+                found.append(Match(name, float(angle), int(rows[best]), direction, float(far[best]), ties))
             else:
                 found.append(Match(name, float(angle), -1, "", float("nan")))
     return found
@@ -184,30 +181,3 @@ def tabulated(value: Array, matches: list[Match]) -> Array:
             a = int(np.argmin(np.abs(table.alpha - match.alpha)))
             out[table.cases.index(match.printed), a] = value[match.row]
     return out
-
-
-def distances(computed: Array) -> list[Distance]:
-    """Distance of Tables 4 to 7, and of all four together (table 0, the last).
-
-    Parameters
-    ----------
-    computed : ndarray, shape (4, 2, 8, 2)
-        As `tabulated` gives it; compared by its modulus.
-    """
-    table = printed()
-    found = []
-    for column, part in enumerate((CROSS, FORK)):
-        for a in range(len(table.alpha)):
-            number = int(table.tables[a, column])
-            found.append(_distance(number, computed[:, a, part], table.gamma[:, a, part]))
-    return [*sorted(found), _distance(0, computed, table.gamma)]
-
-
-def _distance(number: int, value: Array, target: Array) -> Distance:
-    from scipy.stats import spearmanr
-
-    x, y = np.abs(value).ravel(), target.ravel()
-    apart = np.abs(x - y)
-    constant = np.ptp(x) == 0.0  # no rank correlation with a table of equal entries
-    rank = float("nan") if constant else float(spearmanr(x, y).statistic)
-    return Distance(number, float(np.median(apart)), float(apart.mean()), float(apart.max()), rank)

@@ -8,7 +8,9 @@ axis along pins 3 and 4 and the y axis along pins 1 and 2 that leaves, with t th
     t1 = t2,    t3 = t4,    a1 + a2 + a3 + a4 = 0,    r_b (t1 + t2) + T1z + T2z = r_b (t3 + t4) + T3z + T4z = T_r.
 
 Equal tangential forces leave it to axial ones to make F1 and F2 differ. How large they can be follows from what
-the paper prints of the four pins itself: F^2 = t^2 + a^2 + f^2, f the centrifugal force, and |Tz| <= T.
+the paper prints of the four pins itself: F^2 = t^2 + a^2 + f^2, f the centrifugal force, and |Tz| <= T. The bound
+refers to the loads of an ideal joint, hence to r_b and R, which the paper does not print: `exclusions` runs it over
+many.
 """
 
 from __future__ import annotations
@@ -87,6 +89,58 @@ def contradictions(ideal: Loads) -> list[Contradiction]:
     """
     table = printed()
     return [_test(name, table.gamma[c, 0, :4], ideal) for c, name in enumerate(table.cases)]
+
+
+class Exclusion(NamedTuple):
+    """The bound of one printed line over joints that differ in what the paper does not print.
+
+    Attributes
+    ----------
+    case : str
+        Printed case.
+    high : float
+        Larger printed Gamma_F of cross bushings 1 and 2, per cent.
+    allowed : tuple of float
+        Smallest and largest bound of all joints, per cent.
+    excluded, joints : int
+        How many joints exclude the printed pair; how many there are.
+    out, room : tuple of float
+        Range of ``r_b / R`` of the joints that exclude it, and of those that leave room; NaN for none.
+    """
+
+    case: str
+    high: float
+    allowed: tuple[float, float]
+    excluded: int
+    joints: int
+    out: tuple[float, float]
+    room: tuple[float, float]
+
+
+def exclusions(ideals: list[Loads], ratio: Array) -> list[Exclusion]:
+    """Test Table 4 with each of several joints.
+
+    Parameters
+    ----------
+    ideals : list of Loads
+        The joints, without errors at alpha = 0.
+    ratio : ndarray, shape (k,)
+        ``r_b / R`` of each: the share of the contact's lever that the bushing sees.
+    """
+    found = [contradictions(ideal) for ideal in ideals]
+    lines = []
+    for c, name in enumerate(printed().cases):
+        own = [joint[c] for joint in found]
+        out = np.array([not line.possible for line in own])
+        bounds = [line.allowed for line in own]
+        span = (min(bounds), max(bounds))
+        ranges = (_range(ratio[out]), _range(ratio[~out]))
+        lines.append(Exclusion(name, own[0].high, span, int(out.sum()), len(own), *ranges))
+    return lines
+
+
+def _range(values: Array) -> tuple[float, float]:
+    return (float(values.min()), float(values.max())) if values.size else (float("nan"), float("nan"))
 
 
 def _test(case: str, gamma: Array, ideal: Loads) -> Contradiction:

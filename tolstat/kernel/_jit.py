@@ -6,6 +6,7 @@ cache directory therefore carries a hash of all kernel sources: code compiled fr
 
 from __future__ import annotations
 
+import getpass
 import hashlib
 import os
 import tempfile
@@ -39,8 +40,16 @@ def cache_directory() -> str:
             return str(path)
     except OSError:
         pass  # a read-only home: compile into the temporary directory instead
-    path = Path(tempfile.gettempdir()) / f"tolstat-{os.getuid()}-kernel-{source_hash()}"
-    path.mkdir(parents=True, exist_ok=True)
+    return _temporary_directory()
+
+
+def _temporary_directory() -> str:
+    """Directory for compiled code that nobody else can write to: Numba trusts what it finds there."""
+    path = Path(tempfile.gettempdir()) / f"tolstat-{getpass.getuser()}-kernel-{source_hash()}"
+    path.mkdir(mode=0o700, parents=True, exist_ok=True)
+    status = path.stat()
+    if hasattr(os, "getuid") and (status.st_uid != os.getuid() or status.st_mode & 0o077):
+        return tempfile.mkdtemp(prefix="tolstat-kernel-")
     return str(path)
 
 

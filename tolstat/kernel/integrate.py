@@ -2,7 +2,7 @@
 
 `build_integrator` binds the equations of any system to one Newton iteration and one stepping scheme. A method is a file
 with `predict` (write a trial point that obeys the method's formulas, return how velocity and acceleration follow the
-unknowns) and `accept` (remember what the next step needs).
+unknowns) and, where it remembers more than the last points, what it does when a stage or a step is accepted.
 
 The output grid is kept: a step that Newton cannot solve, or whose estimated error is above the tolerance where the
 method has an estimate, is halved, at most ``options.max_halvings`` times; steps grow again by factors of two where the

@@ -12,7 +12,7 @@ from tolstat.kernel.settle import Ring, closure_error, make_ring, record, summar
 from tolstat.kernel.state import HALVINGS, ITERATIONS, STEPS, State, make_state
 from tolstat.kernel.topology import N_DOF, N_LUMPS, PSI
 from tolstat.kernel.work import make_work
-from tolstat.tables import RESULT, Options, Start, Status
+from tolstat.tables import Options, Start, Status
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
 NOT_FINITE, OUTSIDE_MODEL = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL)
@@ -137,7 +137,7 @@ def simulate_joint(par, options, work, state, ring, out):
         for b in range(8):
             if not (out.F_max[b] < 1e300 and out.T_max[b] < 1e300):
                 status = NOT_FINITE
-    if status == NOT_FINITE:
+    if status not in (OK, NOT_SETTLED):
         clear_results(out)
     out.status = status
     out.settled = status == OK
@@ -157,8 +157,3 @@ class Scratch(NamedTuple):
 def make_scratch(options: Options) -> Scratch:
     """Allocate the work arrays of a process."""
     return Scratch(make_work(), make_state(N_DOF), make_ring(options.steps_per_rev))
-
-
-def make_results(n: int) -> np.recarray:
-    """Table of `n` results, status PENDING."""
-    return np.zeros(n, RESULT).view(np.recarray)

@@ -136,7 +136,8 @@ def _curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple
         top = levels.size - np.geomspace(1, levels.size, most // 2).round().astype(int)
         even = np.linspace(0, levels.size - 1, most // 2).round().astype(int)
         levels = levels[np.union1d(top, even)]
-    return exceedance.curve(values, status, levels, confidence, campaign.iid), unit
+    below = np.nextafter(levels[:1], -np.inf)  # where every valid joint is above
+    return exceedance.curve(values, status, np.concatenate([below, levels]), confidence, campaign.iid), unit
 
 
 def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: float) -> None:
@@ -188,13 +189,15 @@ def _range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, flo
 
 
 def _steps(ax: Axes, table: NDArray[np.void], i: int, low: float, floor: float) -> None:
-    """Draw one curve with its bands; the share is constant from each level to the next."""
-    x = np.concatenate([[low], table["level"]])
+    """Draw one curve with its bands as steps; its first row is drawn from the left edge `low` on."""
+    if not table.size:
+        return
+    x = np.concatenate([[low], table["level"][1:]])
     colour = style.COLOURS[i]
 
     def steps(field: str) -> NDArray[np.float64]:
-        shares: NDArray[np.float64] = np.concatenate([[1.0], table[field]])
-        return shares.clip(1e-3 * floor, 1.0)
+        shares: NDArray[np.float64] = table[field].clip(1e-3 * floor, 1.0)
+        return shares
 
     def band(lower: str, upper: str, alpha: float) -> None:
         ax.fill_between(x, steps(lower), steps(upper), step="post", color=colour, alpha=alpha, lw=0)

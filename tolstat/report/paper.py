@@ -13,13 +13,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import tolstat
-from tolstat.analysis import paper, paper_choices
+from tolstat.analysis import paper, paper_choices, paper_distances
 from tolstat.files import writing
-from tolstat.report import paper_checks, paper_choices_figures, paper_curves, style, text
-from tolstat.report.paper_source import PaperStudy, revolutions
+from tolstat.report import paper_checks, paper_choices_figures, paper_curves, paper_equations, style, text
+from tolstat.report.paper_main import revolutions
+from tolstat.report.paper_source import PaperStudy
 from tolstat.tables import BUSHINGS
 
 DPI = 110
+REPRODUCED = 0.5
+"""Mean distance at which a joint would be said to give the printed tables, percentage points."""
+KEYS = {"contact.D_P": "clearance", "cross.R": "R", "cross.r_b": "r_b", "arm.l_f": "fork lever"}
 
 
 class Cell(NamedTuple):
@@ -31,10 +35,11 @@ class Cell(NamedTuple):
 
 
 class Line(NamedTuple):
-    """One line of a table: printed case, direction that comes nearest, mean distance, entries F and T by bushing."""
+    """One line of a table: printed case, direction that comes nearest, ties, mean distance, entries F, T by bushing."""
 
     case: str
     direction: str
+    ties: tuple[str, ...]
     distance: float
     cells: list[Cell]
 
@@ -54,7 +59,7 @@ class Alternative(NamedTuple):
     name: str
     values: str
     objective: float
-    distances: list[paper.Distance]
+    distances: list[paper_distances.Distance]
     cases: str
     settled: str
 
@@ -81,26 +86,53 @@ def write(study: PaperStudy, path: Path) -> None:
 def context(study: PaperStudy) -> dict[str, Any]:
     """Everything that the template shows."""
     angles = [float(a) for a in paper.printed().alpha]
-    best = min((f for f in study.fits if np.isfinite(f.objective)), key=lambda fit: fit.objective)
     return {
         "study": study,
         "version": tolstat.__version__,
-        "joints": len(study.results),
-        "answers": study.answers(),
+        "answers": study.answers,
+        "laws": study.laws,
         "grids": grids(study),
-        "distances": paper.distances(study.computed),
+        "distances": paper_distances.distances(study.computed),
+        "signed": signed(study),
+        "signed_distances": paper_distances.distances(paper.tabulated(study.main.gamma, study.signed), signed=True),
         "contradictions": study.contradictions(),
+        "exclusions": study.exclusions(),
         "alternatives": [alternative(study, v) for v in singles(study)],
-        "best": alternative(study, best.variant),
-        "searched": len(study.searched()[0]),
+        "search": search(study),
         "no_effect": paper_choices.no_effect(),
-        "misprints": paper_checks.misprints(study.joint),
-        "stiffness": paper_checks.stiffness(study.joint),
-        "contact": paper_checks.contact(study.joint),
-        "fit_load": paper_checks.hertz(study.joint)[0],
-        "mobility": paper_checks.mobility(study),
-        "linkage": paper_checks.linkage(study),
+        "misprints": paper_checks.misprints(study),
+        "equations": equations(study),
         "figures": figures(study, angles),
+    }
+
+
+def equations(study: PaperStudy) -> dict[str, Any]:
+    """Equations and Tables 1 to 3."""
+    joint, of = study.joint, paper_equations
+    tables = {"elastic": of.elastic(joint), "contact": of.contact(joint), "stiffness": of.stiffness(joint)}
+    values = {"bushings": of.bushings(joint), "ratios": of.ratios(study), "damping": of.damping(study)}
+    linkages = {"mobility": of.mobility(study), "linkage": of.linkage(study)}
+    return {"fit_load": of.hertz(joint)[0], "xi": joint.bushing.xi} | tables | values | linkages
+
+
+def signed(study: PaperStudy) -> list[tuple[paper.Match, paper.Match]]:
+    """Nearest direction of each printed case by the modulus of Gamma, and with its sign."""
+    return list(zip(study.matches, study.signed, strict=True))
+
+
+def search(study: PaperStudy) -> dict[str, Any] | None:
+    """What the search came to; None where the study has none."""
+    members, keys = study.searched()
+    if not members:
+        return None
+    best = min((f for f in study.fits if np.isfinite(f.objective)), key=lambda fit: fit.objective)
+    laws = list(dict.fromkeys(str(study.variants[v].values.get("contact.law", "")) for v in members))
+    return {
+        "joints": len(members),
+        "keys": [KEYS.get(key, key) for key in keys] + (["contact law"] if len(laws) > 1 else []),
+        "best": alternative(study, best.variant),
+        "found": best.objective <= REPRODUCED,
+        "own": next(f.objective for f in study.fits if f.variant == 0),
     }
 
 
@@ -138,7 +170,8 @@ def grids(study: PaperStudy) -> list[Grid]:
             for c, case in enumerate(table.cases):
                 match = next(m for m in study.matches if m.printed == case and abs(m.alpha - alpha) < paper.SAME_ALPHA)
                 pairs = zip(table.gamma[c, a, part].flat, study.computed[c, a, part].flat, strict=True)
-                lines.append(Line(case, match.case, match.distance, [_cell(float(p), float(x)) for p, x in pairs]))
+                cells = [_cell(float(p), float(x)) for p, x in pairs]
+                lines.append(Line(case, match.case, match.ties, match.distance, cells))
             title = f"{'cross' if column == 0 else 'fork'} bushings, α = {np.degrees(alpha):.0f}°"
             found.append(Grid(int(table.tables[a, column]), title, list(BUSHINGS[part]), lines))
     return sorted(found)
@@ -163,7 +196,7 @@ def alternative(study: PaperStudy, variant: int) -> Alternative:
     done = turns[np.isfinite(turns)]
     settled = f"{done.size} of {turns.size}, most {done.max(initial=0.0):.1f} rev"
     values = ", ".join(_value(key, value) for key, value in study.variants[variant].values.items() if value is not None)
-    distances = paper.distances(paper.tabulated(study.gamma[here], found))
+    distances = paper_distances.distances(paper.tabulated(study.gamma[here], found))
     family = study.families[variant]
     return Alternative(family, values or "the joint file", fit.objective, distances, ", ".join(fit.cases), settled)
 
@@ -176,6 +209,7 @@ def _value(key: str, value: Any) -> str:
 
 
 def _number(value: float, form: str) -> str:
+    """A number, a dash where there is none, and never a minus before zero."""
     if not np.isfinite(value):
         return "–"
     text = form % value
@@ -193,10 +227,10 @@ def _picture(figure: Figure) -> str:
 def summary(study: PaperStudy) -> str:
     """Text for standard output: distances of the tables, then the answers."""
     rows = [["table", "median", "mean", "worst", "rank correlation"]]
-    for d in paper.distances(study.computed):
+    for d in paper_distances.distances(study.computed):
         values = [f"{x:.2f}" for x in (d.median, d.mean, d.worst, d.correlation)]
-        rows.append([f"Table {d.table}" if d.table else "all four", *values])
-    said = [f"{'yes' if a.yes else 'no ':3}  {a.claim}\n     {a.figures}" for a in study.answers()]
+        rows.append([d.label, *values])
+    said = [f"{'yes' if a.yes else 'no ':3}  {a.claim}\n     {a.figures}" for a in study.answers]
     head = "|Gamma| against the printed tables, nearest directions, percentage points"
     return "\n".join([head, text.align(rows), "", *said])
 

@@ -1,4 +1,4 @@
-"""Equations and tables of the paper that need no simulation: mobility, stiffness, contact, printed constants."""
+"""Printed values that the paper's own formulas or its other values contradict, and what each does to the results."""
 
 from __future__ import annotations
 
@@ -7,21 +7,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat import rccc
 from tolstat.analysis import paper
-from tolstat.joint import Joint, material
+from tolstat.joint import material
+from tolstat.report.paper_main import revolutions
 from tolstat.report.paper_source import PaperStudy
 
-PRINTED_RHO = 7.70e-6
-"""Density as printed beside eq. (7)."""
-PRINTED_KD, PRINTED_CD = 38.1, 3.71e8
-FIT_LOAD, H, XI = 20e3, 6.9, 0.05
-"""Load range of the fit (N), ratio of eq. (4) and damping ratio of eq. (7) where a joint file gives none."""
-MOBILITY_POSES = 24
+E, NU, RHO = 210e9, 0.28, 7700.0
+"""Steel: Table 1, and the density below eq. (7) with its unit mended; SI."""
+PRINTED_RHO, PRINTED_KD, PRINTED_CD = 7.70e-6, 38.1, 3.71e8
+PIN_L, PIN_A, PIN_J, PIN_MASS, XI = 36.41e-3, 11.34e-4, 1.02e-7, 0.32, 0.05
+"""The pin below eq. (7): length, section, area moment, mass (SI), damping ratio."""
+D_H, D_P = 76.2e-3, 76.0e-3
+"""Diameters below eq. (3), m."""
 
 
-class Check(NamedTuple):
-    """A printed value beside what its formula gives.
+class Misprint(NamedTuple):
+    """A printed value beside what it should be.
 
     Attributes
     ----------
@@ -30,140 +31,119 @@ class Check(NamedTuple):
     printed, computed : str
         With units.
     remark : str
-        What is wrong, or that it agrees.
+        What is wrong.
+    effect : str
+        What it does to the results of the study.
     """
 
     what: str
     printed: str
     computed: str
     remark: str
+    effect: str
 
 
-class Linkage(NamedTuple):
-    """A joint beside its RCCC linkage, over a revolution.
-
-    Attributes
-    ----------
-    case : str
-        Errors.
-    alpha : float
-        Misalignment, rad.
-    psi_rigid, psi_flexible : float
-        Largest |Psi|.
-    couple_rigid, couple_flexible : float
-        Largest couple about the cross's normal, N m.
-    """
-
-    case: str
-    alpha: float
-    psi_rigid: float
-    psi_flexible: float
-    couple_rigid: float
-    couple_flexible: float
-
-
-def misprints(joint: Joint) -> list[Check]:
-    """Printed values that their own formulas or the other values contradict, computed with the joint's numbers."""
-    steel, pin, contact = joint.material, joint.pin, joint.contact
-    diameter = math.sqrt(4.0 * pin.A / math.pi)
-    k_d, c_e = material.diameter_factor(contact.D_H, contact.D_P), material.compliance_factor(steel.E, steel.nu)
-    mass = pin.mass or steel.rho * pin.A * pin.l
-    damping = [
-        material.contact_damping(contact.xi or XI, mass, length=pin.l, A=pin.A, J=pin.J, E=steel.E, rho=rho)
-        for rho in (steel.rho, PRINTED_RHO)
-    ]
-    gap = contact.D_H - contact.D_P
-    share = 100.0 * gap / contact.D_H
+def misprints(study: PaperStudy) -> list[Misprint]:
+    """Printed values that cannot be right, computed with the other printed values; effects are those of the study."""
+    diameter = math.sqrt(4.0 * PIN_A / math.pi)
+    k_d, c_e = material.diameter_factor(D_H, D_P), material.compliance_factor(E, NU)
+    damping = [contact_damping(rho) for rho in (RHO, PRINTED_RHO)]
+    gap = D_H - D_P
+    percent = [2.0 * 1e3 * 0.01 * d for d in (diameter, D_P)]
     return [
-        Check(
-            "c of the springs, below eq. (7)",
-            f"{PRINTED_CD:.2e} N s/m",
-            f"{damping[0]:.3g} N s/m with ρ = {steel.rho:g} kg/m³; {damping[1]:.3g} with {PRINTED_RHO:g} as printed",
-            f"ρ is per mm³: too large by √10⁹ = {math.sqrt(1e9):.0f}",
+        Misprint(
+            "ρ, and with it c of the springs, below eq. (7)",
+            f"{PRINTED_RHO:.2e} kg m³, {PRINTED_CD:.2e} N s/m",
+            f"{damping[0]:.3g} N s/m with ρ = {RHO:g} kg/m³; {damping[1]:.3g} with {PRINTED_RHO:g} as printed",
+            f"ρ is per mm³: c is too large by √10⁹ = {math.sqrt(1e9):.0f}",
+            damping_effect(study),
         ),
-        Check("K_D, Table 1", f"{PRINTED_KD} (no unit)", f"{1e3 * k_d:.0f} mm", "half of D_H stands in its place"),
-        Check("C_E, Table 1", "9·10⁻¹² 1/GPa", f"{c_e:.3g} 1/Pa", "the number is per Pa"),
-        Check(
-            "pin diameter, below eq. (3)",
-            f"{1e3 * contact.D_P:g} mm",
-            f"{1e3 * diameter:.1f} mm from A = {1e4 * pin.A:g} cm²",
+        Misprint(
+            "K_D, Table 1",
+            f"{PRINTED_KD} (no unit)",
+            f"{1e3 * k_d:.0f} mm",
+            "half of D_H stands in its place",
+            "none: Table 2 is printed and goes with the formula's K_D",
+        ),
+        Misprint("C_E, Table 1", "9·10⁻¹² 1/GPa", f"{c_e:.3g} 1/Pa", "the number is per Pa", "none"),
+        Misprint(
+            "D_H and D_P, below eq. (3)",
+            f"{1e3 * D_H:g} and {1e3 * D_P:g} mm",
+            f"{1e3 * diameter:.1f} mm from A = {1e4 * PIN_A:g} cm²",
             f"A and J are those of a {1e3 * diameter:.0f} mm pin: diameters are doubled",
+            clearance_effect(study, 0.25 * gap, "half the clearance"),
         ),
-        Check(
+        Misprint(
             "clearance, below eq. (4)",
             "2 % of the diameter",
-            f"{1e3 * gap:.2g} mm, {share:.2f} %",
-            f"2 % is {20.0 * diameter:.2f} mm of the one pin, {20.0 * contact.D_P:.2f} mm of the other",
+            f"{1e3 * gap:.2g} mm, {100.0 * gap / D_H:.2f} %",
+            f"2 % is {percent[0]:.2f} mm of the one pin, {percent[1]:.2f} mm of the other",
+            clearance_effect(study, 0.5e-3 * percent[0], f"{percent[0]:.2f} mm"),
         ),
-        Check(
+        Misprint(
             "J of the pin, below eq. (7)",
             "1.02·10⁻⁷ m⁻⁴",
             f"{math.pi * diameter**4 / 64.0:.3g} m⁴",
             "sign of the exponent",
+            "none",
+        ),
+        Misprint(
+            "where errors sit, section 4",
+            "“cross bushing 2”, “output fork bushing 2”",
+            "pin 1 and the hole that takes it",
+            "Figure 10 and the rest of the text say so; in Table 6 bushing 4 moves with cross bushing 1",
+            "none: runs follow Figure 10",
         ),
     ]
 
 
-def stiffness(joint: Joint) -> list[tuple[str, float, float, float, float]]:
-    """Table 3: name; printed and computed stiffness of a cross bushing, then of a fork bushing (N/m, N m/rad)."""
-    given = (joint.bushing.cross, joint.bushing.fork)
-    beams = (joint.pin.beam(joint.material), joint.arm.beam(joint.material))
-    rows = []
-    for name in ("k_x", "k_y", "k_z", "k_bx", "k_by", "k_tz"):
-        values = []
-        for table, beam in zip(given, beams, strict=True):
-            values += [float("nan") if table is None else float(getattr(table, name)), float(getattr(beam, name))]
-        rows.append((name, *values))
-    return [(str(r[0]), float(r[1]), float(r[2]), float(r[3]), float(r[4])) for r in rows]
+def omega(rho: float) -> float:
+    """First circular frequency of the pin, eq. (6), with a density (kg/m^3); rad/s."""
+    return (math.pi / PIN_L) ** 2 * math.sqrt(E * PIN_J / (rho * PIN_A))
 
 
-def hertz(joint: Joint) -> tuple[float, float]:
-    """Load range of the fit (N), and H of eq. (4)."""
-    return joint.contact.fit_load or FIT_LOAD, joint.contact.H or H
+def contact_damping(rho: float) -> float:
+    """Damping of a contact, eqs. (6)-(7), of the printed pin with a density (kg/m^3); N s/m."""
+    return material.contact_damping(XI, PIN_MASS, length=PIN_L, A=PIN_A, J=PIN_J, E=E, rho=rho)
 
 
-def contact(joint: Joint) -> list[tuple[str, float, float]]:
-    """Table 2: name; coefficient of the joint file and fitted to eq. (3) (N/m^2, N/m)."""
-    of, steel = joint.contact, joint.material
-    load, ratio = hertz(joint)
-    fit = material.fit_contact(load, of.z, of.D_H, of.D_P, steel.E, steel.nu)
-    fitted = (*fit, *material.point_coefficients(*fit, ratio))
-    return list(zip(("k1u", "k2u", "k1p", "k2p"), of.stiffness(steel), fitted, strict=True))
+def damping_effect(study: PaperStudy) -> str:
+    """What c_d as printed does: revolutions to settle, and the largest change of a load."""
+    rows, main = study.as_printed(), study.main
+    turns, own = revolutions(study.results[rows]), revolutions(main.results)
+    if not np.isfinite(turns).any():
+        return "not run"
+    changes = []
+    for row in rows[np.isfinite(turns)]:
+        same = np.abs(main.alpha - study.alpha[row]) < paper.SAME_ALPHA
+        (twin,) = np.flatnonzero((main.case == study.case[row]) & same)
+        pairs = [(study.results[name][row], main.results[name][twin]) for name in ("F_max", "T_max")]
+        changes.append(max(float(np.abs(new / old - 1.0).max()) for new, old in pairs))
+    lost = int(np.isinf(turns).sum())
+    text = f"joints settle in up to {turns[np.isfinite(turns)].max():.1f} instead of {own.max():.1f} revolutions"
+    text += f" ({lost} do not settle)" if lost else ""
+    return f"{text}; largest loads change by up to {100.0 * max(changes):.1f} %"
 
 
-def mobility(study: PaperStudy) -> list[tuple[str, str, int, int, str, str]]:
-    """Eq. (1): pairs, errors, count, equations, ranks of the Jacobian over the revolution, degrees of freedom."""
-    theta = np.arange(MOBILITY_POSES) * (2.0 * np.pi / MOBILITY_POSES) + 0.1
-    rows = []
-    bent = float(study.main.alpha.max())
-    match = next(m for m in study.matches if m.printed.startswith("Ang") and m.alpha == bent)
-    for pairs in ("RRRR", "RCCC"):
-        for row, name in ((study.ideal(bent), "ideal"), (match.row, match.case)):
-            found = rccc.mobility(rccc.solve(study.joint, study.main.errors[row], theta).lines, pairs)
-            rows.append((pairs, name, found.kutzbach, found.equations, _span(found.rank), _span(found.dof)))
-    return rows
+def clearance_effect(study: PaperStudy, radial: float, words: str) -> str:
+    """Largest changes of a load with another radial clearance (m), from the joint of the sweep that comes nearest."""
+    hole = study.joint.contact.D_H
+    found = [s for s in study.sweeps() if s.key == "contact.D_P"]
+    if not found:
+        return "not run"
+    gaps = 0.5 * (hole - found[0].values)
+    nearest = int(np.argmin(np.abs(gaps - radial)))
+    parts = []
+    for word in ("Pos", "Ang"):
+        numbers = [i for i, name in enumerate(study.cases) if name.startswith(word)]
+        before = _largest(study, 0, numbers)
+        after = _largest(study, int(found[0].variants[nearest]), numbers)
+        force, torque = (f"{old:.1f} → {new:.1f} %" for old, new in zip(before, after, strict=True))
+        parts.append(f"{word} {force} of force, {torque} of torque")
+    return f"{words} (radially {1e3 * gaps[nearest]:.2f} mm run): {'; '.join(parts)}"
 
 
-def linkage(study: PaperStudy) -> list[Linkage]:
-    """Ideal joint and nearest directions beside the rigid linkage without clearance."""
-    rows = []
-    for alpha in paper.printed().alpha:
-        own = [m.row for m in study.matches if abs(m.alpha - alpha) < paper.SAME_ALPHA and m.row >= 0]
-        for row in (study.ideal(float(alpha)), *own):
-            rigid = rccc.solve(study.joint, study.main.errors[row], study.main.theta)
-            rows.append(
-                Linkage(
-                    study.cases[study.main.case[row]],
-                    float(alpha),
-                    float(np.abs(rigid.psi).max()),
-                    float(study.main.results["psi_max"][row]),
-                    float(rigid.couple.max()),
-                    float(np.abs(study.main.couple[row]).max()),
-                )
-            )
-    return rows
-
-
-def _span(values: np.ndarray[tuple[int], np.dtype[np.int64]]) -> str:
-    low, high = int(values.min()), int(values.max())
-    return str(low) if low == high else f"{low} to {high}"
+def _largest(study: PaperStudy, variant: int, cases: list[int]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Largest |Gamma| of output side force and torque, (2,) per cent."""
+    rows = (study.variant == variant) & np.isin(study.case, cases)
+    return np.asarray(np.nanmax(np.abs(study.gamma[rows][:, paper.OUTPUT_SIDE]), axis=(0, 1)))

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from tolstat.analysis import paper, paper_choices, paper_spectra
 from tolstat.joint import material
 from tolstat.report import style
-from tolstat.report.paper_checks import hertz
 from tolstat.report.paper_curves import COLOURS, DASHES, page
+from tolstat.report.paper_equations import hertz
 from tolstat.report.paper_source import PaperStudy
 
 Array = NDArray[np.float64]

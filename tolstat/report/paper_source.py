@@ -8,87 +8,57 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis import paper, paper_choices, paper_spectra, paper_statements, paper_statics
+from tolstat.analysis import paper, paper_choices, paper_laws, paper_statements, paper_statics
+from tolstat.analysis.paper_evidence import Answer
 from tolstat.joint import Joint
+from tolstat.report import paper_main
+from tolstat.report.paper_main import Main, revolutions, varied
 from tolstat.store import ResultStore
 from tolstat.tables import Status, Variant
 
 Array = NDArray[np.float64]
 AS_PRINTED = 1e7
 """Contact damping (N s/m) above which a joint is one with c_d as printed."""
-
-
-@dataclass(frozen=True)
-class Main:
-    """The joints of the study's first variant with their histories; row i is one of them.
-
-    Attributes
-    ----------
-    case : ndarray of int, shape (m,)
-        Index of the errors in `PaperStudy.cases`.
-    alpha : ndarray, shape (m,)
-        Misalignment, rad.
-    errors, results : ndarray of ERROR and RESULT, shape (m,)
-        Rows of the file.
-    gamma : ndarray, shape (m, 8, 2)
-        Eq. (14), per cent.
-    moduli : ndarray, shape (m, samples, 8, 2)
-        Force (N) and torque (N m) over the input angle.
-    couple : ndarray, shape (m, samples)
-        Couple of cross bushings 1 and 2 about the cross's normal, N m.
-    contact : ndarray, shape (m, samples, 4, 2)
-        Normal force on outer and inner half of pins 1 to 4, N.
-    tau : ndarray, shape (m, samples)
-        Speed ratio.
-    """
-
-    case: NDArray[np.int32]
-    alpha: Array
-    errors: NDArray[np.void]
-    results: NDArray[np.void]
-    gamma: Array
-    moduli: Array
-    couple: Array
-    contact: Array
-    tau: Array
-
-    @property
-    def theta(self) -> Array:
-        """Input angle of the samples, rad, shape (samples,)."""
-        return np.linspace(0.0, 2.0 * np.pi, self.tau.shape[1], endpoint=False)
+LAW = "contact.law"
 
 
 @dataclass(frozen=True)
 class PaperStudy:
-    """A study of the paper's cases.
+    """A study of the paper's cases, at the paper's misalignments.
 
     Attributes
     ----------
     name, created : str
         Name of the study, time of creation.
+    joints : int
+        How many joints the file holds.
     joint : Joint
-        The joint of the study.
+        The joint of the first variant.
+    base : Joint
+        The joint that the variants are made of.
     cases : tuple of str
         Names of the errors, ``"ideal"`` first.
     variants : tuple of Variant
         The joints.
     variant, case : ndarray of int, shape (n,)
-        What each row of the file is.
+        What each row is.
     alpha : ndarray, shape (n,)
         Misalignment, rad.
     results : ndarray of RESULT, shape (n,)
-        All rows.
+        The rows.
     gamma : ndarray, shape (n, 8, 2)
         Eq. (14), per cent.
-    main : Main
-        The first variant.
+    mains : dict
+        Name of the contact law to the variant that differs from the first by nothing else; the first is the first.
     settle_tol : float
         Closure error below which a joint is settled.
     """
 
     name: str
     created: str
+    joints: int
     joint: Joint
+    base: Joint
     cases: tuple[str, ...]
     variants: tuple[Variant, ...]
     variant: NDArray[np.int32]
@@ -96,13 +66,23 @@ class PaperStudy:
     alpha: Array
     results: NDArray[np.void]
     gamma: Array
-    main: Main
+    mains: dict[str, Main]
     settle_tol: float
+
+    @property
+    def main(self) -> Main:
+        """The first variant."""
+        return next(iter(self.mains.values()))
 
     @cached_property
     def matches(self) -> list[paper.Match]:
-        """Nearest direction of each printed case, rows counted in `main`."""
+        """Nearest direction of each printed case by the modulus of Gamma, rows counted in `main`."""
         return paper.nearest(self.main.gamma, self.main.case, self.main.alpha, self.cases)
+
+    @cached_property
+    def signed(self) -> list[paper.Match]:
+        """The same with the sign of Gamma."""
+        return paper.nearest(self.main.gamma, self.main.case, self.main.alpha, self.cases, signed=True)
 
     @cached_property
     def computed(self) -> Array:
@@ -134,75 +114,100 @@ class PaperStudy:
 
     def ideal(self, alpha: float) -> int:
         """Row in `main` of the joint without errors at a misalignment, rad."""
-        return int(np.flatnonzero((self.main.case == 0) & (np.abs(self.main.alpha - alpha) < paper.SAME_ALPHA))[0])
+        return self.main.ideal(alpha)
 
-    def answers(self) -> list[paper_statements.Answer]:
+    @cached_property
+    def answers(self) -> list[Answer]:
         """Sentences of the paper, tested on the first variant."""
-        main = self.main
-        evidence = paper_statements.Evidence(
-            tuple(self.cases[i] for i in main.case),
-            main.alpha,
-            main.gamma,
-            main.results["contact_max"],
-            main.results["psi_max"],
-            paper_spectra.amplitudes(main.moduli),
-            revolutions(main.results),
-            revolutions(self.results[self.as_printed()]),
-        )
-        return paper_statements.answers(evidence)
+        return paper_statements.answers(self.main.evidence(self.cases, self._printed_revolutions()))
+
+    @cached_property
+    def laws(self) -> list[paper_laws.Law]:
+        """Contact laws beside the first variant's."""
+        printed = self._printed_revolutions()
+        return paper_laws.compare({name: main.evidence(self.cases, printed) for name, main in self.mains.items()})
+
+    def _printed_revolutions(self) -> Array:
+        return revolutions(self.results[self.as_printed()])
 
     def contradictions(self) -> list[paper_statics.Contradiction]:
         """Test of Table 4 by statics, with the first variant's ideal joint."""
         row = self.ideal(0.0)
-        force, torque = (float(self.main.results[name][row, :4].max()) for name in ("F_max", "T_max"))
-        resisting = float(self.main.errors["operation.torque"][row])
-        return paper_statics.contradictions(paper_statics.Loads(force, torque, resisting, self.joint.cross.r_b))
+        return paper_statics.contradictions(self._loads(self.main.results[row], self.joint))
 
+    def exclusions(self) -> list[paper_statics.Exclusion]:
+        """The same with every variant whose ideal joint has a result."""
+        loads, ratio = [], []
+        rows = np.flatnonzero((self.case == 0) & (np.abs(self.alpha) < paper.SAME_ALPHA))
+        for row in rows[self.results["status"][rows] == Status.OK]:
+            joint = varied(self.base, self.variants[self.variant[row]].values)
+            loads.append(self._loads(self.results[row], joint))
+            ratio.append(joint.cross.r_b / joint.cross.R)
+        return paper_statics.exclusions(loads, np.array(ratio))
 
-def revolutions(results: NDArray[np.void]) -> Array:
-    """Revolutions until settled, (n,); infinite where a joint did not settle."""
-    return np.where(results["status"] == Status.OK, results["revolutions"], np.inf)
+    def _loads(self, result: np.void, joint: Joint) -> paper_statics.Loads:
+        force, torque = (float(result[name][:4].max()) for name in ("F_max", "T_max"))
+        resisting = float(self.main.errors["operation.torque"][0])
+        return paper_statics.Loads(force, torque, resisting, joint.cross.r_b)
 
 
 def matching(store: ResultStore) -> bool:
     """Whether a file is a complete study of the paper's cases with the histories that the page draws."""
     if not store.case_names or not store.complete or not {"loads", "contact", "tau"} <= set(store.history_specs):
         return False
-    first = store.design()["variant"] == 0
-    whole = bool(np.all(store.status()[first] == Status.OK))
-    return whole and paper.covers(store.case_names, store.errors()["operation.alpha"][first])
+    design, alpha = store.design(), store.errors()["operation.alpha"]
+    rows = _kept(design, alpha)
+    rows = rows[design["variant"][rows] == 0]
+    names = tuple(store.case_names[i] for i in np.unique(design["case"][rows]))
+    whole = bool(np.all(store.status()[rows] == Status.OK))
+    return whole and paper.covers(names, alpha[rows])
+
+
+def _kept(design: NDArray[np.void], alpha: Array) -> NDArray[np.intp]:
+    """Rows at the paper's misalignments: of each variant one group for each, the first where a grid has more."""
+    rows: list[NDArray[np.intp]] = []
+    for variant in np.unique(design["variant"]):
+        for angle in paper.printed().alpha:
+            here = np.flatnonzero((design["variant"] == variant) & (np.abs(alpha - angle) < paper.SAME_ALPHA))
+            rows.append(here[design["group"][here] == design["group"][here[:1]]])
+    return np.concatenate(rows)
 
 
 def read(store: ResultStore) -> PaperStudy:
     """Take the study from its file; see `matching`."""
-    design, errors, results = store.design(), store.errors(), store.results()
+    design, results = store.design(), store.results()
+    alpha = store.errors()["operation.alpha"]
     gamma = paper.gamma(results, design["group"])
-    alpha = errors["operation.alpha"].copy()
-    joint = Joint.model_validate(store.joint)
-    rows = np.flatnonzero(design["variant"] == 0)
-    loads = store.histories("loads", rows).astype(np.float64)
-    main = Main(
-        design["case"][rows],
-        alpha[rows],
-        errors[rows],
-        results[rows],
-        gamma[rows],
-        paper_spectra.moduli(loads),
-        (joint.cross.r_b * loads[:, :, :2, 1] + loads[:, :, :2, 5]).sum(axis=2),
-        store.histories("contact", rows).astype(np.float64),
-        store.histories("tau", rows),
-    )
+    base = Joint.model_validate(store.joint)
+    rows = _kept(design, alpha)
+    own = {v: rows[design["variant"][rows] == v] for v in range(len(store.variants))}
+    mains: dict[str, Main] = {}
+    for v in _laws(store.variants):
+        joint = varied(base, store.variants[v].values)
+        whole = bool(np.all(results["status"][own[v]] == Status.OK))
+        alike = np.array_equal(design["case"][own[v]], design["case"][own[0]])
+        if whole and alike and joint.contact.law not in mains:
+            mains[joint.contact.law] = paper_main.read(store, joint, own[v], gamma)
     return PaperStudy(
         store.study_name,
         store.created,
-        joint,
+        len(results),
+        next(iter(mains.values())).joint,
+        base,
         store.case_names,
         store.variants,
-        design["variant"],
-        design["case"],
-        alpha,
-        results,
-        gamma,
-        main,
+        design["variant"][rows],
+        design["case"][rows],
+        alpha[rows].copy(),
+        results[rows],
+        gamma[rows],
+        mains,
         float(store.options["settle_tol"]),
     )
+
+
+def _laws(variants: tuple[Variant, ...]) -> list[int]:
+    """The first variant and those that differ from it by the contact law alone."""
+    first = {key: value for key, value in variants[0].values.items() if key != LAW}
+    others = [{key: value for key, value in v.values.items() if key != LAW} for v in variants]
+    return [0, *(v for v in range(1, len(variants)) if others[v] == first and LAW in variants[v].values)]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.errors import Fault, InputError
-from tolstat.tables import BUSHINGS, ERROR_FIELDS, PINS, Status
+from tolstat.tables import BUSHINGS, ERROR_FIELDS, FAILED, PINS, Status
 
 if TYPE_CHECKING:
     from tolstat.store import ResultStore
@@ -88,7 +88,7 @@ class Campaign:
 
     def head(self) -> str:
         """Sentence with the number of joints and of those without a valid result."""
-        failed = self.count(Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL)
+        failed = self.count(*FAILED)
         pending = self.count(Status.PENDING)
         text = f"{len(self.results) - pending} joints ({METHODS.get(self.method, self.method)}), "
         text += f"{failed} failed, {self.count(Status.NOT_SETTLED)} not settled"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tolstat.report import style
 from tolstat.report.source import LOADS, Axis, Campaign, load, swept_axes
-from tolstat.tables import Status
+from tolstat.tables import FAILED, Status
 
 Mask = NDArray[np.bool_]
 MAX_LEGEND = 6
@@ -176,7 +176,7 @@ def _legend(page: Figure, campaign: Campaign, axes: list[Axis]) -> None:
     if campaign.count(Status.NOT_SETTLED):
         handles.append(Line2D([], [], ls="", marker="o", ms=6.5, mfc="white", mec=style.INK))
         labels.append("not settled")
-    if campaign.count(Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL):
+    if campaign.count(*FAILED):
         handles.append(Line2D([], [], ls="", marker="x", color=style.INK))
         labels.append("no result")
     style.legend(page, handles, labels)

@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import Status
-
-NO_RESULTS = (Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL)
+from tolstat.tables import FAILED, Status
 
 
 class Counts(NamedTuple):
@@ -38,5 +36,5 @@ class Counts(NamedTuple):
             self.total,
             self.done + int(np.count_nonzero(status != Status.PENDING)),
             self.not_settled + int(np.count_nonzero(status == Status.NOT_SETTLED)),
-            self.failed + int(np.count_nonzero(np.isin(status, NO_RESULTS))),
+            self.failed + int(np.count_nonzero(np.isin(status, FAILED))),
         )

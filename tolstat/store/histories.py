@@ -10,31 +10,26 @@ its place.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.errors import Fault, StoreError
 from tolstat.files import writing
+from tolstat.store.result_file import fault
 from tolstat.tables import HistorySpec
 
 CHUNK_BYTES = 1 << 16
 """About how much of a history one compressed chunk holds."""
 
 
-def blank(spec: HistorySpec, n: int) -> NDArray[Any]:
-    """Return the history of `n` joints that have none: NaN (0 for integers) throughout."""
-    dtype = np.dtype(spec.dtype)
-    return np.full((n, *spec.shape), np.nan if dtype.kind == "f" else 0, dtype)
-
-
 def rows_per_chunk(spec: HistorySpec, n: int) -> int:
     """Return how many of `n` joints share a compressed chunk."""
-    return max(1, min(n, CHUNK_BYTES // blank(spec, 1).nbytes))
+    return max(1, min(n, CHUNK_BYTES // spec.blank(1).nbytes))
 
 
 def create_dataset(group: h5py.Group, name: str, n: int, spec: HistorySpec) -> h5py.Dataset:
@@ -46,11 +41,29 @@ def create_dataset(group: h5py.Group, name: str, n: int, spec: HistorySpec) -> h
         chunks=(rows_per_chunk(spec, n), *spec.shape),
         compression="gzip",
         shuffle=True,
-        fillvalue=blank(spec, 1).flat[0],
+        fillvalue=spec.blank(1).flat[0],
     )
     dataset.attrs["units"] = spec.unit
     dataset.attrs["description"] = spec.description
     return dataset
+
+
+class Index(NamedTuple):
+    """Where the histories of each row are.
+
+    Attributes
+    ----------
+    paths : list of Path
+        The parts.
+    part : (n,) array of int
+        Index into `paths`, -1 for a row that no part holds.
+    position : (n,) array of int
+        Index of the row within that part.
+    """
+
+    paths: list[Path]
+    part: NDArray[np.intp]
+    position: NDArray[np.intp]
 
 
 class HistoryParts:
@@ -64,12 +77,15 @@ class HistoryParts:
         Number of joints of the campaign.
     specs : mapping of str to HistorySpec
         Histories of the campaign.
+    campaign : str
+        What tells the campaign from others; parts that carry another are refused.
     """
 
-    def __init__(self, folder: Path, n: int, specs: Mapping[str, HistorySpec]) -> None:
+    def __init__(self, folder: Path, n: int, specs: Mapping[str, HistorySpec], campaign: str) -> None:
         self.folder = folder
         self.n = n
         self.specs = specs
+        self.campaign = campaign
         self._next: int | None = None
 
     def add(self, rows: NDArray[np.intp], arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -93,6 +109,7 @@ class HistoryParts:
             paths = self.paths()
             self._next = int(paths[-1].stem) + 1 if paths else 0
         with writing(self.folder / f"{self._next:08d}.h5") as temporary, h5py.File(temporary, "w") as file:
+            file.attrs["campaign"] = self.campaign
             file["rows"] = rows
             for name, spec in self.specs.items():
                 create_dataset(file, name, len(rows), spec)[...] = arrays[name]
@@ -102,62 +119,92 @@ class HistoryParts:
         """Finished parts in the order in which they were written."""
         return sorted(self.folder.glob("[0-9]*.h5"))
 
-    def index(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Where each row's histories are.
-
-        Returns
-        -------
-        part : (n,) array of int
-            Index into `paths`, -1 for a row that no part holds.
-        position : (n,) array of int
-            Index of the row within that part.
+    def index(self) -> Index:
+        """Find the histories of each row.
 
         Raises
         ------
         StoreError
-            When a part cannot be read.
+            When a part cannot be read or is of another campaign.
         """
-        part = np.full(self.n, -1, np.intp)
-        position = np.zeros(self.n, np.intp)
-        for k, path in enumerate(self.paths()):
-            try:
-                with h5py.File(path, "r", locking=False) as file:
-                    rows = file["rows"][:]
-            except (OSError, KeyError) as error:
-                remedy = "delete it and run the campaign again: its rows will be simulated again"
-                raise StoreError(str(Fault(str(path), "is damaged", remedy))) from error
-            part[rows] = k
-            position[rows] = np.arange(len(rows))
-        return part, position
+        index = Index(self.paths(), np.full(self.n, -1, np.intp), np.zeros(self.n, np.intp))
+        for k, path in enumerate(index.paths):
+            with self._open(path) as file:
+                rows = file["rows"][:]
+            index.part[rows] = k
+            index.position[rows] = np.arange(len(rows))
+        return index
 
-    def read(self, name: str, rows: NDArray[np.intp]) -> NDArray[Any]:
-        """Histories of `rows`, (m, ...); NaN for a row that no part holds."""
-        part, position = self.index()
-        return self._gather(name, rows, part, position)
+    def read(self, name: str, rows: NDArray[np.intp], done: NDArray[np.bool_]) -> NDArray[Any]:
+        """Read histories of one kind.
 
-    def _gather(
-        self, name: str, rows: NDArray[np.intp], part: NDArray[np.intp], position: NDArray[np.intp]
-    ) -> NDArray[Any]:
-        out = blank(self.specs[name], len(rows))
-        paths = self.paths()
-        for k in np.unique(part[rows]):
-            if k < 0:
-                continue
-            here = np.flatnonzero(part[rows] == k)
-            with h5py.File(paths[k], "r", locking=False) as file:
-                at = position[rows[here]]
-                out[here] = file[name][at.min() : at.max() + 1][at - at.min()]
-        return out
+        Parameters
+        ----------
+        name : str
+            One of `specs`.
+        rows : (m,) array of int
+            Rows of the campaign.
+        done : (m,) array of bool
+            Which of them must have histories, as their status said before this call.
+
+        Returns
+        -------
+        (m, ...) array
+            NaN for a row that is not done and that no part holds.
+
+        Raises
+        ------
+        StoreError
+            When no part holds a row that is done, or as `index`.
+        """
+        index = self.index()
+        self._check_held(index.part[rows[done]])
+        return self._gather(name, rows, index)
 
     def gather_into(self, group: h5py.Group) -> None:
-        """Copy all histories to datasets in `group`, a few chunks at a time."""
-        part, position = self.index()
+        """Copy the histories of all rows to datasets in `group`, a few chunks at a time.
+
+        Raises
+        ------
+        StoreError
+            When no part holds a row, or as `index`.
+        """
+        index = self.index()
+        self._check_held(index.part)
         for name, spec in self.specs.items():
             dataset = create_dataset(group, name, self.n, spec)
             step = 16 * rows_per_chunk(spec, self.n)
             for first in range(0, self.n, step):
                 rows = np.arange(first, min(first + step, self.n))
-                dataset[first : first + len(rows)] = self._gather(name, rows, part, position)
+                dataset[first : first + len(rows)] = self._gather(name, rows, index)
+
+    def _check_held(self, part: NDArray[np.intp]) -> None:
+        """Refuse to pass rows that have lost their histories for rows that have none."""
+        lost = np.count_nonzero(part < 0)
+        if lost:
+            remedy = "bring the folder back, or run the campaign again: these joints will be simulated again"
+            raise fault(self.folder, f"lacks the histories of {lost} joints that are done", remedy)
+
+    def _gather(self, name: str, rows: NDArray[np.intp], index: Index) -> NDArray[Any]:
+        out = self.specs[name].blank(len(rows))
+        part = index.part[rows]
+        for k in np.unique(part[part >= 0]):
+            here = np.flatnonzero(part == k)
+            with self._open(index.paths[k]) as file:
+                at = index.position[rows[here]]
+                out[here] = file[name][at.min() : at.max() + 1][at - at.min()]
+        return out
+
+    @contextmanager
+    def _open(self, path: Path) -> Iterator[h5py.File]:
+        try:
+            with h5py.File(path, "r", locking=False) as file:
+                if file.attrs.get("campaign") != self.campaign:
+                    raise fault(path, "holds histories of another campaign", "delete the folder or use another --out")
+                yield file
+        except (OSError, KeyError) as error:
+            remedy = "delete it and run the campaign again: its rows will be simulated again"
+            raise fault(path, "is damaged", remedy) from error
 
     def remove(self) -> None:
         """Delete the folder with all parts."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 import subprocess
 from importlib import metadata
@@ -10,12 +11,29 @@ from pathlib import Path
 import tolstat
 
 LIBRARIES = ("numpy", "numba", "scipy", "h5py")
+DECIDING = (
+    *("kernel", "joint", "tables.py", "simulation.py", "sampling.py", "tolerance.py"),
+    *("study/correlation.py", "study/design.py"),
+)
+"""Modules that decide the numbers of a campaign, given what its identity holds."""
 
 
 def versions() -> dict[str, str]:
-    """Versions of tolstat, of Python and of the libraries that take part in the numbers."""
-    found = {"tolstat": tolstat.__version__, "python": platform.python_version()}
+    """Versions of tolstat, of Python and of the libraries that take part in the numbers, and `source_hash`."""
+    found = {"tolstat": tolstat.__version__, "sources": source_hash(), "python": platform.python_version()}
     return found | {name: metadata.version(name) for name in LIBRARIES}
+
+
+def source_hash() -> str:
+    """Hash of the sources that decide the numbers: code under development changes while its version stays."""
+    package = Path(tolstat.__file__).parent
+    digest = hashlib.sha256()
+    for name in DECIDING:
+        found = package / name
+        for path in sorted(found.glob("*.py")) if found.is_dir() else [found]:
+            digest.update(path.relative_to(package).as_posix().encode())
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()[:16]
 
 
 def git_commit() -> str:

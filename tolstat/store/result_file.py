@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
-from collections.abc import Mapping
+import shutil
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +20,7 @@ from numpy.typing import NDArray
 
 from tolstat import tables
 from tolstat.errors import Fault, StoreError
+from tolstat.files import writing
 from tolstat.store.provenance import git_commit, versions
 from tolstat.tables import HistorySpec
 
@@ -24,6 +29,17 @@ if TYPE_CHECKING:
 
 FILETYPE = "tolstat campaign"
 SCHEMA_VERSION = 1
+
+
+def campaign_digest(file: h5py.File) -> str:
+    """Hash of what tells a campaign from others: the study's identity and the code that began it."""
+    texts = (str(file.attrs[name]) for name in ("identity", "versions"))
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
+
+
+def judgement(study: Study) -> dict[str, str]:
+    """Make the attributes of a study that decide no number and may change while a campaign goes on."""
+    return {"study": study.text, "study_name": study.name, "limits": json.dumps(study.limits, allow_nan=False)}
 
 
 def attributes(study: Study, specs: Mapping[str, HistorySpec], dimensions: Mapping[str, int]) -> dict[str, Any]:
@@ -43,7 +59,6 @@ def attributes(study: Study, specs: Mapping[str, HistorySpec], dimensions: Mappi
         "identity": study.identity(),
         "joint": study.joint.model_dump(mode="json"),
         "options": study.solver.options()._asdict(),
-        "limits": study.limits,
         "design": {"cases": study.case_names, "variants": [variant._asdict() for variant in study.variants]},
         "sampling": sampling | {"dimensions": dict(dimensions)},
         "versions": versions(),
@@ -52,11 +67,10 @@ def attributes(study: Study, specs: Mapping[str, HistorySpec], dimensions: Mappi
     plain = {
         "filetype": FILETYPE,
         "schema_version": SCHEMA_VERSION,
-        "study": study.text,
-        "study_name": study.name,
         "git_commit": git_commit(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+    plain |= judgement(study)
     return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
 
 
@@ -87,6 +101,13 @@ def create_table(group: h5py.Group, columns: tuple[tables.Column, ...], table: N
         dataset.attrs["description"] = c.description
 
 
+def put(dataset: h5py.Dataset, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
+    """Overwrite the `rows` of a column with `values`, (m,); rows that follow one another go in one piece."""
+    ends = [*(np.flatnonzero(np.diff(rows) != 1) + 1), len(rows)]
+    for begin, end in pairwise([0, *ends]):
+        dataset[rows[begin] : rows[end - 1] + 1] = values[begin:end]
+
+
 def open_hdf5(path: Path, mode: str) -> h5py.File:
     """Open an HDF5 file.
 
@@ -102,7 +123,7 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
         raise fault(path, "is not an HDF5 file", "give a file that tolstat run has made")
     try:
         # Readers take no lock: the writer changes numbers only, so they may look at a campaign under way.
-        return h5py.File(path, mode, locking=False if mode == "r" else "best-effort")
+        file = h5py.File(path, mode, locking=False if mode == "r" else "best-effort")
     except OSError as error:
         if not path.is_file():
             raise fault(path, "is not there", "check the path, or make it with: tolstat run") from error
@@ -115,6 +136,46 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
         if not h5py.is_hdf5(path):
             raise fault(path, "is not an HDF5 file", "give a file that tolstat run has made") from error
         raise fault(path, f"is damaged: {error}", "run the campaign again with another --out") from error
+    if mode != "r" and not _is_at(file, path):
+        # opened before another process replaced it and locked after: nobody else will ever see this file
+        file.close()
+        raise fault(path, "is being written by another process", "wait for it or stop it")
+    return file
+
+
+def _is_at(file: h5py.File, path: Path) -> bool:
+    return path.exists() and os.path.samestat(os.fstat(file.id.get_vfd_handle()), path.stat())
+
+
+def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None]) -> h5py.File:
+    """Change more of a file than numbers, by way of a copy: a kill leaves the file as it was or as it shall be.
+
+    No other process can write in between: `held` stays open and locked until the copy has its lock and the name.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    held : h5py.File
+        The same, open for writing; closed afterwards.
+    change : callable
+        Told the copy, open for writing.
+
+    Returns
+    -------
+    h5py.File
+        What is now at `path`, open for writing.
+    """
+    held.flush()
+    with ExitStack() as opened:
+        with writing(path) as temporary:
+            shutil.copyfile(path, temporary)
+            with open_hdf5(temporary, "r+") as file:
+                change(file)
+            copy = opened.enter_context(open_hdf5(temporary, "r+"))
+        opened.pop_all()
+    held.close()
+    return copy
 
 
 def check_schema(path: Path, file: h5py.File) -> None:

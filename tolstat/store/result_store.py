@@ -2,15 +2,15 @@
 
 Everything but histories lies in datasets of a fixed size, written in full when the file is created. From then
 on only numbers inside them change and none of HDF5's own structures, so a process killed at any moment leaves
-a file that can be read. Values are on the disk before the status that declares them valid.
+a file that can be read. Values are on the disk before the status that declares them valid. What changes more, the
+histories taken in at the end and limits edited between two runs, makes a new file that takes the old one's place.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -23,14 +23,19 @@ from tolstat import tables
 from tolstat.errors import StoreError
 from tolstat.files import writing
 from tolstat.store.counts import Counts
+from tolstat.store.frame import to_pandas
 from tolstat.store.histories import HistoryParts
 from tolstat.store.result_file import (
     attributes,
+    campaign_digest,
     check_schema,
     create_table,
     fault,
+    judgement,
     open_hdf5,
     pending_results,
+    put,
+    replace,
 )
 from tolstat.tables import HistorySpec, Simulation, Status, Variant
 
@@ -38,8 +43,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tolstat.study import Study
-
-LABELS = np.array([s.label for s in Status], dtype=object)
 
 
 class ResultStore:
@@ -73,8 +76,7 @@ class ResultStore:
         self.path = path
         self._file = file
         attrs = file.attrs
-        self.study_name = str(attrs["study_name"])
-        self.study_text = str(attrs["study"])
+        self._read_judgement()
         self.created = str(attrs["created"])
         self.git_commit = str(attrs["git_commit"])
         self.identity: dict[str, Any] = json.loads(attrs["identity"])
@@ -82,14 +84,13 @@ class ResultStore:
         self.options: dict[str, Any] = json.loads(attrs["options"])
         self.sampling: dict[str, Any] = json.loads(attrs["sampling"])
         self.versions: dict[str, str] = json.loads(attrs["versions"])
-        self.limits: dict[str, float] = json.loads(attrs["limits"])
         design: dict[str, Any] = json.loads(attrs["design"])
         self.case_names: tuple[str, ...] = tuple(design["cases"])
         self.variants = tuple(Variant(**variant) for variant in design["variants"])
         specs: dict[str, Any] = json.loads(attrs["histories"])
         self.history_specs = {k: HistorySpec(tuple(shape), *rest) for k, (shape, *rest) in specs.items()}
         self.n = int(file["results/status"].shape[0])
-        self._parts = HistoryParts(_parts_folder(path), self.n, self.history_specs)
+        self._parts = HistoryParts(_parts_folder(path), self.n, self.history_specs, campaign_digest(file))
 
     @classmethod
     def create(
@@ -248,24 +249,28 @@ class ResultStore:
         Raises
         ------
         StoreError
-            When there is no room for them.
+            When there is no room for them, or parts of them are gone.
         """
         if not self.history_specs or not self.complete:
             return
         if "histories" not in self._file:
-            self._file.close()
-            try:
-                with writing(self.path) as temporary:
-                    shutil.copyfile(self.path, temporary)
-                    with h5py.File(temporary, "r+") as file:
-                        self._parts.gather_into(file.create_group("histories"))
-            except OSError as error:
-                reason = error.strerror or str(error)
-                remedy = "make room for a second copy and run the campaign again: finished joints are kept"
-                raise fault(self.path, f"histories cannot be taken in: {reason}", remedy) from error
-            finally:
-                self._file = open_hdf5(self.path, "r+")
+            self._replace(lambda file: self._parts.gather_into(file.create_group("histories")))
         self._parts.remove()
+
+    def judge_by(self, study: Study) -> None:
+        """Take over what decides no number: limits, text and name of a study of the same identity.
+
+        Does nothing where the file has them already.
+
+        Raises
+        ------
+        StoreError
+            When there is no room for a second copy of the file.
+        """
+        wanted = judgement(study)
+        if any(self._file.attrs[name] != value for name, value in wanted.items()):
+            self._replace(lambda file: file.attrs.update(wanted))
+            self._read_judgement()
 
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of every joint, (n,) table DESIGN.
@@ -301,12 +306,12 @@ class ResultStore:
         Returns
         -------
         (m, ...) array
-            NaN for joints that are pending.
+            NaN for joints that are pending or have no results.
 
         Raises
         ------
         StoreError
-            When the file holds no such histories.
+            When the file holds no such histories, or those of joints that are done are gone.
         """
         if name not in self.history_specs:
             held = ", ".join(self.history_specs) or "none"
@@ -314,7 +319,12 @@ class ResultStore:
             raise fault(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
         rows = np.arange(self.n) if rows is None else np.asarray(rows, dtype=np.intp)
         if "histories" not in self._file:
-            return self._parts.read(name, rows)
+            done = self.status()[rows] != Status.PENDING  # asked first: histories are there before the status
+            try:
+                return self._parts.read(name, rows, done)
+            except StoreError:
+                if not self._reopen():
+                    raise
         unique, back = np.unique(rows, return_inverse=True)
         return np.asarray(self._file["histories"][name][unique])[back]
 
@@ -329,25 +339,39 @@ class ResultStore:
         Returns
         -------
         pandas.DataFrame
-            Index ``row``; the errors' columns, then the results'; ``status`` as text.
+            Index ``row``; the errors' columns, then the results'; ``status`` as text. Before them, where the study
+            lists its joints, name of the case, index and family of the variant, and group.
         """
-        import pandas as pd
+        return to_pandas(self, units)
 
-        data: dict[str, NDArray[Any]] = {}
-        errors, results = self.errors(), self.results()
-        data |= {c.name: c.of(errors) for c in tables.ERROR_COLUMNS}
-        data |= {c.name: c.of(results) for c in tables.RESULT_COLUMNS}
-        data["status"] = LABELS[data["status"]]
-        frame = pd.DataFrame(data, index=pd.RangeIndex(self.n, name="row"))
-        if units:
-            all_columns = tables.ERROR_COLUMNS + tables.RESULT_COLUMNS
-            frame.columns = pd.MultiIndex.from_tuples([(c.name, c.unit) for c in all_columns])
-        return frame
+    def _read_judgement(self) -> None:
+        attrs = self._file.attrs
+        self.study_name = str(attrs["study_name"])
+        self.study_text = str(attrs["study"])
+        self.limits: dict[str, float] = json.loads(attrs["limits"])
+
+    def _replace(self, change: Callable[[h5py.File], None]) -> None:
+        try:
+            self._file = replace(self.path, self._file, change)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            remedy = "make room for a second copy and run the campaign again: finished joints are kept"
+            raise fault(self.path, f"cannot be replaced: {reason}", remedy) from error
+
+    def _reopen(self) -> bool:
+        """Go over to the file that has taken this one's place with the histories in it; whether there is one."""
+        if self._file.mode != "r":
+            return False
+        file = open_hdf5(self.path, "r")
+        if "histories" not in file or campaign_digest(file) != self._parts.campaign:
+            file.close()
+            return False
+        self._file.close()
+        self._file = file
+        return True
 
     def _put(self, name: str, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
-        dataset = self._file["results"][name]
-        for here in _runs(rows):
-            dataset[rows[here.start] : rows[here.stop - 1] + 1] = values[here]
+        put(self._file["results"][name], rows, values)
 
     def _read(self, group: str, columns: tuple[tables.Column, ...], dtype: Any) -> NDArray[np.void]:
         table = np.empty(self.n, dtype)
@@ -364,7 +388,7 @@ class ResultStore:
         """Make rows pending whose histories are gone, as when the file was moved without its parts."""
         if not self.history_specs or "histories" in self._file:
             return
-        part, _ = self._parts.index()
+        part = self._parts.index().part
         lost = np.flatnonzero((part < 0) & (self.status() != Status.PENDING))
         if lost.size:
             self._put("status", lost, np.full(lost.size, Status.PENDING, np.uint8))
@@ -373,12 +397,3 @@ class ResultStore:
 
 def _parts_folder(path: Path) -> Path:
     return path.with_name(path.name + ".parts")
-
-
-def _runs(rows: NDArray[np.intp]) -> Iterator[slice]:
-    """Slices of `rows` that hold consecutive numbers: these are written in one go."""
-    ends = [*(np.flatnonzero(np.diff(rows) != 1) + 1), len(rows)]
-    begin = 0
-    for end in ends:
-        yield slice(begin, int(end))
-        begin = int(end)

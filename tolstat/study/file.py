@@ -186,13 +186,15 @@ class StudyFile:
             if section not in used and section in self.data:
                 remedy = "remove it, or write another sampling.method"
                 self._fault((section,), f"has no effect with {sampling.method!r}", remedy)
+        if sampling.method == "cases" and self.data.get("limits"):
+            self._fault(("limits",), "has no effect with 'cases'", "remove it: listed joints have no exceedance")
         points = math.prod(axis.points for axis in sweep)
         if points > MAX_ROWS:
             self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
 
     def check_harmonics(self, output: Output, solver: Solver) -> None:
         """Find harmonics that the steps of a revolution cannot carry."""
-        most = solver.steps_per_rev // 2
+        most = (solver.steps_per_rev - 1) // 2
         if output.histories == "harmonics" and output.harmonics > most:
             found = f"{output.harmonics} harmonics from {solver.steps_per_rev} steps a revolution"
             self._fault(("output", "harmonics"), found, f"give at most {most}, or more solver.steps_per_rev")

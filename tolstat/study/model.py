@@ -27,7 +27,7 @@ class Solver(Strict):
     method: Literal["bdf2", "generalized_alpha", "tr_bdf2"] = "bdf2"
     start: Literal["static", "ramp"] = "static"
     steps_per_rev: Annotated[int, Field(strict=True, ge=12, le=20_000)] = _DEFAULTS.steps_per_rev
-    max_revs: Annotated[int, Field(strict=True, ge=1, le=1000)] = _DEFAULTS.max_revs
+    max_revs: Annotated[int, Field(strict=True, ge=2, le=1000)] = _DEFAULTS.max_revs
     settle_tol: Annotated[Number, Field(gt=0, lt=1)] = _DEFAULTS.settle_tol
     newton_tol: Annotated[Number, Field(ge=1e-12, le=1e-2)] = _DEFAULTS.newton_tol
     newton_max_iter: Annotated[int, Field(strict=True, ge=2, le=100)] = _DEFAULTS.newton_max_iter

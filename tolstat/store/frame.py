@@ -1,0 +1,45 @@
+"""A campaign as one pandas frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import tables
+from tolstat.tables import Status
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tolstat.store.result_store import ResultStore
+
+LABELS = np.array([s.label for s in Status], dtype=object)
+
+
+def to_pandas(store: ResultStore, units: bool = False) -> pd.DataFrame:
+    """Put a campaign into one frame, see `ResultStore.to_pandas`."""
+    import pandas as pd
+
+    errors, results = store.errors(), store.results()
+    data: dict[tuple[str, str], NDArray[Any]] = _design(store) if store.case_names else {}
+    data |= {(c.name, c.unit): c.of(errors) for c in tables.ERROR_COLUMNS}
+    data |= {(c.name, c.unit): c.of(results) for c in tables.RESULT_COLUMNS}
+    data["status", "1"] = LABELS[results["status"]]
+    index = pd.RangeIndex(store.n, name="row")
+    if units:
+        return pd.DataFrame(data, index=index)
+    return pd.DataFrame({name: values for (name, _), values in data.items()}, index=index)
+
+
+def _design(store: ResultStore) -> dict[tuple[str, str], NDArray[Any]]:
+    """Which of the listed joints each row is, names in place of indices where there are names."""
+    design = store.design()
+    families = np.array([variant.family for variant in store.variants], dtype=object)
+    return {
+        ("case", "1"): np.array(store.case_names, dtype=object)[design["case"]],
+        ("variant", "1"): design["variant"],
+        ("family", "1"): families[design["variant"]],
+        ("group", "1"): design["group"],
+    }

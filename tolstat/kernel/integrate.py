@@ -84,27 +84,8 @@ def scaled_size(cv, ca, state):
     return size
 
 
-def build_integrator(residual, factorise, solve, size=scaled_size):
-    """Bind the equations of a system to Newton's iteration and the stepping scheme.
-
-    Parameters
-    ----------
-    residual : jitted function (t, q, v, a, par, options, work, out) -> None
-        Equations of motion, zero when met.
-    factorise : jitted function (t, q, v, a, cv, ca, par, options, work) -> bool
-        Makes and factorises d(residual)/dq + cv d/dv + ca d/da at the point last evaluated; False when singular.
-    solve : jitted function (q, work) -> None
-        Solves for ``work.solution`` in place.
-    size : jitted function (cv, ca, state) -> float
-        Norm of ``state.residual`` that is compared with ``options.newton_tol``.
-
-    Returns
-    -------
-    newton : jitted function (t, cv, ca, par, options, work, state) -> bool
-        Solves for the trial point; True when converged.
-    advance : jitted function (t, h, par, options, work, state) -> bool
-        One step of the output grid; False when it failed at the smallest sub-step.
-    """
+def build_newton(residual, factorise, solve, size=scaled_size):
+    """Bind a system to Newton's iteration; arguments and the function returned as in `build_integrator`."""
 
     @closure
     def newton(t, cv, ca, par, options, work, state):
@@ -138,6 +119,12 @@ def build_integrator(residual, factorise, solve, size=scaled_size):
             at_roundoff = step <= ROUNDOFF * largest
         state.memory[CV_FACTORISED] = 0.0
         return False
+
+    return newton
+
+
+def build_advance(newton):
+    """Bind Newton's iteration for a system to the stepping scheme."""
 
     @closure
     def attempt(t, h, par, options, work, state):
@@ -175,4 +162,29 @@ def build_integrator(residual, factorise, solve, size=scaled_size):
                     return False
         return True
 
-    return newton, advance
+    return advance
+
+
+def build_integrator(residual, factorise, solve, size=scaled_size):
+    """Bind the equations of a system to Newton's iteration and the stepping scheme.
+
+    Parameters
+    ----------
+    residual : jitted function (t, q, v, a, par, options, work, out) -> None
+        Equations of motion, zero when met.
+    factorise : jitted function (t, q, v, a, cv, ca, par, options, work) -> bool
+        Makes and factorises d(residual)/dq + cv d/dv + ca d/da at the point last evaluated; False when singular.
+    solve : jitted function (q, work) -> None
+        Solves for ``work.solution`` in place.
+    size : jitted function (cv, ca, state) -> float
+        Norm of ``state.residual`` that is compared with ``options.newton_tol``.
+
+    Returns
+    -------
+    newton : jitted function (t, cv, ca, par, options, work, state) -> bool
+        Solves for the trial point; True when converged.
+    advance : jitted function (t, h, par, options, work, state) -> bool
+        One step of the output grid; False when it failed at the smallest sub-step.
+    """
+    newton = build_newton(residual, factorise, solve, size)
+    return newton, build_advance(newton)

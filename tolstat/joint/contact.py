@@ -29,6 +29,16 @@ Damping = Annotated[units.Damping, NOT_NEGATIVE]
 Force = Annotated[float, units.Quantity("N"), POSITIVE]
 
 
+NEEDED = {
+    "k1u": ("coefficients", "printed", "fitted"),
+    "k2u": ("coefficients", "printed", "fitted"),
+    "fit_load": ("coefficients", "fitted", "printed"),
+    "c_d": ("damping", "given", "beam"),
+    "xi": ("damping", "beam", "given"),
+}
+"""Keys that a selector asks for: the selector, the word that needs the key, the word that does without."""
+
+
 class Contact(Strict):
     """Contact of the pins in their holes.
 
@@ -68,10 +78,10 @@ class Contact(Strict):
             raise refuse("eq. (3) has no value at D_H = D_P", 'give a clearance, or write "printed"')
         return value
 
-    @field_validator("k1u", "k2u")
+    @field_validator(*NEEDED)
     @classmethod
-    def _printed(cls, value: float | None, info: ValidationInfo) -> float | None:
-        needed(value, info, "coefficients", "printed", "fitted")
+    def _needed(cls, value: float | None, info: ValidationInfo) -> float | None:
+        needed(value, info, *NEEDED[str(info.field_name)])
         return value
 
     @field_validator("H")
@@ -80,24 +90,6 @@ class Contact(Strict):
         given = info.data.get("k1p", 0.0) is not None and info.data.get("k2p", 0.0) is not None
         if value is None and (info.data.get("coefficients") == "fitted" or not given):
             raise refuse("missing key, needed where k1p and k2p are not given", "add H, or both k1p and k2p")
-        return value
-
-    @field_validator("fit_load")
-    @classmethod
-    def _fitted(cls, value: float | None, info: ValidationInfo) -> float | None:
-        needed(value, info, "coefficients", "fitted", "printed")
-        return value
-
-    @field_validator("c_d")
-    @classmethod
-    def _damping_given(cls, value: float | None, info: ValidationInfo) -> float | None:
-        needed(value, info, "damping", "given", "beam")
-        return value
-
-    @field_validator("xi")
-    @classmethod
-    def _damping_beam(cls, value: float | None, info: ValidationInfo) -> float | None:
-        needed(value, info, "damping", "beam", "given")
         return value
 
     def stiffness(self, of: Material) -> tuple[float, float, float, float]:

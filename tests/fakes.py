@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -16,8 +17,22 @@ from typing import Any
 
 import numpy as np
 
-from tolstat import campaign
-from tolstat.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
+from tests.environment import environment as environment
+from tolstat import campaign, kept
+from tolstat.execution import Stages
+from tolstat.study.model import Sampling
+from tolstat.tables import (
+    DESIGN,
+    ERROR,
+    ERROR_FIELDS,
+    PARAM,
+    RESULT,
+    Column,
+    HistorySpec,
+    Options,
+    Simulation,
+    Status,
+)
 
 SPECS = {
     "loads": HistorySpec((30, 8, 6), "f4", "N, N*m", "bushing loads"),
@@ -40,6 +55,16 @@ class Output:
 
     histories: str = "none"
     harmonics: int = 4
+    results: tuple[str, ...] | None = None
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns of the results that are kept."""
+        return kept.columns(self.identity())
+
+    def identity(self) -> dict[str, Any]:
+        """Return what decides the numbers."""
+        return {"output": self.histories} | ({} if self.results is None else {kept.KEY: list(self.results)})
 
 
 @dataclass(frozen=True)
@@ -47,6 +72,8 @@ class Solver:
     """Table ``[solver]`` of a study."""
 
     steps_per_rev: int = 30
+    fidelity: str = "dynamic"
+    error_budget: float = 0.005
 
     def options(self) -> Options:
         """Return the settings as the kernel takes them."""
@@ -69,14 +96,29 @@ class Study:
     joint: Dump = field(default_factory=lambda: Dump(material=Dump(E="2.1e11 Pa")))
 
     @property
-    def sampling(self) -> Dump:
+    def sampling(self) -> Sampling:
         """Table ``[sampling]`` of a study."""
-        return Dump(method="random", n=self.n, seed=self.seed, nominal_first=True)
+        return Sampling(n=self.samples, seed=self.seed)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of every table."""
+        return self.n
+
+    @property
+    def samples(self) -> int:
+        """Number of joints, the nominal one not counted."""
+        return self.n - 1
 
     @property
     def joints(self) -> tuple[Dump, ...]:
         """One joint, of which all rows are variants without errors of their own."""
         return (self.joint,)
+
+    @property
+    def solvers(self) -> tuple[Solver, ...]:
+        """Settings of the only joint."""
+        return (self.solver,)
 
     @property
     def design(self) -> np.ndarray:
@@ -86,15 +128,20 @@ class Study:
     def identity(self) -> dict[str, Any]:
         """Return what decides the numbers."""
         solver = {"solver.steps_per_rev": self.solver.steps_per_rev}
-        return solver | {"sampling.n": self.n, "sampling.seed": self.seed, "output": self.output.histories}
+        return solver | {"sampling.n": self.n, "sampling.seed": self.seed} | self.output.identity()
 
 
 def draw(study: Study) -> np.ndarray:
-    rng = np.random.default_rng(study.seed)
+    rng = np.random.default_rng(184 + study.seed)
     errors = np.zeros(study.n, ERROR)
-    for f in ERROR_FIELDS:
-        errors[f.name] = rng.normal(size=study.n)
+    values = rng.normal(size=(study.n, len(ERROR_FIELDS)))  # row by row: those of a longer campaign begin alike
+    for number, f in enumerate(ERROR_FIELDS):
+        errors[f.name] = values[:, number]
     return errors
+
+
+def draw_blocks(study: Study, rows: range) -> Iterator[np.ndarray]:
+    yield draw(study)[rows.start : rows.stop]
 
 
 def perturb(joint: Any, errors: np.ndarray) -> np.ndarray:
@@ -134,21 +181,27 @@ def history(spec: HistorySpec, x: np.ndarray) -> np.ndarray:
     return (np.abs(values) * 50 % 4 if spec.dtype == "u1" else values).astype(spec.dtype)
 
 
-def simulate_or_die(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
-    """Simulate, but kill this process at the joint with the largest misalignment of the fake study."""
-    if params["alpha"].max() > 2.0:
+def simulate_and_raise(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+    raise ZeroDivisionError("a bug")
+
+
+def simulate_badly(
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, kills: float, hangs: float
+) -> Simulation:
+    """Simulate, but the joint with one value of R kills its process, and another one takes for ever."""
+    if kills in params["R"]:
         os.kill(os.getpid(), signal.SIGKILL)
+    while hangs in params["R"]:
+        pass
     return simulate(params, options, histories, n_harmonics)
 
 
-def simulate_or_raise(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
-    if params["alpha"].max() > 2.0:
-        raise ZeroDivisionError("a bug")
-    return simulate(params, options, histories, n_harmonics)
+def warm_up() -> None:
+    """Compile nothing."""
 
 
-def stages(simulate: Any = simulate) -> campaign.Stages:
-    return campaign.Stages(draw, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up=lambda: None)
+def stages(simulate: Any = simulate) -> Stages:
+    return Stages(draw_blocks, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up)
 
 
 def main(out: str, workers: int, block: int, seconds: float, histories: str = "none", n: int = 40) -> None:
@@ -166,9 +219,4 @@ def main(out: str, workers: int, block: int, seconds: float, histories: str = "n
         campaign.run(study, Path(out), workers, block, progress=say, stages=slow)
     except campaign.Interrupted as stop:
         print(stop, flush=True)
-        raise SystemExit(130) from None
-
-
-def environment() -> dict[str, str]:
-    """Environment in which another Python finds tolstat and these modules."""
-    return os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
+        raise SystemExit(stop.exit_code) from None

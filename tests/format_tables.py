@@ -29,13 +29,21 @@ def status_table() -> str:
     return "\n".join(lines + [f"| {s.value} | `{s.label}` | {tables.STATUS_TEXT[s]} |" for s in tables.Status])
 
 
+def motion_table() -> str:
+    """Markdown table of the values of ``motion``."""
+    lines = ["| motion | name | meaning |", "|---|---|---|"]
+    return "\n".join(lines + [f"| {m.value} | `{m.label}` | {tables.MOTION_TEXT[m]} |" for m in tables.Motion])
+
+
 def updated(text: str) -> str:
     """`text` of the document with its tables made anew."""
     content = {
         "design": field_table(tables.DESIGN_COLUMNS),
         "errors": field_table(tables.ERROR_COLUMNS),
         "results": field_table(tables.RESULT_COLUMNS),
+        "ledger": field_table(tables.LEDGER_COLUMNS),
         "status": status_table(),
+        "motion": motion_table(),
     }
     for name, table in content.items():
         pattern = rf"(<!-- table: {name} -->\n).*?(<!-- end -->)"

@@ -191,3 +191,22 @@ def imbalance(t, q, v, a, par, resisting):
     rate = (momentum[1][2]["out"] - momentum[0][2]["out"]) @ shaft / (2 * h)
     off["out"] = par.Js * rate - force["out"][3:] @ shaft + resisting
     return off
+
+
+def turns(signal):
+    """Values of a periodic signal at which it turns, in order; empty for a constant."""
+    x = [a for a, b in zip(signal, [*signal[1:], signal[0]], strict=True) if a != b]
+    around = zip([x[-1], *x[:-1]] if x else [], x, [*x[1:], *x[:1]], strict=True)
+    return [b for a, b, c in around if (b - a) * (c - b) < 0]
+
+
+def rainflow(signal):
+    """Ranges and means of a periodic signal's cycles: the smallest step between two turns goes first."""
+    points, cycles = turns(list(signal)), []
+    while points:
+        steps = [abs(b - a) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+        i = int(np.argmin(steps))
+        j = (i + 1) % len(points)
+        cycles.append((steps[i], (points[i] + points[j]) / 2))
+        points = [p for k, p in enumerate(points) if k not in (i, j)]
+    return [size for size, _ in cycles], [mean for _, mean in cycles]

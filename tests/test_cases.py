@@ -130,7 +130,7 @@ def test_a_variant_may_be_another_joint_file(tmp_path: Path) -> None:
 def test_without_grid_and_variants_the_joint_as_it_is(tmp_path: Path) -> None:
     s = load(tmp_path, text=TEXT[: TEXT.index("[grid]")] + '[[case]]\nname = "a"\nerrors.pin1.tilt_t = "1 deg"\n')
     assert s.joints == (s.joint,)
-    assert s.variants == (("joint", {}),)
+    assert s.variants == (("joint", {}, ""),)
     assert s.design.tolist() == [(0, 0, 0), (0, 1, 0)]
     assert sampling.draw(s)["operation.alpha"].tolist() == 2 * [np.radians(5)]
 
@@ -206,7 +206,7 @@ def test_workers_blocks_and_interruptions_change_no_byte(tmp_path: Path) -> None
         params["alpha"] = of.contact.D_P * 100 + (of.contact.law == "point") * of.cross.R
         return params
 
-    stages = fakes.stages()._replace(draw=sampling.draw, perturb=perturb)
+    stages = fakes.stages()._replace(draw=sampling.draw_blocks, perturb=perturb)
     campaign.run(s, tmp_path / "a.h5", 1, 5, stages=stages)
     expected = datasets(tmp_path / "a.h5")
     assert {"design/variant", "design/case", "design/group"} <= expected.keys()

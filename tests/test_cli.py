@@ -15,13 +15,17 @@ import pytest
 from typer.testing import CliRunner
 
 import tolstat
-from tests import synthetic
+from tests import fakes, synthetic
 from tolstat import campaign, cli
 from tolstat.executor import WorkerDied
 from tolstat.store import ResultStore
 from tolstat.tables import BUSHINGS, ERROR_COLUMNS, RESULT_COLUMNS, Simulation, Status
 
-COMMANDS = ("simulate", "run", "status", "export", "report")
+COMMANDS = (
+    *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
+    *("worst", "replay", "export", "fatigue", "report"),
+    *("capability", "causes", "reweight", "work-precision"),
+)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
 
 
@@ -44,7 +48,9 @@ def invented_campaign():
     """`campaign.run` with a stand-in for the solver."""
     from tolstat import joint, sampling
 
-    stages = campaign.Stages(sampling.draw, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, lambda: None)
+    stages = campaign.Stages(
+        sampling.draw_blocks, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, fakes.warm_up
+    )
     return partial(campaign.run, stages=stages)
 
 
@@ -70,7 +76,7 @@ def test_every_command_has_help_with_every_option_explained(command):
 
 
 def test_help_lists_the_commands_and_the_readme_order():
-    listed = re.findall(r"^  (\w+)  ", call("--help").stdout.split("Commands:")[1], flags=re.MULTILINE)
+    listed = re.findall(r"^  ([\w-]+)  ", call("--help").stdout.split("Commands:")[1], flags=re.MULTILINE)
     assert tuple(listed) == COMMANDS
 
 
@@ -142,7 +148,15 @@ def test_status_of_a_file_in_any_state(tmp_path, simulated, pending):
     if simulated is None:
         assert (found["newton_failed"], found["not_settled"]) == (2, 1)
     lines = call("status", path).stdout.splitlines()
-    assert lines == [f"{name}: {value}" for name, value in found.items()]
+    shares = found.pop("exceedance")
+    assert lines[: len(found)] == [f"{name}: {value}" for name, value in found.items()]
+    assert found["running"] is False
+    assert "damaged" not in found
+    assert len(lines) == len(found) + len(shares)
+    for share, line in zip(shares, lines[len(found) :], strict=True):
+        assert line.startswith(f"P({share['load']} > {share['limit']:g} {share['unit']}): {share['estimate']} (")
+        assert share["lower"] <= share["estimate"] <= share["upper"]
+    assert bool(shares) == (simulated != 0)
 
 
 def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path):
@@ -235,25 +249,25 @@ def test_report_makes_the_folder_it_is_to_write_to(tmp_path):
 
 
 def test_run_ends_with_the_report_and_goes_on_where_it_was(study):
-    done = call("run", study, "--workers", 1)
+    done = call("run", study, "--executor", "serial")
     assert done.exit_code == 0, done.stderr
     assert done.stdout.startswith("load")
     assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
     with ResultStore.open("small.h5") as store:
         assert store.complete
-    again = call("run", study, "--workers", 1)
+    again = call("run", study, "--executor", "serial")
     assert (again.exit_code, again.stdout) == (0, done.stdout)
 
 
 def test_run_with_fewer_joints_into_another_file_without_report(study, tmp_path):
-    done = call("run", study, "--n", 5, "--out", "five.h5", "--workers", 1, "--no-report")
+    done = call("run", study, "--n", 5, "--out", "five.h5", "--executor", "serial", "--no-report")
     assert (done.exit_code, done.stdout) == (0, "")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["five.h5", "small.toml"]
 
 
 def test_run_refuses_the_file_of_another_study(study):
-    call("run", study, "--n", 5, "--workers", 1, "--no-report")
-    done = call("run", study, "--workers", 1)
+    call("run", study, "--n", 5, "--executor", "serial", "--no-report")
+    done = call("run", study, "--executor", "serial")
     assert done.exit_code == 2
     assert "sampling.n: 5 in the file, 60 in the study" in done.stderr
 
@@ -295,7 +309,7 @@ def simulated(status, load):
     loads = {name: {"F": load, "T": load} for name in BUSHINGS}
     facts = {"status": status, "settled": status == "ok", "closure": load, "max": loads}
     trace = pd.DataFrame({"theta": [0.0, 180.0], "tau": [1.0, 0.1 + 0.2]})
-    return SimpleNamespace(summary=lambda: facts, to_pandas=lambda: trace)
+    return SimpleNamespace(summary=lambda: facts, to_pandas=lambda: trace, remedy=lambda: "try more")
 
 
 @pytest.fixture
@@ -322,7 +336,8 @@ def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch
     done = call("simulate", case)
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1].split() == ["fork4", "-", "-"]
-    assert done.stderr.startswith("warning: newton_failed: a step failed")
+    assert "warning: newton_failed: a step failed" in done.stderr
+    assert "hint: try more" in done.stderr
 
 
 @pytest.mark.parametrize("arguments", [("simulate", "--out"), ("export", "--csv")])

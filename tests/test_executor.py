@@ -1,4 +1,4 @@
-"""Blocks through a function in one or several processes: complete, in order of finishing, stoppable."""
+"""Blocks through a function in one or several processes: complete, in order of finishing, stoppable, unkillable."""
 
 from __future__ import annotations
 
@@ -8,16 +8,26 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests import fakes
-from tolstat.executor import THREAD_VARIABLES, WorkerDied, available_workers, map_blocks
+from tests.environment import environment
+from tolstat.executor import Lost, Work, WorkerDied, available_workers, map_here, map_in_processes
+from tolstat.executor.common import THREAD_VARIABLES, never
 
 SQUARES = {i: i * i for i in range(20)}
+
+
+def map_blocks(
+    function: Callable[[Any], Any], blocks: Iterable[Any], workers: int, stop: Callable[[], bool] = never, **how: Any
+) -> Generator[tuple[Any, Any], None, None]:
+    if workers == 1:
+        return map_here(Work(function, **how), blocks, stop)
+    return map_in_processes(Work(function, **how), blocks, workers, stop)
 
 
 def square(x: int) -> int:
@@ -34,17 +44,47 @@ def very_slow_first(x: int) -> int:
     return x
 
 
-def square_or_die(x: int) -> int:
-    if x == 11:
-        time.sleep(0.3)
+def squares(xs: list[int]) -> list[int]:
+    """Squares; 11 kills the process, 12 loops for ever, 13 is a bug."""
+    for x in xs:
+        if x == 11:
+            os.kill(os.getpid(), signal.SIGKILL)
+        while x == 12:
+            pass
+        if x == 13:
+            raise ZeroDivisionError("a bug")
+    return [x * x for x in xs]
+
+
+def singly(xs: list[int]) -> list[list[int]]:
+    return [[x] for x in xs]
+
+
+def die(x: int) -> int:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return x
+
+
+def bad_luck(job: tuple[str, int]) -> int:
+    """Square; the first process that comes to a multiple of three dies of it, the next does not."""
+    folder, x = job
+    if x % 3 == 0 and not Path(folder, str(x)).exists():
+        Path(folder, str(x)).touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return x * x
 
 
-def square_or_raise(x: int) -> int:
-    if x == 11:
-        raise ZeroDivisionError("a bug")
-    return x * x
+def die_in_the_middle(x: int) -> int:
+    return die(x) if 3 <= x < 7 else x
+
+
+def die_in_the_end(job: tuple[str, int]) -> int:
+    """Every process dies after five blocks, whatever it works at, as when another program takes all memory."""
+    folder, x = job
+    if len(list(Path(folder).iterdir())) >= 5:
+        die(x)
+    Path(folder, str(x)).touch()
+    return x
 
 
 def surroundings(x: int) -> tuple[int, dict[str, str | None], bool]:
@@ -111,35 +151,73 @@ def test_leaving_early_ends_the_workers_at_once() -> None:
     assert time.monotonic() - begin < 50  # not the minute that block 0 takes
 
 
-def test_a_worker_that_dies_is_an_error_after_the_finished_blocks() -> None:
-    seen: dict[int, int] = {}
-    with pytest.raises(WorkerDied, match="a worker process died") as caught:
-        seen.update(map_blocks(square_or_die, range(20), 2))
-    assert "hint: use fewer workers" in str(caught.value)
-    assert len(seen) >= 8  # block 11 was handed out when all but four before it had come back
-    assert all(result == block * block for block, result in seen.items())
-    assert 11 not in seen
+def test_blocks_that_cannot_be_done_are_given_up_alone() -> None:
+    blocks = [list(range(first, first + 5)) for first in range(0, 40, 5)]
+    found: dict[int, Any] = {}
+    for block, result in map_blocks(squares, blocks, 2, split=singly, limit_s=0.5):
+        if isinstance(result, Lost):
+            assert len(block) == 1
+            found[block[0]] = result
+        else:
+            found |= dict(zip(block, result, strict=True))
+    assert found.pop(11) == Lost("crashed", "killed by SIGKILL")
+    assert found.pop(12) == Lost("timeout", "took more than 0.5 s")
+    bug = found.pop(13)
+    assert (bug.kind, bug.reason.splitlines()[0]) == ("crashed", "ZeroDivisionError: a bug")
+    assert found == {x: x * x for x in range(40) if x not in (11, 12, 13)}
     assert multiprocessing.active_children() == []
 
 
+def test_a_single_death_is_nobodys_fault(tmp_path: Path) -> None:
+    jobs = [(str(tmp_path), x) for x in range(12)]
+    assert dict(map_blocks(bad_luck, jobs, 2)) == {job: job[1] ** 2 for job in jobs}
+    assert {int(p.name) for p in tmp_path.iterdir()} == {0, 3, 6, 9}
+
+
+def test_the_only_block_is_given_up_too() -> None:
+    assert list(map_in_processes(Work(die), [1], 1)) == [(1, Lost("crashed", "killed by SIGKILL"))]
+
+
+def test_no_block_is_blamed_when_all_workers_die() -> None:
+    with pytest.raises(WorkerDied, match="6 times in a row a worker process died over its block") as caught:
+        list(map_in_processes(Work(die), range(100), 1))
+    assert "killed by SIGKILL\n  hint: use fewer workers" in str(caught.value)
+    assert multiprocessing.active_children() == []
+
+
+def test_no_block_is_blamed_when_workers_begin_to_die(tmp_path: Path) -> None:
+    seen: dict[Any, int] = {}
+    with pytest.raises(WorkerDied):
+        seen.update(map_in_processes(Work(die_in_the_end), ((str(tmp_path), x) for x in range(100)), 1))
+    assert sorted(seen.values()) == list(range(5))
+
+
+def test_many_bad_blocks_in_a_row_are_given_up() -> None:
+    """Since one that came through before does so again, it is the blocks and not the machine."""
+    found = dict(map_in_processes(Work(die_in_the_middle), range(9), 1))
+    assert {x for x, result in found.items() if isinstance(result, Lost)} == set(range(3, 7))
+
+
 @pytest.mark.parametrize("workers", [1, 2])
-def test_an_exception_of_the_function_comes_through(workers: int) -> None:
-    seen: dict[int, int] = {}
+def test_an_exception_in_every_block_comes_through(workers: int) -> None:
     with pytest.raises(ZeroDivisionError, match="a bug"):
-        seen.update(map_blocks(square_or_raise, range(20), workers))
-    assert 11 not in seen
-    assert len(seen) >= 8  # block 11 was handed out when all but four before it had come back
-    assert all(result == block * block for block, result in seen.items())
+        list(map_blocks(squares, [[13]] * 40, workers))
+
+
+def test_workers_that_cannot_start() -> None:
+    with pytest.raises(WorkerDied, match="died before it had begun, 3 times in a row: ended with exit code 0"):
+        list(map_blocks(square, range(9), 2, prepare=sys.exit))
 
 
 def test_a_script_without_a_main_guard_is_told(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text("from tests.test_executor import *\nprint(dict(map_blocks(square, range(4), 2)))\n")
     python = [sys.executable, str(script)]
-    ended = subprocess.run(python, env=fakes.environment(), capture_output=True, text=True, check=False)
+    ended = subprocess.run(python, env=environment(), capture_output=True, text=True, check=False)
     assert ended.returncode == 1
     assert "WorkerDied" in ended.stderr
     assert '__name__ == "__main__"' in ended.stderr
+    assert "died before it had begun" in ended.stderr
 
 
 def test_workers_end_with_their_parent(tmp_path: Path) -> None:
@@ -152,7 +230,7 @@ def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     )
     script = tmp_path / "script.py"
     script.write_text(code)
-    parent = subprocess.Popen([sys.executable, str(script)], env=fakes.environment(), stdout=subprocess.PIPE)
+    parent = subprocess.Popen([sys.executable, str(script)], env=environment(), stdout=subprocess.PIPE)
     assert parent.stdout is not None
     workers = {int(parent.stdout.readline()) for _ in range(20)}
     parent.kill()

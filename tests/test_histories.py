@@ -16,6 +16,7 @@ from tests.test_store import in_another_process, new_store, simulation
 from tolstat.errors import StoreError
 from tolstat.store import ResultStore
 from tolstat.store.histories import HistoryParts
+from tolstat.store.result_file import text
 
 
 @pytest.fixture
@@ -51,7 +52,7 @@ def test_finished_file_holds_the_histories(tmp_path: Path, study: fakes.Study) -
         for name, spec in fakes.SPECS.items():
             dataset = file["histories"][name]
             assert dataset.compression == "gzip"
-            assert dataset.attrs["units"] == spec.unit
+            assert text(dataset.attrs, "units") == spec.unit
             np.testing.assert_array_equal(dataset[...], expected[name])
     assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
 

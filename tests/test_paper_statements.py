@@ -11,9 +11,8 @@ from numpy.testing import assert_allclose
 
 from tolstat.analysis import paper_laws, paper_statements
 from tolstat.analysis.paper_evidence import Answer, Evidence, signed
-from tolstat.joint import Joint, load
+from tolstat.joint import Joint, load, varied
 from tolstat.joint.sections import BeamAxes
-from tolstat.report import paper_main
 from tolstat.tables import BUSHINGS
 
 CASES = ("ideal", "Pos fork +t", "Pos cross +t", "Ang fork +z", "Ang cross +z")
@@ -137,7 +136,7 @@ def test_laws_are_told_apart_by_single_loads_and_answers():
 def test_values_of_a_variant_make_its_joint():
     base = load("cirelli2021", {}, "test")
     values = {"cross.r_b": 0.03, "contact.law": "point", "bushing.cross.k_x": 1e9, "arm.inertia": [1e-4, 1e-4, 1e-4]}
-    joint = paper_main.varied(base, values)
+    joint = varied(base, values)
     written = {"cross": {"r_b": "30 mm"}, "contact": {"law": "point"}, "bushing": {"cross": {"k_x": "1e9 N/m"}}}
     assert joint == load("cirelli2021", written | {"arm": {"inertia": ["1e-4 kg*m^2"] * 3}}, "test")
     assert base == load("cirelli2021", {}, "test")
@@ -146,10 +145,10 @@ def test_values_of_a_variant_make_its_joint():
 def test_values_can_add_and_drop_a_table_of_stiffness():
     base = load("cirelli2021", {}, "test")
     assert base.bushing.cross is not None
-    bare = paper_main.varied(base, {"bushing.stiffness": "beam", "bushing.cross": None})
+    bare = varied(base, {"bushing.stiffness": "beam", "bushing.cross": None})
     assert bare.bushing.cross is None
     table = {f"bushing.cross.{name}": value for name, value in base.bushing.cross.model_dump().items()}
-    again = paper_main.varied(bare, {"bushing.stiffness": "given"} | table)
+    again = varied(bare, {"bushing.stiffness": "given"} | table)
     assert isinstance(again.bushing.cross, BeamAxes)
     assert_allclose(again.k_cross, base.k_cross)
 
@@ -158,7 +157,7 @@ def test_as_printed_joint_by_its_values():
     base = load("cirelli2021", {}, "test")
     printed: Joint = load("cirelli2021_as_printed", {}, "test")
     values = {"material.rho": 7.7e-6, "arm.mass": 0.3516, "contact.c_d": 3.71e8}
-    same = paper_main.varied(base, values)
+    same = varied(base, values)
     assert same.model_dump(exclude={"description"})["contact"] == printed.model_dump()["contact"]
     assert same.material == printed.material
 

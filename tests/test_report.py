@@ -116,7 +116,7 @@ def _not_drawn(figure):
     return hidden
 
 
-def _overlapping(figure):
+def overlapping(figure):
     """Pairs of texts on a page whose boxes overlap."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -145,7 +145,7 @@ def _overlapping(figure):
     ],
 )
 def test_no_text_lies_on_another_or_leaves_the_page(draw):
-    assert _overlapping(draw()) == []
+    assert overlapping(draw()) == []
 
 
 @pytest.mark.parametrize("status", [Status.PENDING, Status.NEWTON_FAILED])

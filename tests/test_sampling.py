@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from tolstat import sampling, study
+from tolstat.errors import InputError
 from tolstat.study import Study
 from tolstat.tables import ERROR, ERROR_FIELDS
 
@@ -175,3 +176,55 @@ def test_sweep_is_a_grid(make: Make, tmp_path: Path) -> None:
 def test_dimension_table_is_that_of_the_errors() -> None:
     assert list(sampling.dimensions()) == [f.name for f in ERROR_FIELDS]
     assert list(sampling.dimensions().values()) == list(range(len(ERROR_FIELDS)))
+
+
+KINDS = (
+    '"pin1.offset_t" = { plus_minus = "0.1 mm", distribution = "normal" }\n'
+    '"pin2.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", truncate = true }\n'
+    '"pin3.offset_t" = { plus_minus = "0.1 mm", distribution = "uniform" }\n'
+    '"pin4.offset_t" = { plus_minus = "0.1 mm", distribution = "triangular" }\n'
+    '"hole1.offset_radial" = { plus_minus = "0.1 mm", distribution = "rayleigh" }\n'
+    '"hole2.offset_t" = { plus_minus = "0.1 mm", distribution = "beta", a = 2, b = 5 }\n'
+    '"hole3.offset_t" = { lower = "0.01 mm", upper = "0.1 mm", distribution = "lognormal", cpk = 1.0 }\n'
+)
+TIED = '[[correlation]]\nbetween = ["pin*.offset_t", "hole2.offset_t"]\nrho = 0.4\n'
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_any_rows_are_those_of_the_whole(make: Make, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slices of a campaign and its continuation draw the same bits as one draw."""
+    s = make(KINDS, method=method, n=997, more=TIED)
+    whole = sampling.draw(s)
+    for rows in (range(1), range(998), range(1, 2), range(5, 18), range(400, 998), range(997, 998), range(7, 7)):
+        assert sampling.draw(s, rows).tobytes() == whole[rows.start : rows.stop].tobytes(), rows
+    monkeypatch.setattr(sampling, "BLOCK", 64)
+    blocks = list(sampling.draw_blocks(s, range(3, 900)))
+    assert b"".join(block.tobytes() for block in blocks) == whole[3:900].tobytes()
+    assert max(len(block) for block in blocks) == (897 if method == "lhs" else 64)
+
+
+def test_any_rows_of_a_sweep_and_of_a_list(tmp_path: Path) -> None:
+    sweep = '"pin*.diameter" = { from = "-0.1 mm", to = "0.1 mm", points = 5 }\n"pin1.tilt_t" = { from = "0.2 deg", '
+    bodies = {
+        "sweep": f'[sweep]\n{sweep}to = "1 deg", points = 7 }}\n',
+        "cases": '[grid]\n"operation.alpha" = ["0 deg", "9 deg"]\n[[case]]\nname = "a"\nerrors = { "pin1.offset_e" = '
+        '"0.1 mm" }\n[[case]]\nname = "b"\nerrors = { "pin2.tilt_t" = "1 deg" }\n',
+    }
+    head = HEAD.partition("[errors]")[0]
+    for method, body in bodies.items():
+        path = tmp_path / f"{method}.toml"
+        path.write_text(f'{head}[sampling]\nmethod = "{method}"\n{body}', encoding="utf-8")
+        s = study.load(path)
+        whole = sampling.draw(s)
+        assert len(np.unique(whole)) == s.rows
+        parts = [sampling.draw(s, range(a, min(a + 4, s.rows))) for a in range(0, s.rows, 4)]
+        assert np.concatenate(parts).tobytes() == whole.tobytes()
+
+
+def test_a_slice_of_a_thousand_million_joints(make: Make) -> None:
+    s = make(OFFSET, DIAMETER, n=10**9)
+    errors = sampling.draw(s, range(10**9 - 2, 10**9 + 1))
+    assert len(np.unique(errors)) == 3
+    assert s.design[10**9]["variant"] == 0
+    with pytest.raises(InputError, match="a Latin hypercube of 1000000000 joints"):
+        make(OFFSET, DIAMETER, method="lhs", n=10**9)

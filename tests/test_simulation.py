@@ -339,9 +339,10 @@ print(counts)
 
 def test_a_second_process_finds_the_compiled_kernel():
     code = """
+from tolstat.kernel.lockstep import lockstep
 from tolstat.simulation import warm_up
 warm_up()
-print(sum(simulate.simulate_joint.stats.cache_hits.values()), sum(simulate.simulate_joint.stats.cache_misses.values()))
+print(sum(lockstep.stats.cache_hits.values()), sum(lockstep.stats.cache_misses.values()))
 """
     python(code)
     assert python(code).split() == ["1", "0"]

@@ -19,6 +19,7 @@ from tests import fakes, format_tables
 from tolstat import campaign, tables
 from tolstat.errors import StoreError
 from tolstat.store import Counts, ResultStore, provenance
+from tolstat.store.result_file import text
 from tolstat.tables import Simulation, Status
 
 
@@ -80,13 +81,14 @@ def test_long_study_text_fits(tmp_path: Path) -> None:
 def test_every_dataset_has_unit_and_description(tmp_path: Path, study: fakes.Study) -> None:
     new_store(tmp_path / "a.h5", study).close()
     with h5py.File(tmp_path / "a.h5") as file:
-        assert file.attrs["filetype"] == "tolstat campaign"
-        assert file.attrs["schema_version"] == 1
+        assert file.attrs["filetype"] == b"tolstat campaign"
+        assert file.attrs["schema_version"] == 2
         for group, columns in (("errors", tables.ERROR_COLUMNS), ("results", tables.RESULT_COLUMNS)):
             assert set(file[group]) == {c.name for c in columns}
             for c in columns:
                 dataset = file[group][c.name]
-                assert (dataset.attrs["units"], dataset.attrs["description"]) == (c.unit, c.description)
+                assert text(dataset.attrs, "units") == c.unit
+                assert text(dataset.attrs, "description") == c.description
                 assert dataset.shape == (study.n,)
                 assert dataset.dtype == c.dtype
                 assert dataset.chunks is None
@@ -132,7 +134,7 @@ def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
     assert before.size == after.size
     may_change = np.zeros(before.size, bool)
     with h5py.File(path) as file:
-        for dataset in file["results"].values():
+        for dataset in (*file["results"].values(), *file["ledger"].values()):
             may_change[dataset.id.get_offset() :][: dataset.id.get_storage_size()] = True
     changed = before != after
     assert changed.any()
@@ -184,8 +186,8 @@ def test_limits_are_replaced_whole_or_not_at_all(
     [
         ({"filetype": "statepoint"}, "is HDF5, but of type 'statepoint'"),
         (
-            {"schema_version": 2},
-            "has schema version 2, this tolstat reads up to 1\n  hint: use a newer tolstat",
+            {"schema_version": 3},
+            "has schema version 3, this tolstat reads up to 2\n  hint: use a newer tolstat",
         ),
     ],
 )
@@ -200,10 +202,10 @@ def test_other_files_are_refused(tmp_path: Path, study: fakes.Study, change: dic
 
 
 def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> None:
-    text = tmp_path / "text.h5"
-    text.write_text("not HDF5")
+    plain = tmp_path / "text.h5"
+    plain.write_text("not HDF5")
     with pytest.raises(StoreError, match=r"text.h5: is not an HDF5 file\n  hint: give a file"):
-        ResultStore.open(text)
+        ResultStore.open(plain)
     with pytest.raises(StoreError, match=r"none.h5: is not there"):
         ResultStore.open(tmp_path / "none.h5")
     with pytest.raises(StoreError, match="is a folder"):
@@ -256,10 +258,10 @@ def test_create_replaces_nothing(tmp_path: Path, study: fakes.Study) -> None:
 
 
 def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(n: int) -> None:
+    def interrupt(*args: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tolstat.store.result_store.pending_results", interrupt)
+    monkeypatch.setattr("tolstat.store.result_store.fill", interrupt)
     with pytest.raises(KeyboardInterrupt):
         new_store(tmp_path / "a.h5", fakes.Study())
     assert list(tmp_path.iterdir()) == []
@@ -269,7 +271,7 @@ def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
     code = (
         "import os, signal, pathlib, tolstat.store.result_store\n"
         "from tests import fakes, test_store\n"
-        "tolstat.store.result_store.pending_results = lambda n: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "tolstat.store.result_store.fill = lambda *args: os.kill(os.getpid(), signal.SIGKILL)\n"
         f"test_store.new_store(pathlib.Path({str(tmp_path / 'a.h5')!r}), fakes.Study())"
     )
     ended = subprocess.run([sys.executable, "-c", code], env=fakes.environment(), check=False)
@@ -321,9 +323,9 @@ def test_document_is_up_to_date() -> None:
 
 def test_document_names_every_attribute(tmp_path: Path, study: fakes.Study) -> None:
     new_store(tmp_path / "a.h5", study).close()
-    text = format_tables.DOCUMENT.read_text(encoding="utf-8")
+    document = format_tables.DOCUMENT.read_text(encoding="utf-8")
     with h5py.File(tmp_path / "a.h5") as file:
-        for name, value in file.attrs.items():
-            assert f"\n| `{name}` | " in text
-            if f"| `{name}` | JSON |" in text:
-                json.loads(value)
+        for name in file.attrs:
+            assert f"\n| `{name}` | " in document
+            if f"| `{name}` | JSON |" in document:
+                json.loads(text(file.attrs, name))

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tolstat.errors import InputError, StoreError, TolstatError
     from tolstat.integration import integrate
     from tolstat.joint import perturb
+    from tolstat.pylife import series as pylife_series
     from tolstat.report import write as report
     from tolstat.sampling import draw
     from tolstat.simulation import simulate_rows
@@ -40,6 +41,7 @@ __all__ = [
     "load_case",
     "open",
     "perturb",
+    "pylife_series",
     "report",
     "run",
     "simulate_case",
@@ -58,6 +60,7 @@ _HOMES = {
     "load_case": "tolstat.study:load_case",
     "open": "tolstat.store:ResultStore.open",
     "perturb": "tolstat.joint:perturb",
+    "pylife_series": "tolstat.pylife:series",
     "report": "tolstat.report:write",
     "run": "tolstat.campaign:run",
     "simulate_case": "tolstat.trace:simulate_case",

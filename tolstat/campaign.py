@@ -1,73 +1,35 @@
-"""A campaign: the pending rows of a result file, in blocks, through the simulation and back into the file."""
+"""A campaign: the pending rows of a result file through the simulation and back into the file."""
 
 from __future__ import annotations
 
 import json
 import signal
-import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import closing
 from functools import partial
 from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat import fidelity, rainflow, signals, verify
 from tolstat.errors import Fault, InputError, StoreError
-from tolstat.executor import WorkerDied, available_workers, map_blocks
-from tolstat.progress import Reporter
+from tolstat.execution import Execution, Stages, pending, simulate_pending
+from tolstat.executor import WorkerDied
+from tolstat.progress import Reporter, note
+from tolstat.recorded import perturbed, settings
+from tolstat.retry import Retry, begin
 from tolstat.store import Counts, ResultStore
 from tolstat.store.provenance import versions
-from tolstat.tables import PARAM, HistorySpec, Options, Simulation
+from tolstat.tables import Status
 
 if TYPE_CHECKING:
     from tolstat.study import Study
 
-MAX_BLOCK = 32
-"""Largest default block: a second or a few of work, which is what a stop or a crash costs."""
-BLOCKS_PER_WORKER = 4
-"""Least blocks a worker by default, so that none is long idle at the end."""
-
-
-class Stages(NamedTuple):
-    """The functions that a campaign strings together; tests put simple ones in their place.
-
-    Attributes
-    ----------
-    draw : callable
-        Study -> (n,) table ERROR.
-    dimensions : callable
-        () -> dimension of the sequence by name of error.
-    perturb : callable
-        Joint, (m,) table ERROR -> (m,) table PARAM.
-    history_specs : callable
-        Options, kind of histories, number of harmonics -> what each history holds for a joint.
-    simulate : callable
-        (m,) table PARAM, Options, ``histories=``, ``n_harmonics=`` -> Simulation; goes to other processes.
-    warm_up : callable
-        Compiles what `simulate` needs. Done before there are workers: two processes that compile into one
-        cache can crash.
-    """
-
-    draw: Callable[..., NDArray[np.void]]
-    dimensions: Callable[[], Mapping[str, int]]
-    perturb: Callable[..., NDArray[np.void]]
-    history_specs: Callable[..., Mapping[str, HistorySpec]]
-    simulate: Callable[..., Simulation]
-    warm_up: Callable[[], object]
-
-
-class Block(NamedTuple):
-    """Rows of the campaign that are simulated together, and their parameters."""
-
-    rows: NDArray[np.intp]
-    params: NDArray[np.void]
-
 
 class Interrupted(Exception):
-    """A campaign was stopped by Ctrl-C; the file holds all finished blocks.
+    """A campaign was stopped by a signal; the file holds all finished blocks.
 
     Attributes
     ----------
@@ -75,11 +37,14 @@ class Interrupted(Exception):
         The result file.
     counts : Counts
         How far the campaign is.
+    exit_code : int
+        128 and the number of the signal: 130 after Ctrl-C, 143 after SIGTERM.
     """
 
-    def __init__(self, path: Path, counts: Counts) -> None:
+    def __init__(self, path: Path, counts: Counts, number: int = signal.SIGINT) -> None:
         self.path = path
         self.counts = counts
+        self.exit_code = 128 + number
         super().__init__(
             f"stopped: {counts.done} of {counts.total} joints are kept in {path}\n  hint: run the same command to go on"
         )
@@ -92,6 +57,12 @@ def run(
     block: int | None = None,
     progress: Reporter | None = None,
     stages: Stages | None = None,
+    rows: range | None = None,
+    until_row: int | None = None,
+    execution: Execution | None = None,
+    retry: Retry | None = None,
+    tell: Callable[[str], None] = note,
+    check: bool = True,
 ) -> Counts:
     """Simulate the joints of a study that its result file does not hold yet.
 
@@ -104,14 +75,24 @@ def run(
     out : str or Path
         Result file; made if it does not exist, otherwise its pending rows are done, and limits, text and name of the
         study taken over.
-    workers : int, optional
-        Processes; without it as many as there are cores. 1 computes in this process.
-    block : int, optional
-        Joints a block.
+    workers, block : int, optional
+        Short for an `Execution` of these.
     progress : Reporter, optional
         Told how far the campaign is, at the start and after every block.
     stages : Stages, optional
         Other functions than tolstat's own.
+    rows : range, optional
+        Rows of the campaign that the file holds, a slice of it; all without it.
+    until_row : int, optional
+        Rows of the campaign from this one on are left pending.
+    execution : Execution, optional
+        Where and how to simulate.
+    retry : Retry, optional
+        Joints that are simulated once more, and how.
+    tell : callable, optional
+        Told which fidelity ``auto`` has chosen, why a joint was given up, and how many are simulated once more.
+    check : bool
+        Simulate a few of the joints in other ways at the end, to know the numerical error; see `verify.small`.
 
     Returns
     -------
@@ -121,51 +102,53 @@ def run(
     Raises
     ------
     InputError
-        When `workers` or `block` is less than one.
+        When workers, block or time limit cannot be, or `rows` are none of the study's.
     StoreError
         When the file is of another study or was begun by other code (it names what differs), or cannot be used.
     Interrupted
-        When Ctrl-C was pressed.
+        When Ctrl-C was pressed or the process was asked to end.
     WorkerDied
-        When a worker was killed or crashed; the file holds all finished blocks.
+        When worker processes die whatever they work at; the file holds all finished blocks.
     """
-    _check_at_least_one(workers=workers, block=block)
+    execution = execution or Execution(workers=workers, block=block)
+    _check_positive(workers=execution.workers, block=execution.block, joint_timeout=execution.joint_timeout)
     stages = stages or _own_stages()
     path = Path(out)
-    with _create_or_resume(study, path, stages) as store:
-        pending = store.pending()
-        workers = workers or available_workers()
-        size = block or default_block(len(pending), workers)
-        blocks = _blocks(pending, size, partial(_parameters, stages.perturb, study, store.errors()))
-        function = partial(_simulate, stages.simulate, study.solver.options(), _history_options(study))
+    with signals.caught() as stop, _create_or_resume(study, path, stages, rows, tell) as store:
+        if retry:
+            retry = retry.chosen(store.fidelity)
+            begin(store, retry, stages.history_specs(retry.options, *_history_options(study)), tell)
         counts = store.counts()
+        last = store.n if until_row is None else until_row - store.rows.start
         try:
             if progress:
                 progress(counts)
-            if pending.size:
+            if next(pending(store, last), None) is not None:
                 stages.warm_up()
-            with _stop_on_interrupt() as stop:
-                workers = min(workers, -(-len(pending) // size)) if pending.size else 1
-                with closing(map_blocks(function, blocks, workers, stop)) as finished:
-                    for (rows, _), simulation in finished:
-                        store.write(rows, simulation)
-                        counts = counts.after(simulation.results["status"])
-                        if progress:
-                            progress(counts)
+                store.begin_session(counts.done)
+            finished = simulate_pending(study, store, last, stages, execution, stop)
+            with stop.patiently(), closing(finished):
+                for done in finished:
+                    store.write(done.rows, done.simulation)
+                    counts = counts.after(done.simulation.results["status"])
+                    if done.trouble:
+                        status = Status(done.simulation.results["status"][0])
+                        tell(f"row {store.rows[done.rows[0]]}: {status.label}: {done.trouble}")
+                    if progress:
+                        progress(counts)
+            if check:
+                verify.small(store, partial(_rows_of, study, store, stages), stages.simulate)
             store.finish()
+            store.end_session()
         except KeyboardInterrupt:
-            raise Interrupted(path, store.counts()) from None
+            store.end_session()
+            raise Interrupted(path, store.counts(), stop.number) from None
         except WorkerDied as error:
             kept = f"{counts.done} of {counts.total} joints are kept in {path}"
             raise WorkerDied(f"{error}\n  {kept}: run the same command to go on") from error
-        if not store.complete:
-            raise Interrupted(path, counts)
+        if next(pending(store, last), None) is not None:
+            raise Interrupted(path, counts, stop.number)
         return counts
-
-
-def default_block(n_pending: int, workers: int) -> int:
-    """Return how many joints make a block: seconds of work at most, and several blocks a worker."""
-    return max(1, min(MAX_BLOCK, n_pending // (BLOCKS_PER_WORKER * workers)))
 
 
 def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
@@ -188,7 +171,7 @@ def _own_stages() -> Stages:
     from tolstat import joint, sampling, simulation
 
     return Stages(
-        sampling.draw,
+        sampling.draw_blocks,
         sampling.dimensions,
         joint.perturb,
         simulation.history_specs,
@@ -197,13 +180,24 @@ def _own_stages() -> Stages:
     )
 
 
-def _create_or_resume(study: Study, path: Path, stages: Stages) -> ResultStore:
+def _create_or_resume(
+    study: Study, path: Path, stages: Stages, rows: range | None, tell: Callable[[str], None]
+) -> ResultStore:
+    rows = range(study.rows) if rows is None else rows
+    if not (0 <= rows.start < rows.stop <= study.rows and rows.step == 1):
+        found = f"{rows.start}:{rows.stop} are no rows of the {study.rows} that the study has"
+        raise InputError([Fault("rows", found, f"give a part of 0:{study.rows}")])
     if not path.exists():
-        histories = stages.history_specs(study.solver.options(), *_history_options(study))
-        return ResultStore.create(path, study, stages.draw(study), histories, stages.dimensions())
+        choice = choose_fidelity(study, stages) if study.solver.fidelity == "auto" else {}
+        if choice:
+            tell(fidelity.describe(choice))
+        options = settings(study.solver, choice)
+        histories = stages.history_specs(options, *_history_options(study))
+        errors = stages.draw(study, rows)
+        return ResultStore.create(path, study, errors, histories, stages.dimensions(), rows, options, choice)
     store = ResultStore.open(path, "r+")
     try:
-        _check_same(store, study)
+        _check_same(store, study, rows)
         store.judge_by(study)
     except StoreError:
         store.close()
@@ -211,7 +205,37 @@ def _create_or_resume(study: Study, path: Path, stages: Stages) -> ResultStore:
     return store
 
 
-def _check_same(store: ResultStore, study: Study) -> None:
+def _rows_of(study: Study, store: ResultStore, stages: Stages, rows: NDArray[np.intp]) -> NDArray[np.void]:
+    """Parameters of rows of the file, (m,) table PARAM."""
+    errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
+    return perturbed(study, rows + store.rows.start, errors, stages.perturb)
+
+
+def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any]:
+    """Choose the fidelity of a new campaign by a pilot of its joints.
+
+    Returns
+    -------
+    dict
+        The record of the choice, see `fidelity.Choice`.
+    """
+    stages = stages or _own_stages()
+    stages.warm_up()
+    rows = fidelity.pilot(study.rows, study.sampling.nominal_first, study.sampling.seed)
+    errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
+    params = perturbed(study, rows, errors, stages.perturb)
+    simulate = partial(stages.simulate, histories="none", n_harmonics=0)
+    budget, least = study.solver.error_budget, _least_steps(*_history_options(study))
+    return fidelity.choose(params, study.solver.options(), budget, study.asked, simulate, least).record
+
+
+def _least_steps(histories: str, n_harmonics: int) -> int:
+    """Fewest steps a revolution that the histories kept can be made from."""
+    harmonics = 2 * n_harmonics + 1 if "harmonics" in histories else 0
+    return max(harmonics, rainflow.LEAST_SAMPLES if "cycles" in histories else 0)
+
+
+def _check_same(store: ResultStore, study: Study, rows: range) -> None:
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     found, remedy = "is the result file of another study", "use another --out, or delete the file"
     if not differing:
@@ -222,71 +246,24 @@ def _check_same(store: ResultStore, study: Study) -> None:
         held = store.versions.get(name, "unknown")
         if held != now[name]:
             differing.append(f"{name}: {noun} {held} in the file, {now[name]} now")
+    if not differing and store.rows != rows:
+        held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
+        raise StoreError(str(Fault(str(store.path), f"holds rows {held}, not {asked}", f"give --rows {held}")))
     if differing:
         lines = "\n    ".join([found, *differing])
         raise StoreError(str(Fault(str(store.path), lines, remedy)))
 
 
-def _check_at_least_one(**numbers: int | None) -> None:
-    faults = [
-        Fault(name, f"{value} is less than one", "give a whole number of 1 or more")
-        for name, value in numbers.items()
-        if value is not None and value < 1
-    ]
+def _check_positive(**numbers: float | None) -> None:
+    faults = []
+    for name, value in numbers.items():
+        if value is not None and not (value > 0 if isinstance(value, float) else value >= 1):
+            faults.append(
+                Fault(name, f"{value} is too small", "give a time above zero, or a whole number of 1 or more")
+            )
     if faults:
         raise InputError(faults)
 
 
 def _history_options(study: Study) -> tuple[str, int]:
     return study.output.histories, study.output.harmonics
-
-
-def _blocks(
-    pending: NDArray[np.intp], size: int, parameters: Callable[[NDArray[np.intp]], NDArray[np.void]]
-) -> Iterator[Block]:
-    for first in range(0, len(pending), size):
-        rows = pending[first : first + size]
-        yield Block(rows, parameters(rows))
-
-
-def _parameters(
-    perturb: Callable[..., NDArray[np.void]], study: Study, errors: NDArray[np.void], rows: NDArray[np.intp]
-) -> NDArray[np.void]:
-    """Parameters of `rows`, (m,) table PARAM, each from the joint of its own variant."""
-    params = np.empty(len(rows), PARAM)
-    variant = study.design["variant"][rows]
-    for number in np.unique(variant):
-        here = variant == number
-        params[here] = perturb(study.joints[number], errors[rows[here]])
-    return params
-
-
-def _simulate(
-    simulate: Callable[..., Simulation], options: Options, histories: tuple[str, int], block: Block
-) -> Simulation:
-    kind, n_harmonics = histories
-    return simulate(block.params, options, histories=kind, n_harmonics=n_harmonics)
-
-
-@contextmanager
-def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
-    """Turn the first Ctrl-C into a request to stop after the blocks in work; the second one interrupts.
-
-    So that no interrupt lands in the middle of writing. Only the main thread can catch signals; elsewhere
-    Ctrl-C is the caller's affair.
-    """
-    asked: list[int] = []
-
-    def ask(number: int, frame: FrameType | None) -> None:
-        if asked:
-            raise KeyboardInterrupt
-        asked.append(number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
-        return
-    before = signal.signal(signal.SIGINT, ask)
-    try:
-        yield lambda: bool(asked)
-    finally:
-        signal.signal(signal.SIGINT, before)

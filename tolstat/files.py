@@ -64,6 +64,27 @@ def writing(path: Path, overwrite: bool = True) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def check_room(path: Path, size: int) -> None:
+    """Check that a file of `size` bytes can be written beside `path`, by taking the room for a moment.
+
+    HDF5 does not survive a full disk: a file that cannot be closed stays open, and complains of it to the end.
+
+    Raises
+    ------
+    OSError
+        When there is no room.
+    """
+    if not hasattr(os, "posix_fallocate"):
+        return
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
+    try:
+        os.posix_fallocate(handle, 0, size)
+    finally:
+        os.close(handle)
+        temporary.unlink()
+
+
 def sync(path: Path) -> None:
     """Wait until a file, or the names in a folder, are on the disk."""
     folder = path.is_dir()

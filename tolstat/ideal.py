@@ -1,10 +1,12 @@
-"""Closed forms of the ideal joint: no errors, no clearance, no elasticity, no inertia.
+"""Closed forms of the ideal joint: no errors, no clearance, no elasticity; no inertia but in `loads`.
 
 Truth for tests and baseline of reports. Source: Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and
 Driveshafts, ch. 4; Cirelli et al. (2021), eq. (2).
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -75,3 +77,41 @@ def pin_force(theta: ArrayLike, alpha: float, torque: float, radius: float) -> A
     Other parameters as in `cross_couple`.
     """
     return cross_couple(theta, alpha, torque) / (2 * radius)
+
+
+def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
+    """Loads of all bushings and contact forces of the ideal joint at its operating point.
+
+    Each pin is in touch with the outer end of its hole, R + z/2 from the centre (R + the outermost station's distance
+    with the law ``sliced``), as it is once the cross has turned through its clearance; without clearance both touch
+    and the force lies further in. What moves the bodies in the ideal motion is included: centrifugal loads, the
+    cross's couple, inertia of the output shaft and its arms. Without it the forces are those of `pin_force`, and in
+    the forks' axes the secondary couples, up to T sin(alpha) on the input side and T tan(alpha) on the output side.
+
+    Parameters
+    ----------
+    theta : array_like, shape (n,)
+        Input angle, rad.
+    par : ndarray of PARAM, shape (1,)
+        The joint; its errors and clearances are not looked at.
+
+    Returns
+    -------
+    loads : ndarray, shape (n, 8, 6)
+        Force e, t, z (N) and torque e, t, z (N m) of the bushings cross 1-4, fork 1-4 on the lump, at the base
+        marker and in its axes.
+    contact : ndarray, shape (n, 4)
+        Force between each pin and its hole, N.
+    """
+    from tolstat.kernel.ideal_loads import ideal_loads
+    from tolstat.kernel.simulate import make_scratch
+    from tolstat.tables import Options
+
+    angles = np.atleast_1d(np.asarray(theta, float))
+    row: Any = par.view(np.recarray)[0]
+    work, state, _ = make_scratch(Options())
+    load, contact = np.empty((angles.size, 8, 6)), np.empty((angles.size, 4))
+    for i, angle in enumerate(angles):
+        ideal_loads(angle, row, state, work)
+        load[i], contact[i] = work.load, work.contact[:, 0]
+    return load, contact

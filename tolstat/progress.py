@@ -49,6 +49,11 @@ def text(counts: Counts, begun: int, seconds: float) -> str:
     return ", ".join([*words, f"{counts.failed} failed", f"{counts.not_settled} not settled"])
 
 
+def note(text: str) -> None:
+    """Say on stderr what happened to a joint."""
+    print(f"tolstat: {text}", file=sys.stderr, flush=True)
+
+
 def _clock(seconds: float) -> str:
     minutes, s = divmod(round(seconds), 60)
     hours, m = divmod(minutes, 60)
@@ -93,8 +98,12 @@ class Lines:
             self._said = now
             self._print()
 
+    def note(self, text: str) -> None:
+        """Say what happened to a joint."""
+        print(f"tolstat: {text}", file=self._stream or sys.stderr, flush=True)
+
     def _print(self) -> None:
-        print(f"tolstat: {self._last}", file=self._stream or sys.stderr, flush=True)
+        self.note(self._last)
         self._last = ""
 
 
@@ -130,6 +139,11 @@ class Bar:
             self._bar.add_task("", total=counts.total)
         words = text(counts, self._start[0], now - self._start[1])
         self._bar.update(self._bar.task_ids[0], completed=counts.done, description=words)
+
+    def note(self, text: str) -> None:
+        """Say above the bar what happened to a joint."""
+        if self._bar is not None:
+            self._bar.console.print(f"tolstat: {text}", markup=False, highlight=False)
 
 
 def reporter() -> Bar | Lines:

@@ -1,13 +1,14 @@
-"""From a study to the errors of all its joints, drawn before anything runs.
+"""From a study to the errors of its joints, drawn before anything runs.
 
-The errors of joint i depend on the seed, i and the error's name only: not on the number of joints, and not on
-other errors that are added to the study later (`lhs` excepted, whose strata are as many as its joints).
+The errors of joint i depend on the seed, i and the error's name only: not on the number of joints, not on which
+others are drawn with it, and not on other errors that are added to the study later (`lhs` excepted, whose strata are
+as many as its joints).
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,31 +24,56 @@ Array = NDArray[np.float64]
 Table = NDArray[np.void]
 
 
-def draw(study: Study) -> Table:
-    """Draw the errors of all joints of a study.
+BLOCK = 1 << 16
+"""Rows drawn at a time: a table of 27 MB."""
+
+
+def draw(study: Study, rows: range | None = None) -> Table:
+    """Draw the errors of the joints of a study.
 
     Parameters
     ----------
     study : Study
         What to draw.
+    rows : range, optional
+        Which rows, without gaps; all of the study's without it.
 
     Returns
     -------
-    ndarray, (study.rows,), dtype ERROR
-        Row 0 is the nominal joint when ``sampling.nominal_first`` is true: no error of any kind, not even the
-        study's fixed ones. The other rows are samples 0, 1, 2, ...
+    ndarray, (len(rows),), dtype ERROR
+        Row 0 of the study is the nominal joint when ``sampling.nominal_first`` is true: no error of any kind, not even
+        the study's fixed ones. The other rows are samples 0, 1, 2, ...
     """
-    table = nominal_errors(study.rows, study.operation)
-    samples = table[int(study.sampling.nominal_first) :]
+    rows = range(study.rows) if rows is None else rows
+    table = nominal_errors(len(rows), study.operation)
+    nominal = int(study.sampling.nominal_first)
+    samples = table[max(0, nominal - rows.start) :]
+    numbers = range(rows.stop - nominal - samples.size, rows.stop - nominal)
     for name, value in study.errors.items():
         samples[name] = value
     if study.sampling.method == "sweep":
-        _fill_grid(samples, study.sweep)
+        _fill_grid(samples, study.sweep, numbers)
     elif study.listed is not None:
-        _fill_listed(samples, study.listed)
+        _fill_listed(samples, study.listed, numbers)
     else:
-        _fill_scatter(samples, study)
+        _fill_scatter(samples, study, numbers)
     return table
+
+
+def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
+    """Draw `rows` of a study as tables of at most `BLOCK` rows, one after the other.
+
+    A Latin hypercube, whose permutations go over all of its joints, is drawn in one.
+    """
+    size = len(rows) if study.sampling.method == "lhs" else BLOCK
+    for first in range(rows.start, rows.stop, size):
+        yield draw(study, range(first, min(first + size, rows.stop)))
+
+
+def values(errors: Table, name: str) -> Array:
+    """Values that the distribution of an error gave, (n,), SI: for ``pin1.offset_radial`` the radii."""
+    columns = columns_of(name)
+    return np.asarray(errors[name] if len(columns) == 1 else np.hypot(*(errors[column] for column in columns)))
 
 
 def dimensions() -> dict[str, int]:
@@ -59,25 +85,30 @@ def dimensions() -> dict[str, int]:
     return {field.name: number for number, field in enumerate(ERROR_FIELDS)}
 
 
-def _fill_grid(samples: Table, axes: Sequence[SweepAxis]) -> None:
+def _fill_grid(samples: Table, axes: Sequence[SweepAxis], numbers: range) -> None:
     """Product grid of the axes, the last running fastest."""
-    values = np.meshgrid(*(np.linspace(a.start, a.stop, a.points) for a in axes), indexing="ij")
-    for axis, value in zip(axes, values, strict=True):
+    index = np.unravel_index(np.arange(numbers.start, numbers.stop), [axis.points for axis in axes])
+    for axis, at in zip(axes, index, strict=True):
         for name in axis.names:
-            samples[name] = value.ravel()
+            samples[name] = np.linspace(axis.start, axis.stop, axis.points)[at]
 
 
-def _fill_listed(samples: Table, design: Design) -> None:
-    """Point of the grid and errors of the case of each row."""
-    for values, index in ((design.points, design.point()), (tuple(design.cases.values()), design.table["case"])):
+def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
+    """Operating point of the variant, point of the grid and errors of the case of each row."""
+    here = slice(numbers.start, numbers.stop)
+    variant, case, point = design.table["variant"][here], design.table["case"][here], design.point()[here]
+    for number, operation in enumerate(design.operations):
+        for key, value in operation.model_dump().items():
+            samples[f"operation.{key}"][variant == number] = value
+    for values, index in ((design.points, point), (tuple(design.cases.values()), case)):
         for number, fixed in enumerate(values):
             for name, value in fixed.items():
                 samples[name][index == number] = value
 
 
-def _fill_scatter(samples: Table, study: Study) -> None:
+def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
     columns = list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
-    u = _uniforms(columns, samples.size, study.sampling.method, study.sampling.seed)
+    u = _uniforms(columns, numbers, study)
     names = study.copula.names
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))
@@ -91,22 +122,29 @@ def _fill_scatter(samples: Table, study: Study) -> None:
             samples[name] = distribution.ppf(u[name])
 
 
-def _uniforms(names: Sequence[str], n: int, method: str, seed: int) -> dict[str, Array]:
-    """Probabilities in (0, 1), independent from name to name; shape (n,) each."""
-    if method == "sobol":
-        points = sobol(n, len(ERROR_FIELDS), seed)
+def _uniforms(names: Sequence[str], numbers: range, study: Study) -> dict[str, Array]:
+    """Probabilities in (0, 1) of the samples `numbers`, independent from name to name; shape (len(numbers),) each."""
+    seed, n, first = study.sampling.seed, len(numbers), numbers.start
+    if study.sampling.method == "sobol":
+        points = sobol(n, len(ERROR_FIELDS), seed, first)
         return {name: points[:, dimensions()[name]] for name in names}
-    if method == "lhs":
-        return {name: _stratified(n, _stream(seed, f"lhs {name}")) for name in names}
+    if study.sampling.method == "lhs":
+        here = slice(first, numbers.stop)
+        return {name: _stratified(study.samples, _stream(seed, f"lhs {name}"))[here] for name in names}
     # a stream may give 0 itself, once in 2^53 draws
-    return {name: np.maximum(_stream(seed, name).random(n), 2.0**-54) for name in names}
+    return {name: np.maximum(_stream(seed, name, first).random(n), 2.0**-54) for name in names}
 
 
-def _stream(seed: int, name: str) -> np.random.Generator:
-    """Random stream of one name: counter-based, so that two keys never share a part of a stream."""
+def _stream(seed: int, name: str, first: int = 0) -> np.random.Generator:
+    """Random stream of one name from its number `first` on: counter-based, two keys never share a part of a stream."""
     digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
     key = np.array([seed, int.from_bytes(digest, "little")], dtype=np.uint64)
-    return np.random.Generator(np.random.Philox(key=key))
+    counter, within = divmod(first, 4)  # a count of Philox gives four numbers
+    bits = np.random.Philox(key=key)
+    bits.advance(counter)
+    stream = np.random.Generator(bits)
+    stream.random(within)
+    return stream
 
 
 def _stratified(n: int, stream: np.random.Generator) -> Array:

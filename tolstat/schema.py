@@ -23,8 +23,8 @@ class Strict(BaseModel):
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
+def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
+    """Read a TOML file, or `text` in its place.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         When the file cannot be read or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8") if text is None else text)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import RESULT, HistorySpec, Options, Simulation, Status
+from tolstat import rainflow
+from tolstat.tables import PARAM, RESULT, SIMULATED, Fidelity, HistorySpec, Method, Options, Simulation
 
 if TYPE_CHECKING:
+    from tolstat.kernel.batch import Batch
     from tolstat.kernel.simulate import Scratch
 
-Histories = Literal["none", "harmonics", "full"]
+Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
+
+MOST_KEPT = 64
+"""Joints whose last revolution is in memory at a time, some 200 kB each."""
 
 
 def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
@@ -23,7 +29,7 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
     ----------
     options : Options
         ``steps_per_rev`` gives the number of samples; sample k belongs to the input angle 2 pi k / steps_per_rev.
-    histories : {"none", "harmonics", "full"}
+    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
         What is kept.
     n_harmonics : int
         Highest multiple of the input speed that ``"harmonics"`` keeps.
@@ -35,24 +41,26 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
     n = options.steps_per_rev
     loads = "force e, t, z (N), torque e, t, z (N m) of bushings cross 1-4, fork 1-4 on the lump, in base marker axes"
     if histories == "full":
+        contact = "normal force on the outer and inner half of pins 1-4"
+        modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
-            "loads": HistorySpec((n, 8, 6), "f4", "N, N*m", loads),
-            "contact": HistorySpec((n, 4, 2), "f4", "N", "normal force on the outer and inner half of pins 1-4"),
-            "mode": HistorySpec(
-                (n, 4), "u1", "1", "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
-            ),
-            "tau": HistorySpec((n,), "f8", "1", "speed ratio"),
+            "loads": HistorySpec((n, 8, 6), "f4", "N, N*m", loads, ("theta", "bushing", "component")),
+            "contact": HistorySpec((n, 4, 2), "f4", "N", contact, ("theta", "pin", "half")),
+            "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
+            "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
         }
-    if histories == "harmonics":
+    specs = dict(rainflow.SPECS) if "cycles" in histories else {}
+    if "harmonics" in histories:
+        axes = ("bushing", "component", "harmonic")
         shape = (8, 6, min(n_harmonics, (n - 1) // 2) + 1)
         text = f"part of the Fourier coefficients c_h: {loads}; load(theta) = Re(c_0 + 2 sum c_h exp(i h theta))"
         error = "largest deviation of the load so restored, relative to the largest |F| and |T| of the joint"
-        return {
-            "coefficients_real": HistorySpec(shape, "f4", "N, N*m", f"real {text}"),
-            "coefficients_imag": HistorySpec(shape, "f4", "N, N*m", f"imaginary {text}"),
-            "harmonics_error": HistorySpec((2,), "f8", "1", error),
+        specs |= {
+            "coefficients_real": HistorySpec(shape, "f4", "N, N*m", f"real {text}", axes),
+            "coefficients_imag": HistorySpec(shape, "f4", "N, N*m", f"imaginary {text}", axes),
+            "harmonics_error": HistorySpec((2,), "f8", "1", error, ("load",)),
         }
-    return {}
+    return specs
 
 
 def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.float64]:
@@ -92,10 +100,26 @@ def scratch(options: Options) -> Scratch:
     return make_scratch(options)
 
 
+@cache
+def lanes(options: Options) -> Batch:
+    """Work arrays of this process for joints in lock-step."""
+    from tolstat.kernel.batch import make_batch
+
+    return make_batch(options)
+
+
+def in_lanes(options: Options) -> bool:
+    """Whether joints with these settings go in lock-step; all others go one after the other."""
+    from numba import config
+
+    covered = options.fidelity == Fidelity.DYNAMIC and options.method == Method.BDF2 and options.rtol == 0
+    return covered and not config.DISABLE_JIT  # type: ignore[attr-defined]
+
+
 def simulate_rows(
     params: NDArray[np.void], options: Options, histories: Histories = "none", n_harmonics: int = 16
 ) -> Simulation:
-    """Simulate joints one after the other; row i of the result is joint i.
+    """Simulate joints; row i of the result is joint i, and depends on no other row.
 
     Parameters
     ----------
@@ -103,51 +127,94 @@ def simulate_rows(
         The joints.
     options : Options
         Numerical settings.
-    histories : {"none", "harmonics", "full"}
+    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
         Load histories to keep, see `history_specs`.
     n_harmonics : int
-        Highest harmonic kept by ``"harmonics"``.
+        Highest harmonic kept.
 
     Returns
     -------
     Simulation
         Results, and histories; NaN (mode: 0) where a joint has none.
     """
-    from tolstat.kernel.simulate import simulate_joint
-
-    work, state, ring = scratch(options)
-    rows = params.view(np.recarray)
     results = np.zeros(len(params), RESULT).view(np.recarray)
     specs = history_specs(options, histories, n_harmonics)
     kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
-    for i in range(len(params)):
-        simulate_joint(rows[i], options, work, state, ring, results[i])
-        if kept and results[i].status in (Status.OK, Status.NOT_SETTLED):
-            if histories == "full":
-                sample = {name: getattr(ring, name) for name in kept}
-            else:
-                sample = _harmonics(ring.loads, kept["coefficients_real"].shape[-1])
-            for name, values in sample.items():
+    simulate = _together if in_lanes(options) else _alone
+    for i, samples in simulate(params, options, bool(specs), results):
+        if results[i].status in SIMULATED:
+            for name, values in _sample(samples, histories, specs).items():
                 kept[name][i] = values
     return Simulation(results.view(np.ndarray), kept)
 
 
-def is_compiled() -> bool:
-    """Whether compiled kernels lie in the cache, so that `warm_up` only has to load them."""
+def _alone(
+    params: NDArray[np.void], options: Options, keep: bool, results: NDArray[np.void]
+) -> Iterator[tuple[int, NDArray[np.void]]]:
+    """Simulate joints one after the other; gives the samples of each if they are to be kept."""
+    from tolstat.kernel.simulate import simulate_joint
+
+    work, state, ring = scratch(options)
+    rows = params.view(np.recarray)
+    for i in range(len(params)):
+        simulate_joint(rows[i], options, work, state, ring, results[i])
+        if keep:
+            yield i, ring.samples
+
+
+def _together(
+    params: NDArray[np.void], options: Options, keep: bool, results: NDArray[np.void]
+) -> Iterator[tuple[int, NDArray[np.void]]]:
+    """Simulate joints in lock-step, those of one contact law at a time; gives the samples of each if they are kept."""
+    from tolstat.kernel.lockstep import PATIENCE, lockstep
+    from tolstat.kernel.settle import make_samples
+
+    batch, tally = lanes(options), np.zeros(3, np.int64)
+    for here in _groups(params, MOST_KEPT if keep else len(params)):
+        part = np.ascontiguousarray(params[here])
+        batch.par.law, batch.par.n_stations = part["law"][0], part["n_stations"][0]
+        words = part.view(np.float64).reshape(len(part), -1)
+        samples = make_samples(len(part) if keep else 0, options.steps_per_rev)
+        out = np.zeros(len(part), RESULT).view(np.recarray)
+        rows = part.view(np.recarray)
+        lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, out, tally)
+        results[here] = out
+        yield from zip(here.tolist(), samples, strict=False)
+
+
+def _groups(params: NDArray[np.void], most: int) -> Iterator[NDArray[np.intp]]:
+    """Rows with one contact law and one number of stations, `most` at a time."""
+    kinds = np.stack([params["law"], params["n_stations"]], axis=1)
+    for kind in np.unique(kinds, axis=0):
+        rows = np.flatnonzero((kinds == kind).all(axis=1))
+        for first in range(0, len(rows), most):
+            yield rows[first : first + most]
+
+
+def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:
+    """What is kept of the revolution recorded last, its samples given."""
+    if histories == "full":
+        return {name: samples[name] for name in specs}
+    loads = np.ascontiguousarray(samples["loads"])
+    sample = rainflow.count(loads) if "cycles" in histories else {}
+    if "harmonics" in histories:
+        sample |= _harmonics(loads, specs["coefficients_real"].shape[-1])
+    return sample
+
+
+def is_compiled(options: Options | None = None) -> bool:
+    """Whether the kernels that `options` need lie in the cache, so that `warm_up` only has to load them."""
     from pathlib import Path
 
     from tolstat.kernel._jit import CACHE_DIRECTORY
 
-    return any(Path(CACHE_DIRECTORY).rglob("simulate.simulate_joint*.nbc"))
+    name = "lockstep.lockstep" if in_lanes(options or Options()) else "simulate.simulate_joint"
+    return any(Path(CACHE_DIRECTORY).rglob(f"{name}*.nbc"))
 
 
-def warm_up() -> None:
-    """Compile the kernels, or load them from the cache, by simulating a joint that has no clearance to run in."""
-    from tolstat.kernel.simulate import simulate_joint
-    from tolstat.tables import PARAM
-
-    params = np.zeros(1, PARAM).view(np.recarray)
-    params.clearance[:] = -1.0
-    results = np.zeros(1, RESULT).view(np.recarray)
-    options = Options()
-    simulate_joint(params[0], options, *scratch(options), results[0])
+def warm_up(options: Options | None = None) -> None:
+    """Compile the kernels that `options` need, or load them from the cache, with a joint that has no clearance."""
+    params = np.zeros(1, PARAM)
+    params["clearance"] = -1.0
+    simulate_rows(params, options or Options())
+    rainflow.count(np.zeros((2, 8, 6)))

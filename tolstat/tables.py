@@ -15,8 +15,17 @@ from numpy.typing import NDArray
 BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
 PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
 HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
+CHANNELS = {
+    f"{bushing}.{load}": "N" if load[0] == "F" else "N*m"
+    for bushing in BUSHINGS
+    for load in ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z", "F", "T")
+}
+"""Unit of every load that cycles are counted of: components of a bushing's force and torque, and their moduli."""
 MAX_STATIONS = 16
 """Most contact stations that one pin can have (``contact.law = "sliced"``)."""
+MAX_ITERATIONS = 40
+"""Bound on the work of a joint, in Newton iterations per step of the longest run allowed: no joint can hang a campaign.
+Joints that never settle take some 8 to 10."""
 
 
 class Status(IntEnum):
@@ -28,6 +37,10 @@ class Status(IntEnum):
     NEWTON_FAILED = 3
     NOT_FINITE = 4
     OUTSIDE_MODEL = 5
+    NOT_PERIODIC = 6
+    TIMEOUT = 7
+    CRASHED = 8
+    INVALID_INPUT = 9
 
     @property
     def label(self) -> str:
@@ -35,13 +48,25 @@ class Status(IntEnum):
         return self.name.lower()
 
 
-FAILED = (Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL)
+UNSETTLED = (Status.NOT_SETTLED, Status.NOT_PERIODIC)
+"""States of a joint whose results are those of the revolutions recorded, which others would not repeat."""
+
+SIMULATED = (Status.OK, *UNSETTLED)
+"""States of a joint that has results."""
+
+FAILED = tuple(s for s in Status if s not in SIMULATED and s != Status.PENDING)
 """States of a joint that has no results."""
 
 STATUS_TEXT = {
     Status.PENDING: "not simulated yet",
     Status.OK: "settled; results valid",
-    Status.NOT_SETTLED: "closure error still above solver.settle_tol after solver.max_revs; results stored",
+    Status.NOT_SETTLED: "closure error still above solver.settle_tol after solver.max_revs; results are those of the "
+    "last revolution",
+    Status.NOT_PERIODIC: "steady, but not the same in each revolution: sub-harmonic, quasi-periodic or chaotic, "
+    "see motion; results are those of the whole period, or of up to the last 16 revolutions",
+    Status.TIMEOUT: "took longer than the time allowed to a joint; results are NaN",
+    Status.CRASHED: "its process died with it twice; results are NaN",
+    Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
     Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or the joint took too many; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
     Status.OUTSIDE_MODEL: "negative clearance (interference fit), |alpha| of 90 deg or more, no speed, or stiffness "
@@ -73,6 +98,18 @@ class Start(IntEnum):
     STATIC = 1
 
 
+class Fidelity(IntEnum):
+    """What of the joint's mechanics is solved; the ladder that ``solver.fidelity = "auto"`` chooses from."""
+
+    DYNAMIC = 0
+    QUASISTATIC = 1
+    IDEAL = 2
+
+
+FINEST_STEPS = 360
+"""Most steps a revolution that ``solver.fidelity = "auto"`` chooses."""
+
+
 class Mode(IntEnum):
     """Contact mode of a pin (Cirelli et al. 2021, Figure 3)."""
 
@@ -80,6 +117,32 @@ class Mode(IntEnum):
     ONE_POINT = 1
     TWO_POINT = 2
     UNIFORM = 3
+
+
+class Motion(IntEnum):
+    """What kind of motion a joint came to, in revolutions of the input shaft."""
+
+    UNKNOWN = 0
+    PERIODIC = 1
+    SLOW = 2
+    SUBHARMONIC = 3
+    QUASI_PERIODIC = 4
+    CHAOTIC = 5
+
+    @property
+    def label(self) -> str:
+        """Name as it is written to the user: ``"quasi_periodic"``."""
+        return self.name.lower()
+
+
+MOTION_TEXT = {
+    Motion.UNKNOWN: "not known: no results, or fewer revolutions than it takes to tell",
+    Motion.PERIODIC: "the same in each revolution",
+    Motion.SLOW: "still settling: its closure error falls, or neighbouring motions converge",
+    Motion.SUBHARMONIC: "the same after 2 to 8 revolutions, see period",
+    Motion.QUASI_PERIODIC: "repeats in no number of revolutions, and neighbouring motions stay neighbours",
+    Motion.CHAOTIC: "repeats in no number of revolutions, and neighbouring motions part exponentially",
+}
 
 
 class Field(NamedTuple):
@@ -107,7 +170,7 @@ class Field(NamedTuple):
 
 
 class Options(NamedTuple):
-    """Numerical settings of the solver, the same for every joint of a campaign; see `study.Solver`."""
+    """Numerical settings of the solver; see `study.Solver`."""
 
     method: int = int(Method.BDF2)
     start: int = int(Start.STATIC)
@@ -120,15 +183,20 @@ class Options(NamedTuple):
     rho_inf: float = 0.8
     rtol: float = 0.0
     atol: float = 0.0
+    fidelity: int = int(Fidelity.DYNAMIC)
 
 
 class HistorySpec(NamedTuple):
-    """What a load history holds for each joint: an array of `shape`, without the leading axis of joints."""
+    """What a load history holds for each joint: an array of `shape`, without the leading axis of joints.
+
+    `axes` are the names of its axes.
+    """
 
     shape: tuple[int, ...]
     dtype: str
     unit: str
     description: str
+    axes: tuple[str, ...] = ()
 
     def blank(self, n: int) -> NDArray[Any]:
         """Make the history of `n` joints that have none, (n, ...): NaN (0 for integers) throughout."""
@@ -145,11 +213,15 @@ class Variant(NamedTuple):
         Name under which the study lists it; other variants may share it.
     values : dict
         What makes it this joint, by dotted key of a joint file: keys that the study writes for it, and all others in
-        which it differs from the study's joint. SI floats, words for choices.
+        which it differs from the study's joint; ``operation.`` and ``solver.`` before keys of these sections that the
+        study writes for it. SI floats, words for choices.
+    note : str
+        What the study says of it.
     """
 
     family: str
     values: dict[str, Any]
+    note: str = ""
 
 
 class Simulation(NamedTuple):
@@ -237,7 +309,7 @@ def _load_fields() -> list[Field]:
     fields = []
     for load, unit, noun in (("F", "N", "force"), ("T", "N*m", "torque")):
         for stat, text in (("max", "largest"), ("mean", "mean"), ("range", "largest less smallest")):
-            description = f"{text} modulus of the bushing {noun} over the last revolution"
+            description = f"{text} modulus of the bushing {noun} over the revolutions that count"
             fields.append(Field(f"{load}_{stat}", unit, description, shape=(8,)))
     return fields
 
@@ -246,10 +318,17 @@ RESULT_FIELDS = (
     Field("status", "1", "see Status", "u1"),
     Field("settled", "1", "1 when the closure error is below solver.settle_tol", "u1"),
     Field("closure", "1", "closure error of the last revolution"),
+    Field("closure_trend", "1", "change of log10(closure) a revolution, fitted to the last revolutions"),
+    Field("motion", "1", "class of the motion, see Motion", "u1"),
+    Field("period", "1", "revolutions after which the motion repeats; 0 where it does not or is not known", "u1"),
+    Field("lyapunov", "1", "largest Lyapunov exponent a revolution, of joints that neither settle nor repeat"),
+    Field("failed_step", "1", "step of the output grid at which the joint failed, from 1; -1 if it did not", "i4"),
+    Field("failed_theta", "rad", "input angle at the start of that step, less whole revolutions"),
     Field("revolutions", "1", "revolutions integrated, the recorded one included"),
-    Field("steps", "1", "steps taken, sub-steps included", "i4"),
+    Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),
     Field("newton_iterations", "1", "Newton iterations", "i4"),
-    Field("halvings", "1", "times that a step was halved", "i4"),
+    Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),
+    Field("factorisations", "1", "times that the tangent was factorised", "i4"),
     *_load_fields(),
     Field(
         "contact_max",
@@ -257,7 +336,7 @@ RESULT_FIELDS = (
         "largest normal force on the outer (1) and inner (2) half of the pin",
         shape=(4, 2),
     ),
-    Field("mode_share", "1", "share of the last revolution in each contact mode", shape=(4, 4)),
+    Field("mode_share", "1", "share of the revolutions that count in each contact mode", shape=(4, 4)),
     Field("psi_max", "1", "largest |Psi|, relative error of the speed ratio, eq. (13)"),
 )
 
@@ -267,6 +346,13 @@ DESIGN_FIELDS = (
     Field("group", "1", "joints of one group differ in their case only; the one without errors comes first", "i4"),
 )
 """What each joint of a study that lists its joints is (``sampling.method = "cases"``)."""
+
+LEDGER_FIELDS = (
+    Field("attempt", "1", "what gave the results: 0 the study's settings, k those of entry k - 1 of `retries`", "i4"),
+    Field("errors_check", "1", "checksum of the joint's row, errors and design", "u8"),
+    Field("results_check", "1", "checksum of `errors_check`, `attempt` and the joint's results, status included", "u8"),
+)
+"""What is kept of each joint so that its rows can be trusted."""
 
 DESIGN = dtype_of(DESIGN_FIELDS)
 ERROR = dtype_of(ERROR_FIELDS)
@@ -315,5 +401,6 @@ def _scalar_columns(fields: tuple[Field, ...]) -> tuple[Column, ...]:
 
 
 DESIGN_COLUMNS = _scalar_columns(DESIGN_FIELDS)
+LEDGER_COLUMNS = _scalar_columns(LEDGER_FIELDS)
 ERROR_COLUMNS = _scalar_columns(ERROR_FIELDS)
 RESULT_COLUMNS = _result_columns()

@@ -14,13 +14,15 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv, ndtr, ndtri
+from scipy.special import betaincinv, betaln, ndtr, ndtri, xlog1py, xlogy
 
 Array = NDArray[np.float64]
+
+LOG_ROOT_2PI = 0.5 * math.log(2 * math.pi)
 
 
 class Distribution(ABC):
@@ -42,6 +44,26 @@ class Distribution(ABC):
         """
 
     @abstractmethod
+    def logpdf(self, x: Array) -> Array:
+        """Logarithm of the density at `x`; of the probability for values measured.
+
+        Parameters
+        ----------
+        x : ndarray, (n,)
+            Values in the error's SI unit.
+
+        Returns
+        -------
+        ndarray, (n,)
+            -inf where the distribution has no values.
+        """
+
+    @property
+    def discrete(self) -> bool:
+        """Whether `logpdf` is that of probabilities."""
+        return False
+
+    @abstractmethod
     def describe(self) -> dict[str, Any]:
         """Kind and parameters, as JSON values: what decides the numbers that are drawn."""
 
@@ -55,6 +77,18 @@ class _Described(Distribution):
         return {"distribution": type(self).__name__.lower(), **asdict(self)}
 
 
+class _Banded(Protocol):
+    @property
+    def lower(self) -> float: ...
+    @property
+    def upper(self) -> float: ...
+
+
+def _within(band: _Banded, x: Array, density: Array) -> Array:
+    """Density where x is in the band, and none elsewhere."""
+    return np.where((x >= band.lower) & (x <= band.upper), density, -np.inf)
+
+
 @dataclass(frozen=True)
 class Normal(_Described):
     """Normal distribution with `mean` and standard deviation `sigma`."""
@@ -65,6 +99,10 @@ class Normal(_Described):
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
         return self.mean + self.sigma * ndtri(u)
+
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        return -0.5 * ((x - self.mean) / self.sigma) ** 2 - math.log(self.sigma) - LOG_ROOT_2PI
 
 
 @dataclass(frozen=True)
@@ -88,6 +126,12 @@ class TruncatedNormal(_Described):
         z = np.where(low <= 0, low, high)
         return np.clip(self.mean + self.sigma * z, self.lower, self.upper)
 
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
+        share = float(ndtr(b) - ndtr(a) if a <= 0 else ndtr(-a) - ndtr(-b))
+        return _within(self, x, Normal(self.mean, self.sigma).logpdf(x) - math.log(share))
+
 
 @dataclass(frozen=True)
 class Uniform(_Described):
@@ -99,6 +143,10 @@ class Uniform(_Described):
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
         return self.lower + (self.upper - self.lower) * u
+
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        return _within(self, x, np.full_like(x, -math.log(self.upper - self.lower)))
 
 
 @dataclass(frozen=True)
@@ -116,6 +164,13 @@ class Triangular(_Described):
         above = self.upper - np.sqrt((1 - u) * width * fall)
         return np.where(u * width <= rise, below, above)
 
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rising, falling = (x - self.lower) / (self.peak - self.lower), (self.upper - x) / (self.upper - self.peak)
+            height = np.log(np.where(x < self.peak, rising, np.where(x > self.peak, falling, 1.0)))
+        return _within(self, x, height + math.log(2.0 / (self.upper - self.lower)))
+
 
 @dataclass(frozen=True)
 class LogNormal(_Described):
@@ -127,6 +182,12 @@ class LogNormal(_Described):
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
         return self.threshold + np.exp(self.log.ppf(u))
+
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        above = x > self.threshold
+        y = np.log(np.where(above, x - self.threshold, 1.0))
+        return np.where(above, self.log.logpdf(y) - y, -np.inf)
 
 
 @dataclass(frozen=True)
@@ -141,6 +202,13 @@ class Beta(_Described):
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
         return self.lower + (self.upper - self.lower) * betaincinv(self.a, self.b, u)
+
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        width = self.upper - self.lower
+        t = np.clip((x - self.lower) / width, 0.0, 1.0)
+        density = xlogy(self.a - 1, t) + xlog1py(self.b - 1, -t) - betaln(self.a, self.b) - math.log(width)
+        return _within(self, x, np.asarray(density, dtype=float))
 
 
 @dataclass(frozen=True)
@@ -158,6 +226,14 @@ class Rayleigh(_Described):
         share = 1.0 if self.upper is None else -math.expm1(-0.5 * (self.upper / self.sigma) ** 2)
         radius: Array = self.sigma * np.sqrt(-2 * np.log1p(-u * share))
         return radius if self.upper is None else np.minimum(radius, self.upper)
+
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        share = 1.0 if self.upper is None else -math.expm1(-0.5 * (self.upper / self.sigma) ** 2)
+        inside = (x >= 0) & (x <= (math.inf if self.upper is None else self.upper))
+        with np.errstate(divide="ignore"):
+            radius = np.log(np.where(inside, x, 0.0))
+        return radius - 0.5 * (x / self.sigma) ** 2 - 2 * math.log(self.sigma) - math.log(share)
 
 
 @dataclass(frozen=True)
@@ -189,9 +265,48 @@ class Measured(Distribution):
         index = np.ceil(u * self.values.size).astype(np.intp) - 1
         return self.values[np.clip(index, 0, self.values.size - 1)]
 
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        count = np.searchsorted(self.values, x, "right") - np.searchsorted(self.values, x, "left")
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.log(count / self.values.size))
+
+    @property
+    def discrete(self) -> bool:
+        """See `Distribution.discrete`."""
+        return True
+
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""
         return {"distribution": "measured", "count": self.values.size, "digest": self.digest}
+
+
+def score(distribution: Distribution, values: Array) -> Array:
+    """Standard scores: how many sigma from the middle a normal error of the same probability would lie.
+
+    Parameters
+    ----------
+    distribution : Distribution
+        Where the values come from.
+    values : ndarray, (n,)
+        In the error's SI unit.
+
+    Returns
+    -------
+    ndarray, (n,)
+        z with ``ppf(Phi(z)) = value``; for a normal distribution (value - mean) / sigma. Where a range of probabilities
+        has one value (`Measured`), their middle. Beyond +-9 it is not told apart.
+    """
+    ends = []
+    for below in (np.less, np.less_equal):  # the least and the largest z that give the value
+        low, high = np.full(values.shape, -9.0), np.full(values.shape, 9.0)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            under = below(distribution.ppf(ndtr(middle)), values)
+            low, high = np.where(under, middle, low), np.where(under, high, middle)
+        ends.append(0.5 * (low + high))
+    step: Array = ndtri(0.5 * (ndtr(ends[0]) + ndtr(ends[1])))
+    return np.where(ends[1] - ends[0] < 1e-6, ends[0], step)
 
 
 def sigma_of(lower: float, upper: float, mean: float, cpk: float) -> float:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.remedy import remedy
 from tolstat.simulation import simulate_rows, warm_up
-from tolstat.tables import BUSHINGS, PINS, Simulation, Status
+from tolstat.tables import BUSHINGS, PINS, Motion, Options, Simulation, Status
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,11 +32,14 @@ class CaseResult(NamedTuple):
         Misalignment, rad.
     wall_s : float
         Time that the simulation took, without compilation, s.
+    options : Options
+        Settings that it was simulated with.
     """
 
     simulation: Simulation
     alpha: float
     wall_s: float
+    options: Options
 
     def summary(self) -> dict[str, Any]:
         """Figures of the joint as plain values; None where a failed joint has none.
@@ -50,6 +54,9 @@ class CaseResult(NamedTuple):
             "status": Status(row["status"]).label,
             "settled": bool(row["settled"]),
             "closure": _number(row["closure"]),
+            "closure_trend": _number(row["closure_trend"]),
+            "motion": Motion(row["motion"]).label,
+            "period": int(row["period"]),
             "revolutions": _number(row["revolutions"]),
             "steps": int(row["steps"]),
             "newton_iterations": int(row["newton_iterations"]),
@@ -57,6 +64,10 @@ class CaseResult(NamedTuple):
             "wall_s": self.wall_s,
             "max": largest,
         }
+
+    def remedy(self) -> str:
+        """What to do about a joint that did not settle; empty for one that did."""
+        return remedy(self.simulation.results[0], self.options._asdict())
 
     def to_pandas(self) -> pd.DataFrame:
         """Trace of the last revolution, one row per input angle.
@@ -107,8 +118,9 @@ def simulate_case(case: Case) -> CaseResult:
     params = perturb(case.joint, errors)
     warm_up()
     begin = time.perf_counter()
-    simulation = simulate_rows(params, case.solver.options(), "full")
-    return CaseResult(simulation, float(errors["operation.alpha"][0]), time.perf_counter() - begin)
+    options = case.solver.options()
+    simulation = simulate_rows(params, options, "full")
+    return CaseResult(simulation, float(errors["operation.alpha"][0]), time.perf_counter() - begin, options)
 
 
 def _number(value: float) -> float | None:

@@ -144,7 +144,8 @@ class Quantity:
     """Annotation that makes a pydantic ``float`` field read a unit string.
 
     ``Annotated[float, Quantity("m")]`` accepts ``"0.1 mm"`` and holds ``1e-4``. SI floats are written back
-    as ``"0.0001 m"`` by ``model_dump(mode="json")``, so that a dump can be read again.
+    as ``"0.0001 m"`` by ``model_dump(mode="json")``, so that a dump can be read again. With the validation context
+    ``{"si": True}`` values are SI floats already.
     """
 
     unit: str
@@ -155,8 +156,12 @@ class Quantity:
         def write(value: float) -> str | float:
             return value if self.unit == "1" else f"{value!r} {self.unit}"
 
-        return core_schema.no_info_plain_validator_function(
-            lambda value: to_si(value, self.unit),
+        def read(value: object, info: core_schema.ValidationInfo) -> float:
+            si = isinstance(value, float) and bool(info.context and info.context.get("si"))
+            return to_si(value, "1" if si else self.unit)
+
+        return core_schema.with_info_plain_validator_function(
+            read,
             serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
         )
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.tables import Status
+from tolstat.tables import UNSETTLED, Status
 
 FloatArray = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
     load, state = np.asarray(values, dtype=float), np.asarray(status)
     if load.ndim != 1 or load.shape != state.shape:
         raise ValueError(f"values {load.shape} and status {state.shape} must be of one length")
-    unsettled = state == Status.NOT_SETTLED
+    unsettled = np.isin(state, UNSETTLED)
     valid = (state == Status.OK) & np.isfinite(load)
     failed = ~valid & ~unsettled & (state != Status.PENDING)
     return Sample(np.sort(load[valid]), int(failed.sum()), int(unsettled.sum()))

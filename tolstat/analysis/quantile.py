@@ -85,6 +85,29 @@ def at(values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0
     )
 
 
+def wilks(share: float, confidence: float = 0.95) -> int:
+    """Return the least number of joints whose largest load bounds the quantile from above (Wilks 1941, first order).
+
+    With that many independent joints the largest of them exceeds the quantile with probability
+    1 - share^n >= confidence.
+
+    Parameters
+    ----------
+    share : float
+        Share of the joints that stay at or below the quantile, 0 < share < 1.
+    confidence : float
+        Of the bound.
+
+    Raises
+    ------
+    ValueError
+        When `share` or `confidence` is not between 0 and 1.
+    """
+    if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
+        raise ValueError(f"share {share} and confidence {confidence} must lie between 0 and 1")
+    return max(1, int(np.ceil(np.log1p(-confidence) / np.log(share))))
+
+
 def _rank(n: int, share: float) -> int:
     """Rank (from 1) of the inverted empirical distribution; rounding of ``n * share`` is not an excess."""
     return max(1, int(np.ceil(n * share * (1.0 - 4e-16))))

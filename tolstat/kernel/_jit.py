@@ -65,11 +65,21 @@ def njit(function: Callable[..., Any]) -> Any:
     # read when a function is decorated; other users' functions in this process keep their own directory
     config.CACHE_DIR = CACHE_DIRECTORY
     try:
-        return numba.njit(cache=True, error_model="numpy", fastmath=False)(function)
+        return numba.njit(cache=True, error_model="numpy", fastmath=False, no_cfunc_wrapper=True)(function)
     finally:
         config.CACHE_DIR = before
 
 
 def closure(function: Callable[..., Any]) -> Any:
     """Compile a function made by a factory; it is cached with the entry point that calls it."""
-    return numba.njit(error_model="numpy", fastmath=False)(function)
+    return numba.njit(error_model="numpy", fastmath=False, no_cfunc_wrapper=True)(function)
+
+
+def bare(function: Any, *arguments: Any) -> Any:
+    """Compiled code of a kernel for arguments such as these, without numba's look at their types at each call.
+
+    That look takes longer than a residual of the joint. Other types than these must never be passed.
+    """
+    if not hasattr(function, "compile"):  # compilation is switched off
+        return function
+    return function.compile(tuple(numba.typeof(argument) for argument in arguments))

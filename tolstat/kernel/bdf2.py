@@ -6,22 +6,22 @@ Euler. Algebraic order 2, L-stable.
 """
 
 from tolstat.kernel._jit import njit
-from tolstat.kernel.state import H_OLD
+from tolstat.kernel.lane import where
+from tolstat.kernel.state import AHEAD, H_OLD
 
 
 @njit
-def predict(h, state, options):
-    """Write a trial point that obeys the formula; return cv = dv/dq and ca = da/dq."""
+def predict(h, begins, state, options):
+    """Write a trial point that obeys the formula, in lanes that begin a step; return cv = dv/dq and ca = da/dq."""
     h_old = state.memory[H_OLD]
-    if h_old > 0:
-        r = h / h_old
-        c0, c1, c2 = (1 + 2 * r) / (1 + r), -(1 + r), r * r / (1 + r)
-    else:
-        c0, c1, c2 = 1.0, -1.0, 0.0
-    cv = c0 / h
+    r = where(h_old > 0, h / h_old, 0.0)
+    cv, b1, b2 = (1 + 2 * r) / (1 + r) / h, -(1 + r) / h, r * r / (1 + r) / h
+    known = state.memory[AHEAD] > 0
     for i in range(state.q.size):
-        guess = state.q0[i] + h * (state.v0[i] + 0.5 * h * state.a0[i])
-        state.q[i] = guess
-        state.v[i] = cv * guess + (c1 * state.q0[i] + c2 * state.q1[i]) / h
-        state.a[i] = cv * state.v[i] + (c1 * state.v0[i] + c2 * state.v1[i]) / h
+        change = where(known, state.ahead[i], h * (state.v0[i] + 0.5 * h * state.a0[i]))
+        guess = state.q0[i] + change
+        v = cv * guess + (b1 * state.q0[i] + b2 * state.q1[i])
+        state.q[i] = where(begins, guess, state.q[i])
+        state.v[i] = where(begins, v, state.v[i])
+        state.a[i] = where(begins, cv * v + (b1 * state.v0[i] + b2 * state.v1[i]), state.a[i])
     return cv, cv * cv

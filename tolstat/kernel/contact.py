@@ -8,8 +8,9 @@ import math
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.bushing import accumulate
+from tolstat.kernel.lane import all_of, any_of, where
 from tolstat.kernel.topology import ARM, ARM_OF_PIN, FRAME, PIN
-from tolstat.kernel.vector import add, axpy, cross, dot, row, scale, sub, turn, turn_back
+from tolstat.kernel.vector import add, axpy, choose, cross, dot, row, scale, sub, turn, turn_back
 from tolstat.kernel.work import (
     DELTA,
     EXCESS,
@@ -26,7 +27,7 @@ from tolstat.tables import Law
 from tolstat.tables import Mode as ContactMode
 
 UNIFORM, POINT_LAW, MODE_LAW = int(Law.UNIFORM), int(Law.POINT), int(Law.MODE)
-NONE, ONE_POINT, TWO_POINT, UNIFORM_MODE = (int(m) for m in ContactMode)
+NONE, ONE_POINT, TWO_POINT, UNIFORM_MODE = (float(m) for m in ContactMode)
 SMALLEST_RHO = 1e-15
 """Below it (m) the pin is centred and has no direction of displacement."""
 
@@ -34,19 +35,13 @@ SMALLEST_RHO = 1e-15
 @njit
 def smooth_step(x):
     """Cubic step S: 0 below 0, x^2 (3 - 2 x), 1 beyond 1."""
-    if x <= 0:
-        return 0.0
-    if x >= 1:
-        return 1.0
-    return x * x * (3 - 2 * x)
+    return where(x <= 0, 0.0, where(x >= 1, 1.0, x * x * (3 - 2 * x)))
 
 
 @njit
 def smooth_step_slope(x):
     """Derivative of `smooth_step`."""
-    if x <= 0 or x >= 1:
-        return 0.0
-    return 6 * x * (1 - x)
+    return where((x <= 0) | (x >= 1), 0.0, 6 * x * (1 - x))
 
 
 @njit
@@ -70,12 +65,13 @@ def locate(pin, par, work):
         d = sub(point, centre)
         gap = axpy(-dot(d, axis), axis, d)
         rho = math.sqrt(dot(gap, gap))
-        if rho > SMALLEST_RHO:
-            n = scale(1 / rho, gap)
-        else:
-            n = cross(axis, direction)  # any direction across the hole: no force acts
-            length = math.sqrt(dot(n, n))
-            n = scale(1 / length, n) if length > 0 else cross(axis, (0.0, 0.0, 1.0))
+        n = scale(1 / rho, gap)
+        displaced = rho > SMALLEST_RHO
+        if not all_of(displaced):  # else any direction across the hole: no force acts
+            across = cross(axis, direction)
+            length = math.sqrt(dot(across, across))
+            across = choose(length > 0, scale(1 / length, across), cross(axis, (0.0, 0.0, 1.0)))
+            n = choose(displaced, n, across)
         m = cross(axis, n)
         station = work.station[pin, j]
         for k in range(3):
@@ -99,23 +95,25 @@ def sharing(pin, law, work):
     if law != MODE_LAW:
         return
     a, b = work.station[pin, 0], work.station[pin, 1]
-    if a[DELTA] <= 0 or b[DELTA] <= 0:
+    touching = (a[DELTA] > 0) & (b[DELTA] > 0)
+    if not any_of(touching):
         return
     cosine = along_a = along_b = 0.0
     for k in range(3):
         cosine += a[NORMAL + k] * b[NORMAL + k]
         along_a += a[TANGENT + k] * b[NORMAL + k]
         along_b += a[NORMAL + k] * b[TANGENT + k]
-    if cosine <= 0:
-        return
+    shared = touching & (cosine > 0)
     a_is_larger = a[DELTA] >= b[DELTA]
-    larger, smaller = (a[DELTA], b[DELTA]) if a_is_larger else (b[DELTA], a[DELTA])
+    larger, smaller = max(a[DELTA], b[DELTA]), min(a[DELTA], b[DELTA])
     r = smaller / larger
     step, slope = smooth_step(r), smooth_step_slope(r)
     by_smaller, by_larger = slope * cosine / larger, -slope * cosine * r / larger
-    out[0] = step * cosine
-    out[1], out[3] = (by_larger, by_smaller) if a_is_larger else (by_smaller, by_larger)
-    out[2], out[4] = step * along_a / a[RHO], step * along_b / b[RHO]
+    out[0] = where(shared, step * cosine, 0.0)
+    out[1] = where(shared, where(a_is_larger, by_larger, by_smaller), 0.0)
+    out[3] = where(shared, where(a_is_larger, by_smaller, by_larger), 0.0)
+    out[2] = where(shared, step * along_a / a[RHO], 0.0)
+    out[4] = where(shared, step * along_b / b[RHO], 0.0)
 
 
 @njit
@@ -125,8 +123,9 @@ def press(pin, w, par, work):
     for j in range(par.n_stations):
         station, weight = work.station[pin, j], par.station_weight[j]
         delta = station[DELTA]
-        station[FORCE] = station[SLOPE] = station[EXCESS] = 0.0
-        if delta <= 0:
+        touching = delta > 0
+        if not any_of(touching):
+            station[FORCE] = station[SLOPE] = station[EXCESS] = 0.0
             continue
         ramp = smooth_step(delta / par.delta_d)
         slope_d = par.c_d * weight * smooth_step_slope(delta / par.delta_d) / par.delta_d * station[V_NORMAL]
@@ -134,37 +133,32 @@ def press(pin, w, par, work):
         uniform_slope = 0.5 * weight * (2 * par.k1u * delta + par.k2u)
         point = (par.k1p * delta + par.k2p) * delta
         point_slope = 2 * par.k1p * delta + par.k2p
-        if sliced:
-            elastic, slope, excess = uniform, uniform_slope, 0.0
-        else:
+        elastic, slope, excess = uniform, uniform_slope, uniform - point
+        if not sliced:
             elastic = w * uniform + (1 - w) * point
             slope = w * uniform_slope + (1 - w) * point_slope
-            excess = uniform - point
         total = elastic + par.c_d * weight * ramp * station[V_NORMAL]
-        if total > 0:
-            station[FORCE], station[SLOPE], station[EXCESS] = total, slope + slope_d, excess
+        pressed = touching & (total > 0)
+        station[FORCE] = where(pressed, total, 0.0)
+        station[SLOPE] = where(pressed, slope + slope_d, 0.0)
+        station[EXCESS] = where(pressed, excess, 0.0)
 
 
 @njit
 def classify(pin, par, work):
     """Contact mode of `pin`: which stations touch, and on which side."""
-    touching = 0
+    touching = 0.0
     opposed = False
     for j in range(par.n_stations):
-        if work.station[pin, j, DELTA] <= 0:
-            continue
-        touching += 1
+        touches = work.station[pin, j, DELTA] > 0
+        touching += where(touches, 1.0, 0.0)
         for i in range(j):
-            if work.station[pin, i, DELTA] > 0:
-                cosine = 0.0
-                for k in range(3):
-                    cosine += work.station[pin, i, NORMAL + k] * work.station[pin, j, NORMAL + k]
-                opposed = opposed or cosine < 0
-    if touching == 0:
-        return NONE
-    if opposed:
-        return TWO_POINT
-    return UNIFORM_MODE if touching == par.n_stations else ONE_POINT
+            cosine = 0.0
+            for k in range(3):
+                cosine += work.station[pin, i, NORMAL + k] * work.station[pin, j, NORMAL + k]
+            opposed = opposed | (touches & (work.station[pin, i, DELTA] > 0) & (cosine < 0))
+    one_sided = where(touching == par.n_stations, UNIFORM_MODE, ONE_POINT)
+    return where(touching == 0, NONE, where(opposed, TWO_POINT, one_sided))
 
 
 @njit
@@ -177,9 +171,10 @@ def contact_load(pin, par, work):
     work.contact[pin, 0] = work.contact[pin, 1] = 0.0
     for j in range(par.n_stations):
         station = work.station[pin, j]
-        if station[DELTA] <= 0:
+        if not any_of(station[DELTA] > 0):
             continue
-        outer = 0.5 if par.station_s[j] == 0 else (1.0 if par.station_s[j] > 0 else 0.0)
+        s = par.station_s[j]
+        outer = where(s == 0, 0.5, where(s > 0, 1.0, 0.0))
         work.contact[pin, 0] += outer * station[FORCE]
         work.contact[pin, 1] += (1 - outer) * station[FORCE]
         drag = par.c_t * par.station_weight[j] * smooth_step(station[DELTA] / par.delta_d) * station[V_TANGENT]

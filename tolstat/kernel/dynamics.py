@@ -49,11 +49,17 @@ def place(q, v, par, work):
         put(work.vel, body, (v[i], v[i + 1], v[i + 2]))
         exponential(phi, work.rot, body)
         put(work.spin, body, spin(phi, (v[i + 3], v[i + 4], v[i + 5])))
-    for body, angle, rate in ((INPUT_SHAFT, 0.0, 0.0), (OUTPUT_SHAFT, q[PSI], v[PSI])):
-        put(work.pos, body, (0.0, 0.0, 0.0))
-        put(work.vel, body, (0.0, 0.0, 0.0))
-        exponential((0.0, 0.0, angle), work.rot, body)
-        put(work.spin, body, (0.0, 0.0, rate))
+    place_shaft(INPUT_SHAFT, 0.0 * q[PSI], 0.0 * v[PSI], work)
+    place_shaft(OUTPUT_SHAFT, q[PSI], v[PSI], work)
+
+
+@njit
+def place_shaft(body, angle, rate, work):
+    """Attitude and angular velocity of a shaft that turns about z."""
+    put(work.pos, body, (0.0, 0.0, 0.0))
+    put(work.vel, body, (0.0, 0.0, 0.0))
+    exponential((0.0, 0.0, angle), work.rot, body)
+    put(work.spin, body, (0.0, 0.0, rate))
 
 
 @njit

@@ -9,15 +9,27 @@ method has an estimate, is halved, at most ``options.max_halvings`` times; steps
 grid allows. An unconverged point is never accepted.
 """
 
-from tolstat.kernel import bdf2, generalized_alpha, trbdf2
+from tolstat.kernel import bdf2, generalized_alpha, quadrature, trbdf2
 from tolstat.kernel._jit import closure, njit
-from tolstat.kernel.state import CV_FACTORISED, FACTORISATIONS, H_OLD, HALVINGS, ITERATIONS, STEPS
+from tolstat.kernel.state import (
+    AHEAD,
+    ATTEMPTS_LEFT,
+    CV_FACTORISED,
+    FACTORISATIONS,
+    H_OLD,
+    HALVINGS,
+    ITERATIONS,
+    STEPS,
+)
+from tolstat.kernel.vector import larger
 from tolstat.tables import Method
 
 BDF2, GENERALIZED_ALPHA, TR_BDF2 = int(Method.BDF2), int(Method.GENERALIZED_ALPHA), int(Method.TR_BDF2)
 SLOW = 0.2
 """Contraction per iteration above which the tangent is renewed."""
 ROUNDOFF = 10 * 2.0**-52
+NO, IF_STALLED, YES = 0, 1, 2
+"""Whether a change of the unknowns ends Newton's iteration."""
 ERROR_TO_GROW = 0.1
 """Estimated error, in units of the tolerance, below which a step may be doubled."""
 MAX_RATIO = 2.0
@@ -27,7 +39,9 @@ START_LEVEL = 4
 
 bdf2_predict = bdf2.predict
 alpha_predict, alpha_accept = generalized_alpha.predict, generalized_alpha.accept
-tr_predict, keep_stage, estimate = trbdf2.predict, trbdf2.keep_stage, trbdf2.error
+tr_predict, keep_stage, embedded_error = trbdf2.predict, trbdf2.keep_stage, trbdf2.error
+quadrature_error = quadrature.error
+UNLIMITED = 2**62
 
 
 @njit
@@ -45,7 +59,7 @@ def predict(h, stage, state, options):
         cv, ca = tr_predict(h, stage, state, options)
         return cv, ca, (trbdf2.GAMMA if stage == 0 else 1.0)
     if options.method == BDF2:
-        cv, ca = bdf2_predict(h, state, options)
+        cv, ca = bdf2_predict(h, True, state, options)
     else:
         cv, ca = alpha_predict(h, state, options)
     return cv, ca, 1.0
@@ -57,9 +71,9 @@ def accept(h, state, options):
     if options.method == GENERALIZED_ALPHA:
         alpha_accept(h, state, options)
     for i in range(state.q.size):
-        state.q1[i], state.v1[i] = state.q0[i], state.v0[i]
+        state.q1[i], state.v1[i], state.a1[i] = state.q0[i], state.v0[i], state.a0[i]
         state.q0[i], state.v0[i], state.a0[i] = state.q[i], state.v[i], state.a[i]
-    state.memory[H_OLD] = h
+    state.memory[H_OLD], state.memory[AHEAD] = h, 0.0
     state.counters[STEPS] += 1
 
 
@@ -68,38 +82,59 @@ def reset(state):
     """Forget everything but the last accepted point."""
     state.memory[:] = 0.0
     state.counters[:] = 0
+    state.counters[ATTEMPTS_LEFT] = UNLIMITED
     for i in range(state.q.size):
-        state.q1[i], state.v1[i], state.aux[i] = state.q0[i], state.v0[i], state.a0[i]
+        state.q1[i], state.v1[i], state.a1[i] = state.q0[i], state.v0[i], state.a0[i]
+        state.aux[i] = state.a0[i]
+
+
+@njit
+def estimate(h, state, options):
+    """Estimated error of the step in units of the tolerance; 0 where none is kept."""
+    if options.rtol <= 0:
+        return 0.0
+    if options.method == TR_BDF2:
+        return embedded_error(h, state, options)
+    return quadrature_error(h, state, options)
 
 
 @njit
 def scaled_size(cv, ca, state):
-    """Largest residual in units of its scale."""
+    """Largest residual, weighted."""
     size = 0.0
     for i in range(state.q.size):
-        # written so that a NaN is kept
-        ratio = abs(state.residual[i]) / state.scale[i]
-        if not ratio <= size:
-            size = ratio
+        size = larger(size, abs(state.residual[i]) * state.weight[i])
     return size
 
 
-def build_newton(residual, factorise, solve, size=scaled_size):
+@njit
+def at_rounding(cv, ca, fresh, options, work, state):
+    """`YES` when the last change of the unknowns is no more than their rounding."""
+    step = largest = 0.0
+    for i in range(state.q.size):
+        step, largest = max(step, abs(work.solution[i])), max(largest, abs(state.q[i]))
+    return YES if step <= ROUNDOFF * largest else NO
+
+
+def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding):
     """Bind a system to Newton's iteration; arguments and the function returned as in `build_integrator`."""
 
     @closure
     def newton(t, cv, ca, par, options, work, state):
         q, v, a = state.q, state.v, state.a
         before = 0.0
-        at_roundoff = False
+        negligible = NO
         for iteration in range(options.newton_max_iter + 1):
             residual(t, q, v, a, par, options, work, state.residual)
             now = size(cv, ca, state)
-            if now <= options.newton_tol or (at_roundoff and now < 1e300):
+            if now <= options.newton_tol or (negligible == YES and now < 1e300):
+                return True
+            if negligible == IF_STALLED and SLOW * before < now <= before / SLOW:
                 return True
             if not now < 1e300 or iteration == options.newton_max_iter:
                 break
-            if state.memory[CV_FACTORISED] != cv or (iteration > 0 and now > SLOW * before):
+            fresh = state.memory[CV_FACTORISED] != cv or (iteration > 0 and now > SLOW * before)
+            if fresh:
                 state.memory[CV_FACTORISED] = cv
                 state.counters[FACTORISATIONS] += 1
                 if not factorise(t, q, v, a, cv, ca, par, options, work):
@@ -109,14 +144,12 @@ def build_newton(residual, factorise, solve, size=scaled_size):
                 work.solution[i] = -state.residual[i]
             solve(q, work)
             state.counters[ITERATIONS] += 1
-            step = largest = 0.0
             for i in range(q.size):
                 change = work.solution[i]
                 q[i] += change
                 v[i] += cv * change
                 a[i] += ca * change
-                step, largest = max(step, abs(change)), max(largest, abs(q[i]))
-            at_roundoff = step <= ROUNDOFF * largest
+            negligible = small(cv, ca, fresh, options, work, state)
         state.memory[CV_FACTORISED] = 0.0
         return False
 
@@ -124,7 +157,15 @@ def build_newton(residual, factorise, solve, size=scaled_size):
 
 
 def build_advance(newton):
-    """Bind Newton's iteration for a system to the stepping scheme."""
+    """Bind Newton's iteration for a system to the stepping scheme.
+
+    Returns
+    -------
+    substeps : jitted function (t, h, level, par, options, work, state) -> bool
+        One step of the output grid, tried first in sub-steps of h / 2^level; False when it failed at the smallest.
+    advance : jitted function (t, h, par, options, work, state) -> bool
+        The same, tried first as a whole.
+    """
 
     @closure
     def attempt(t, h, par, options, work, state):
@@ -132,20 +173,21 @@ def build_advance(newton):
             cv, ca, share = predict(h, stage, state, options)
             if not newton(t + share * h, cv, ca, par, options, work, state):
                 return False, 0.0
-        error = estimate(h, state, options) if options.method == TR_BDF2 and options.rtol > 0 else 0.0
+        error = estimate(h, state, options)
         return error <= 1, error
 
     @closure
-    def advance(t, h, par, options, work, state):
+    def substeps(t, h, level, par, options, work, state):
         whole = 1 << options.max_halvings  # the step is counted in parts of its smallest sub-step
-        done = level = 0
-        if options.method == BDF2 and state.memory[H_OLD] == 0:
-            level = min(START_LEVEL, options.max_halvings)
+        done = 0
         while done < whole:
             h_old = state.memory[H_OLD]
             if h_old > 0 and (options.method == BDF2 or options.rtol > 0):
                 while level < options.max_halvings and h / (1 << level) > 1.0001 * MAX_RATIO * h_old:
                     level += 1
+            if state.counters[ATTEMPTS_LEFT] <= 0:
+                return False
+            state.counters[ATTEMPTS_LEFT] -= 1
             part = h / (1 << level)
             good, error = attempt(t + h * (done / whole), part, par, options, work, state)
             if good:
@@ -157,15 +199,23 @@ def build_advance(newton):
                     error *= 8
             else:
                 level += 1
+                state.memory[AHEAD] = 0.0
                 state.counters[HALVINGS] += 1
                 if level > options.max_halvings:
                     return False
         return True
 
-    return advance
+    @closure
+    def advance(t, h, par, options, work, state):
+        level = 0
+        if options.method == BDF2 and state.memory[H_OLD] == 0:
+            level = min(START_LEVEL, options.max_halvings)
+        return substeps(t, h, level, par, options, work, state)
+
+    return substeps, advance
 
 
-def build_integrator(residual, factorise, solve, size=scaled_size):
+def build_integrator(residual, factorise, solve, size=scaled_size, small=at_rounding):
     """Bind the equations of a system to Newton's iteration and the stepping scheme.
 
     Parameters
@@ -178,13 +228,16 @@ def build_integrator(residual, factorise, solve, size=scaled_size):
         Solves for ``work.solution`` in place.
     size : jitted function (cv, ca, state) -> float
         Norm of ``state.residual`` that is compared with ``options.newton_tol``.
+    small : jitted function (cv, ca, fresh, options, work, state) -> int
+        Whether the change just made, ``work.solution``, leaves nothing to gain: `NO`, `YES`, or `IF_STALLED` when it
+        does so only if the residual did not fall; `fresh` tells that its tangent is new.
 
     Returns
     -------
     newton : jitted function (t, cv, ca, par, options, work, state) -> bool
         Solves for the trial point; True when converged.
     advance : jitted function (t, h, par, options, work, state) -> bool
-        One step of the output grid; False when it failed at the smallest sub-step.
+        One step of the output grid; False when it failed at the smallest sub-step, or no attempt is left.
     """
-    newton = build_newton(residual, factorise, solve, size)
-    return newton, build_advance(newton)
+    newton = build_newton(residual, factorise, solve, size, small)
+    return newton, build_advance(newton)[1]

@@ -22,7 +22,7 @@ def factorise_block(blocks, b, n):
     good = True
     for k in range(n):
         pivot = 1 / blocks[b, k, k]
-        good = good and abs(pivot) < 1e300
+        good = good & (abs(pivot) < 1e300)
         blocks[b, k, k] = pivot
         for i in range(k + 1, n):
             factor = blocks[b, i, k] * pivot
@@ -98,7 +98,7 @@ def factorise(work):
     for p in range(4):
         pin, a = PIN + p, ARM_OF_PIN[p]
         arm = ARM + a
-        good = factorise_block(d, arm, 6) and good
+        good = good & factorise_block(d, arm, 6)
         solve_columns(d, arm, work.arm_pin, p)
         for i in range(6):
             work.pin_psi[p, i] = work.psi_pin[p, i] = 0.0
@@ -111,7 +111,7 @@ def factorise(work):
                 for k in range(6):
                     work.pin_psi[p, i] -= work.pin_arm[p, i, k] * work.arm_psi[a, k]
                     work.psi_pin[p, i] -= work.psi_arm[a, k] * work.arm_pin[p, k, i]
-        good = factorise_block(d, pin, 6) and good
+        good = good & factorise_block(d, pin, 6)
         solve_columns(d, pin, work.pin_hub, p)
         subtract_product(d, HUB, work.hub_pin, p, work.pin_hub, p)
         if a >= 2:
@@ -125,7 +125,7 @@ def factorise(work):
     for i in range(6):
         for j in range(6):
             core[0, i, j] = d[HUB, i, j]
-    return factorise_block(core, 0, 7) and good
+    return good & factorise_block(core, 0, 7)
 
 
 @njit

@@ -1,44 +1,64 @@
-"""A whole trajectory of a system given by its accelerations."""
+"""A whole trajectory of a system given by its forces."""
 
 import numpy as np
 
 from tolstat.kernel._jit import closure
-from tolstat.kernel.dense import build_dense, make_dense_work, motion_size
+from tolstat.kernel.dense import build_dense, lu, make_dense_work, motion_size, small_change
 from tolstat.kernel.integrate import build_integrator, reset
-from tolstat.kernel.state import make_state
+from tolstat.kernel.state import ATTEMPTS_LEFT, make_state
+from tolstat.tables import Status
+
+OK, NEWTON_FAILED, NOT_FINITE = int(Status.OK), int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
 
 
-def build_march(acceleration, tangent=None):
-    """Bind a system; returns a function (t0, t1, options, points) -> (converged, counters).
+def build_march(force, tangent=None, mass=None, divided=False):
+    """Bind a system; arguments as for `dense.build_dense`.
 
-    ``points[0]`` holds q and v at the start; ``points``, shape (steps + 1, 3, n), is filled with q, v, a.
+    Returns
+    -------
+    run : function (t0, t1, options, attempts, matrix, points) -> (status, counters)
+        ``points[0]`` holds q and v at the start; ``points``, shape (steps + 1, 3, n), is filled with q, v, a.
+        `attempts` bounds the sub-steps tried; `matrix` is a constant mass or None.
     """
-    residual, factorise, solve = build_dense(acceleration, tangent)
-    _, advance = build_integrator(residual, factorise, solve, motion_size)
+    acceleration, residual, factorise, solve = build_dense(force, tangent, mass, divided)
+    _, advance = build_integrator(residual, factorise, solve, motion_size, small_change)
 
     @closure
-    def march(t0, t1, par, options, work, state, points):
+    def finite(state):
+        for i in range(state.q0.size):
+            if not (abs(state.q0[i]) < 1e300 and abs(state.v0[i]) < 1e300 and abs(state.a0[i]) < 1e300):
+                return False
+        return True
+
+    @closure
+    def march(t0, t1, par, options, attempts, work, state, points):
         steps = points.shape[0] - 1
         h = (t1 - t0) / steps
         state.q0[:] = points[0, 0]
         state.v0[:] = points[0, 1]
-        acceleration(t0, state.q0, state.v0, state.a0)
-        points[0, 2] = state.a0
+        acceleration(t0, state.q0, state.v0, work, state.a0)
         reset(state)
+        state.counters[ATTEMPTS_LEFT] = attempts
+        if not finite(state):
+            return NOT_FINITE
+        points[0, 2] = state.a0
         for k in range(steps):
             if not advance(t0 + k * h, h, par, options, work, state):
-                return False
+                return NEWTON_FAILED
+            if not finite(state):
+                return NOT_FINITE
             for i in range(points.shape[2]):
                 points[k + 1, 0, i], points[k + 1, 1, i] = state.q0[i], state.v0[i]
                 points[k + 1, 2, i] = state.a0[i]
-                if not abs(state.q0[i]) < 1e300:
-                    return False
-        return True
+        return OK
 
-    def run(t0, t1, options, points):
+    def run(t0, t1, options, attempts, matrix, points):
         n = points.shape[2]
-        state = make_state(n)
-        good = march(t0, t1, np.zeros(1), options, make_dense_work(n), state, points)
-        return good, state.counters
+        state, work = make_state(n), make_dense_work(n)
+        if matrix is not None:
+            work.mass[:] = matrix
+            if not lu(work.mass, work.mass_pivots):
+                return NOT_FINITE, state.counters
+        return march(t0, t1, np.zeros(1), options, attempts, work, state, points), state.counters
 
     return run

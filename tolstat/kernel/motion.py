@@ -29,9 +29,10 @@ def ideal_motion(theta, alpha, omega, work):
     st, ct = math.sin(theta), math.cos(theta)
     # cross against input fork: tan(beta) = tan(alpha) sin(theta)
     ta = sa / ca
-    sec2 = 1 + (ta * st) ** 2
+    tb = ta * st
+    sec2 = 1 + tb * tb
     cb = 1 / math.sqrt(sec2)
-    sb = ta * st * cb
+    sb = tb * cb
     db = omega * ta * ct / sec2
     ddb = -omega * omega * ta * st / sec2 - 2 * ta * st * db * db
     # output fork against cross: sin(gamma) = sin(alpha) cos(theta)

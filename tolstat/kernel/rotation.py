@@ -11,6 +11,7 @@ Multibody Dynamics, 2011, ch. 13):
 import math
 
 from tolstat.kernel._jit import njit
+from tolstat.kernel.lane import all_of, where
 from tolstat.kernel.vector import add, axpy, cross, dot, scale
 
 SERIES_BELOW = 0.1
@@ -20,26 +21,29 @@ SERIES_BELOW = 0.1
 @njit
 def coefficients(x):
     """Return s1, s2, s3 at x = |phi|^2."""
-    if x < SERIES_BELOW:
-        s1 = 1 - x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110))))
-        s2 = (1 - x / 12 * (1 - x / 30 * (1 - x / 56 * (1 - x / 90 * (1 - x / 132))))) / 2
-        s3 = (1 - x / 20 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110 * (1 - x / 156))))) / 6
-        return s1, s2, s3
-    angle = math.sqrt(x)
-    s1 = math.sin(angle) / angle
-    return s1, (1 - math.cos(angle)) / x, (1 - s1) / x
+    s1 = 1 - x * (1 / 6 - x * (1 / 120 - x * (1 / 5040 - x * (1 / 362880 - x * (1 / 39916800)))))
+    s2 = 1 / 2 - x * (1 / 24 - x * (1 / 720 - x * (1 / 40320 - x * (1 / 3628800 - x * (1 / 479001600)))))
+    s3 = 1 / 6 - x * (1 / 120 - x * (1 / 5040 - x * (1 / 362880 - x * (1 / 39916800 - x * (1 / 6227020800)))))
+    small = x < SERIES_BELOW
+    if not all_of(small):
+        angle = math.sqrt(x)
+        ratio = math.sin(angle) / angle
+        s1 = where(small, s1, ratio)
+        s2 = where(small, s2, (1 - math.cos(angle)) / x)
+        s3 = where(small, s3, (1 - ratio) / x)
+    return s1, s2, s3
 
 
 @njit
 def inverse_coefficient(x):
     """Return s4 = (1 - (|phi|/2) cot(|phi|/2)) / x at x = |phi|^2."""
-    if x < SERIES_BELOW:
-        # Bernoulli numbers: 1/12, 1/720, 1/30240, 1/1209600, 1/47900160, 691/1307674368000
-        return 1 / 12 + x * (
-            1 / 720 + x * (1 / 30240 + x * (1 / 1209600 + x * (1 / 47900160 + x * 691 / 1307674368000)))
-        )
-    half = 0.5 * math.sqrt(x)
-    return (1 - half / math.tan(half)) / x
+    # Bernoulli numbers: 1/12, 1/720, 1/30240, 1/1209600, 1/47900160, 691/1307674368000
+    s4 = 1 / 12 + x * (1 / 720 + x * (1 / 30240 + x * (1 / 1209600 + x * (1 / 47900160 + x * (691 / 1307674368000)))))
+    small = x < SERIES_BELOW
+    if not all_of(small):
+        half = 0.5 * math.sqrt(x)
+        s4 = where(small, s4, (1 - half / math.tan(half)) / x)
+    return s4
 
 
 @njit
@@ -78,12 +82,12 @@ def spin_bias(phi, rate):
     """Part of the angular acceleration that the rates alone make: dT/dt rate, so that w' = T phi'' + bias."""
     x = dot(phi, phi)
     s1, s2, s3 = coefficients(x)
-    if x < SERIES_BELOW:
-        ds2 = -1 / 24 + x * (1 / 360 - x * (1 / 13440 - x * (1 / 907200 - x / 95800320)))
-        ds3 = -1 / 120 + x * (1 / 2520 - x * (1 / 120960 - x * (1 / 9979200 - x / 1245404160)))
-    else:
-        ds2 = (0.5 * s1 - s2) / x
-        ds3 = (0.5 * s2 - 1.5 * s3) / x
+    small = x < SERIES_BELOW
+    ds2 = -1 / 24 + x * (1 / 360 - x * (1 / 13440 - x * (1 / 907200 - x * (1 / 95800320))))
+    ds3 = -1 / 120 + x * (1 / 2520 - x * (1 / 120960 - x * (1 / 9979200 - x * (1 / 1245404160))))
+    if not all_of(small):
+        ds2 = where(small, ds2, (0.5 * s1 - s2) / x)
+        ds3 = where(small, ds3, (0.5 * s2 - 1.5 * s3) / x)
     along = 2 * dot(phi, rate)
     turned = cross(phi, rate)
     twice = cross(phi, turned)
@@ -105,9 +109,9 @@ def relative_vector(rot, i, j):
         trace += rot[i, k, 0] * rot[j, k, 0] + rot[i, k, 1] * rot[j, k, 1] + rot[i, k, 2] * rot[j, k, 2]
     half = (0.5 * (r21 - r12), 0.5 * (r02 - r20), 0.5 * (r10 - r01))
     y = dot(half, half)  # sin^2 of the angle
-    if y < 1e-3 and trace > 1:
-        ratio = 1 + y * (1 / 6 + y * (3 / 40 + y * (5 / 112 + y * (35 / 1152 + y * 63 / 2816))))  # asin(s)/s
-    else:
+    ratio = 1 + y * (1 / 6 + y * (3 / 40 + y * (5 / 112 + y * (35 / 1152 + y * (63 / 2816)))))  # asin(s)/s
+    small = (y < 1e-3) & (trace > 1)
+    if not all_of(small):
         s = math.sqrt(y)
-        ratio = math.atan2(s, 0.5 * (trace - 1)) / s
+        ratio = where(small, ratio, math.atan2(s, 0.5 * (trace - 1)) / s)
     return scale(ratio, half)

@@ -7,21 +7,25 @@ import numpy as np
 
 from tolstat.kernel import dynamics, integrate, linsolve, tangent
 from tolstat.kernel._jit import njit
-from tolstat.kernel.equilibrium import build_equilibrium
-from tolstat.kernel.settle import Ring, closure_error, make_ring, record, summarise
-from tolstat.kernel.state import HALVINGS, ITERATIONS, STEPS, State, make_state
+from tolstat.kernel.classify import build_classify
+from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium
+from tolstat.kernel.guess import rigid_guess
+from tolstat.kernel.ideal_loads import ideal_loads
+from tolstat.kernel.quasistatic import build_quasistatic, end_closure, speed_ratios
+from tolstat.kernel.settle import Ring, closure_error, foresee, keep, make_ring, record, summarise
+from tolstat.kernel.state import AHEAD, FACTORISATIONS, HALVINGS, ITERATIONS, STEPS, make_state_record
 from tolstat.kernel.topology import N_DOF, N_LUMPS, PSI
+from tolstat.kernel.trail import closure_trend, note_closure
 from tolstat.kernel.work import make_work
-from tolstat.tables import Options, Start, Status
+from tolstat.tables import MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
-NOT_FINITE, OUTSIDE_MODEL = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL)
+NOT_FINITE, OUTSIDE_MODEL, NOT_PERIODIC = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL), int(Status.NOT_PERIODIC)
+PERIODIC, UNKNOWN = int(Motion.PERIODIC), int(Motion.UNKNOWN)
 RAMP = int(Start.RAMP)
+DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)
 CHECKS_PER_REV = 12
 """How often a revolution the closure error is looked at, once two revolutions are recorded."""
-MAX_ITERATIONS = 40
-"""Bound on the work of a joint, in Newton iterations per step of the longest run allowed: no joint can hang a
-campaign. Joints that never settle take some 8 to 10."""
 SMALLEST_FORCE = 1e-3
 """Scale (N) of the stopping test of a joint that neither turns nor carries."""
 
@@ -36,8 +40,19 @@ def factorise(t, q, v, a, cv, ca, par, options, work):
     return eliminate(work)
 
 
-newton, advance = integrate.build_integrator(residual, factorise, solve)
-equilibrium = build_equilibrium(residual, newton, integrate.scaled_size)
+@njit
+def factorise_static(t, q, v, a, cv, ca, par, options, work):
+    """Tangent of an equilibrium, regularised and factorised."""
+    assemble(CV_REGULAR, CA_REGULAR, par, work)
+    return eliminate(work)
+
+
+newton = integrate.build_newton(residual, factorise, solve)
+substeps, advance = integrate.build_advance(newton)
+static_newton = integrate.build_newton(residual, factorise_static, solve)
+hold, relax, equilibrium = build_equilibrium(residual, newton, static_newton, integrate.scaled_size, rigid_guess)
+revolution = build_quasistatic(hold, relax, record)
+classify = build_classify(advance)
 reset = integrate.reset
 
 
@@ -52,22 +67,23 @@ def inside_model(par):
 
 
 @njit
-def set_scale(par, state):
-    """Scale of the residuals: the pins' tangential force T_r/(2R) or a pin's centrifugal force, times R for torques."""
-    force = max(abs(par.torque) / (2 * par.R), par.pin_mass * par.omega**2 * par.R, SMALLEST_FORCE)
+def set_weight(par, state):
+    """Weights of residuals: 1 / (pins' tangential force T_r/(2R) or a pin's centrifugal force, times R for torques)."""
+    weight = 1 / max(abs(par.torque) / (2 * par.R), par.pin_mass * par.omega**2 * par.R, SMALLEST_FORCE)
     for body in range(N_LUMPS):
         for k in range(3):
-            state.scale[6 * body + k] = force
-            state.scale[6 * body + 3 + k] = force * par.R
-    state.scale[PSI] = force * par.R
+            state.weight[6 * body + k] = weight
+            state.weight[6 * body + 3 + k] = weight / par.R
+    state.weight[PSI] = weight / par.R
 
 
 @njit
 def clear_results(out):
     """NaN in everything that may not be computed."""
     nan = np.nan
-    out.settled, out.steps, out.newton_iterations, out.halvings = 0, 0, 0, 0
-    out.closure = out.revolutions = out.psi_max = nan
+    out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
+    out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
+    out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = out.psi_max = nan
     for b in range(8):
         out.F_max[b] = out.F_mean[b] = out.F_range[b] = nan
         out.T_max[b] = out.T_mean[b] = out.T_range[b] = nan
@@ -79,38 +95,139 @@ def clear_results(out):
 
 
 @njit
-def run(par, options, work, state, ring, out):
-    """Integrate until settled; return a status. ``out.closure`` and ``out.revolutions`` are written."""
-    if not inside_model(par):
-        return OUTSIDE_MODEL
-    set_scale(par, state)
+def clear(par, state, samples, notes):
+    """Make ready for another joint."""
+    set_weight(par, state)
     state.q0[:] = 0.0
     state.v0[:] = 0.0
     state.a0[:] = 0.0
     reset(state)
+    for s in range(samples.size):
+        samples[s].modulus[:] = np.nan
+    notes.count = 0
+
+
+@njit
+def run(par, options, work, state, ring, out):
+    """Fill the ring at the fidelity asked for; return a status.
+
+    ``out.closure`` and ``out.revolutions`` are written, and ``out.failed_step`` where a step failed.
+    """
+    if not inside_model(par):
+        return OUTSIDE_MODEL
+    clear(par, state, ring.samples, ring.trail.notes)
+    if options.fidelity == IDEAL:
+        return run_ideal(par, work, state, ring, out)
+    if options.fidelity == QUASISTATIC:
+        return run_quasistatic(par, options, work, state, ring, out)
+    return run_dynamic(par, options, work, state, ring, out)
+
+
+@njit
+def run_ideal(par, work, state, ring, out):
+    """Fill the ring with the loads of the ideal joint."""
+    n = ring.samples.size
+    for k in range(n):
+        ideal_loads(math.copysign(2 * math.pi * k / n, par.omega), par, state, work)
+        record(k, 0, par, work, state, ring.samples)
+    out.closure, out.revolutions = 0.0, 1.0
+    state.counters[STEPS] = n
+    return OK
+
+
+@njit
+def run_quasistatic(par, options, work, state, ring, out):
+    """Go around through equilibria, again where a revolution does not end where it began."""
+    n = ring.samples.size
+    equilibrium(2 * math.pi / abs(par.omega), par, options, work, state)
+    for revolutions in range(options.max_revs):
+        if not revolution(revolutions == 0, par, options, work, state, ring):
+            return NEWTON_FAILED
+        out.closure, out.revolutions = end_closure(ring), revolutions + 1.0
+        if out.closure <= options.settle_tol:
+            break
+        if state.counters[ITERATIONS] > MAX_ITERATIONS * n * options.max_revs:
+            return NEWTON_FAILED
+    speed_ratios(par, ring)
+    return OK if out.closure <= options.settle_tol else NOT_SETTLED
+
+
+@njit
+def begin(par, options, work, state):
+    """Bring a joint to its start at theta = 0."""
     if options.start == RAMP:
         acceleration(0.0, state.q0, state.v0, par, options, work, state.a0)
     else:
-        equilibrium(par, options, work, state)
-    iterations = state.counters[ITERATIONS]
+        equilibrium(0.0, par, options, work, state)
+    iterations, factorisations = state.counters[ITERATIONS], state.counters[FACTORISATIONS]
     reset(state)
-    state.counters[ITERATIONS] = iterations
+    state.counters[ITERATIONS], state.counters[FACTORISATIONS] = iterations, factorisations
 
+
+@njit
+def grid_step(par, options):
+    """Length of a step of the output grid, s."""
+    return 2 * math.pi / (abs(par.omega) * options.steps_per_rev)
+
+
+@njit
+def judge(k, iterations, options, samples, notes, out):
+    """Status of a joint at grid point `k`: `NOT_SETTLED` while it is to go on."""
     n = options.steps_per_rev
-    h = 2 * math.pi / (abs(par.omega) * n)
-    ring.modulus[:] = np.nan
+    out.revolutions = k / n
+    if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
+        out.closure = closure_error(samples)
+        note_closure(out.revolutions, out.closure, notes)
+        if out.closure <= options.settle_tol:
+            return OK
+    return NEWTON_FAILED if iterations > MAX_ITERATIONS * n * options.max_revs else NOT_SETTLED
+
+
+@njit
+def run_dynamic(par, options, work, state, ring, out):
+    """Integrate until settled."""
+    begin(par, options, work, state)
+    n, h = options.steps_per_rev, grid_step(par, options)
+    half = n * (options.max_revs - options.max_revs // 2)
     for k in range(1, options.max_revs * n + 1):
         if not advance((k - 1) * h, h, par, options, work, state):
+            out.failed_step = k
             return NEWTON_FAILED
-        record(k, par, work, state, ring)
-        out.revolutions = k / n
-        if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
-            out.closure = closure_error(ring)
-            if out.closure <= options.settle_tol:
-                return OK
-        if state.counters[ITERATIONS] > MAX_ITERATIONS * n * options.max_revs:
-            return NEWTON_FAILED
+        record(k, 0, par, work, state, ring.samples)
+        state.memory[AHEAD] = foresee(k, state.q0, state.ahead, ring.samples)
+        if k > half:
+            keep(k, ring)
+        status = judge(k, state.counters[ITERATIONS], options, ring.samples, ring.trail.notes, out)
+        if status == NEWTON_FAILED:
+            out.failed_step = k
+        if status != NOT_SETTLED:
+            return status
     return NOT_SETTLED
+
+
+@njit
+def is_finite(out):
+    """Whether the statistics of a joint are numbers."""
+    for b in range(8):
+        if not (out.F_max[b] < 1e300 and out.T_max[b] < 1e300 and out.F_mean[b] + out.T_mean[b] < 1e300):
+            return False
+    return True
+
+
+@njit
+def describe(status, counters, out):
+    """Write how a joint ended."""
+    out.status = status
+    out.settled = status == OK
+    out.steps, out.newton_iterations = counters[STEPS], counters[ITERATIONS]
+    out.halvings, out.factorisations = counters[HALVINGS], counters[FACTORISATIONS]
+
+
+@njit
+def conclude(notes, out):
+    """Write what only a joint that has settled has."""
+    out.closure_trend, _ = closure_trend(0.0, notes)
+    out.motion, out.period = PERIODIC, 1
 
 
 @njit
@@ -131,29 +248,34 @@ def simulate_joint(par, options, work, state, ring, out):
         Written: status, and NaN in what was not computed.
     """
     clear_results(out)
+    state.counters[:] = 0
     status = run(par, options, work, state, ring, out)
+    failed = out.failed_step
     if status in (OK, NOT_SETTLED):
-        summarise(ring, out)
-        for b in range(8):
-            if not (out.F_max[b] < 1e300 and out.T_max[b] < 1e300):
-                status = NOT_FINITE
-    if status not in (OK, NOT_SETTLED):
+        summarise(ring.samples, out)
+        if not is_finite(out):
+            status, failed = NOT_FINITE, state.counters[STEPS]
+    if status == OK:
+        conclude(ring.trail.notes, out)
+    elif status == NOT_SETTLED:
+        if options.fidelity == DYNAMIC:
+            status = classify(par, options, work, state, ring, out)
+    else:
         clear_results(out)
-    out.status = status
-    out.settled = status == OK
-    out.steps = state.counters[STEPS]
-    out.newton_iterations = state.counters[ITERATIONS]
-    out.halvings = state.counters[HALVINGS]
+        if failed > 0:
+            out.failed_step = failed
+            out.failed_theta = 2 * math.pi * ((failed - 1) % options.steps_per_rev) / options.steps_per_rev
+    describe(status, state.counters, out)
 
 
 class Scratch(NamedTuple):
     """Everything a process needs to simulate one joint after the other."""
 
     work: np.record
-    state: State
+    state: np.record
     ring: Ring
 
 
 def make_scratch(options: Options) -> Scratch:
     """Allocate the work arrays of a process."""
-    return Scratch(make_work(), make_state(N_DOF), make_ring(options.steps_per_rev))
+    return Scratch(make_work(), make_state_record(N_DOF), make_ring(options.steps_per_rev, options.max_revs))

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-STEPS, ITERATIONS, HALVINGS, FACTORISATIONS = 0, 1, 2, 3
-H_OLD, CV_FACTORISED = 0, 1
+STEPS, ITERATIONS, HALVINGS, FACTORISATIONS, ATTEMPTS_LEFT = 0, 1, 2, 3, 4
+H_OLD, CV_FACTORISED, AHEAD = 0, 1, 2
 
 
 class State(NamedTuple):
@@ -19,14 +19,32 @@ class State(NamedTuple):
     a0: np.ndarray
     q1: np.ndarray  # the accepted point before
     v1: np.ndarray
+    a1: np.ndarray
     aux: np.ndarray  # algorithmic acceleration of generalised-alpha at the last accepted point
     residual: np.ndarray
-    scale: np.ndarray  # size of each residual that counts as 1
-    memory: np.ndarray  # (2,) last accepted step, cv that the tangent in use was factorised for (0: none)
-    counters: np.ndarray  # (4,) steps, Newton iterations, halvings, factorisations
+    weight: np.ndarray  # 1 / the size of each residual that counts as 1
+    ahead: np.ndarray  # change of q to expect of the next step, where something better than a Taylor series is known
+    memory: np.ndarray  # (3,) last accepted step, cv of the tangent in use (0: none), whether to use `ahead` (1)
+    counters: np.ndarray  # (5,) steps, Newton iterations, halvings, factorisations, attempts at a step still allowed
 
 
 def make_state(n: int) -> State:
     """Allocate for `n` unknowns, filled with NaN so that reading before writing shows."""
-    arrays = {name: np.full(n, np.nan) for name in State._fields[:11]}
-    return State(**arrays, memory=np.zeros(2), counters=np.zeros(4, np.int64))
+    arrays = {name: np.zeros(shape, dtype) for name, (dtype, shape) in layout(n).items()}
+    for name in State._fields[:13]:
+        arrays[name][...] = np.nan
+    return State(**arrays)
+
+
+def layout(n: int) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Type and shape of each array."""
+    arrays: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(State._fields[:13], ("f8", (n,)))
+    return arrays | {"memory": ("f8", (3,)), "counters": ("i8", (5,))}
+
+
+def make_state_record(n: int) -> np.record:
+    """Allocate the same as one record: what passes it on counts no references, and its shapes are constants."""
+    state = np.zeros(1, [(name, *kind) for name, kind in layout(n).items()]).view(np.recarray)[0]
+    for name in State._fields[:13]:
+        state[name][...] = np.nan
+    return state

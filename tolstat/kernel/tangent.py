@@ -10,6 +10,7 @@ from tolstat.kernel._jit import njit
 from tolstat.kernel.bushing import markers
 from tolstat.kernel.contact import MODE_LAW, smooth_step, smooth_step_slope
 from tolstat.kernel.dynamics import mass_of
+from tolstat.kernel.lane import any_of, where
 from tolstat.kernel.topology import (
     ARM,
     ARM_OF_PIN,
@@ -162,16 +163,19 @@ def contact_tangent(pin, cv, par, work):
     right[1, :] = 0.0
     for j in range(par.n_stations):
         station = work.station[pin, j]
-        if station[DELTA] <= 0:
+        touching = station[DELTA] > 0
+        if not any_of(touching):
             continue
         x, weight = station[DELTA] / par.delta_d, par.station_weight[j]
         film = par.c_t * weight * smooth_step(x)
-        damping = par.c_d * weight * smooth_step(x) if station[FORCE] > 0 else 0.0
-        turning = station[V_TANGENT] / station[RHO]
+        damping = where(station[FORCE] > 0, par.c_d * weight * smooth_step(x), 0.0)
+        # zero where nothing touches: film, damping and force are, but the pin may be centred
+        by_rho = where(touching, 1 / station[RHO], 0.0)
+        turning = station[V_TANGENT] * by_rho
         nn = station[SLOPE] + cv * damping
         nm = (damping - film) * turning
         mn = par.c_t * weight * smooth_step_slope(x) / par.delta_d * station[V_TANGENT]
-        mm = station[FORCE] / station[RHO] + film * (cv - station[V_NORMAL] / station[RHO])
+        mm = station[FORCE] * by_rho + film * (cv - station[V_NORMAL] * by_rho)
         _directions(pin, j, work)
         n, m = work.vectors[0], work.vectors[1]
         for i in range(12):
@@ -185,7 +189,7 @@ def contact_tangent(pin, cv, par, work):
             for i in range(12):
                 left[1, i] += station[EXCESS] * n[i]
                 right[1, i] += by_delta * n[i] + by_m * m[i]
-    if par.law == MODE_LAW and work.mode_weight[pin, 0] > 0:
+    if par.law == MODE_LAW and any_of(work.mode_weight[pin, 0] > 0):
         _add_dyad(pin, left[1], right[1], work)
 
 

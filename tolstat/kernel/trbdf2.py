@@ -8,6 +8,7 @@ w = sqrt(2) / 4; the embedded formula of order 3 has ((1 - w) / 3, (3 w + 1) / 3
 import math
 
 from tolstat.kernel._jit import njit
+from tolstat.kernel.quadrature import relative
 
 STAGES = 2
 GAMMA = 2 - math.sqrt(2)
@@ -52,7 +53,5 @@ def error(h, state, options):
     for i in range(state.q.size):
         of_q = h * (E0 * state.v0[i] + E1 * state.v1[i] + E2 * state.v[i])
         of_v = h * (E0 * state.a0[i] + E1 * state.aux[i] + E2 * state.a[i])
-        size_q = options.atol + options.rtol * max(abs(state.q0[i]), abs(state.q[i]))
-        size_v = options.atol + options.rtol * max(abs(state.v0[i]), abs(state.v[i]))
-        worst = max(worst, abs(of_q) / size_q, abs(of_v) / size_v)
+        worst = max(worst, relative(i, h, of_q, of_v, state, options))
     return worst

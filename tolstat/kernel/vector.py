@@ -1,6 +1,7 @@
 """Vectors of three as tuples: they live in registers and nothing is allocated."""
 
 from tolstat.kernel._jit import njit
+from tolstat.kernel.lane import where
 
 
 @njit
@@ -40,6 +41,12 @@ def cross(a, b):
 
 
 @njit
+def choose(condition, a, b):
+    """Return a where the condition holds, else b."""
+    return (where(condition, a[0], b[0]), where(condition, a[1], b[1]), where(condition, a[2], b[2]))
+
+
+@njit
 def row(matrix, i):
     """Row `i` of an (n, 3) array."""
     return (matrix[i, 0], matrix[i, 1], matrix[i, 2])
@@ -69,3 +76,9 @@ def turn_back(matrices, i, a):
         matrices[i, 0, 1] * a[0] + matrices[i, 1, 1] * a[1] + matrices[i, 2, 1] * a[2],
         matrices[i, 0, 2] * a[0] + matrices[i, 1, 2] * a[1] + matrices[i, 2, 2] * a[2],
     )
+
+
+@njit
+def larger(a, b):
+    """The larger of two numbers; NaN if one of them is."""
+    return where((b > a) | (b != b), b, a)

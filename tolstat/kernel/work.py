@@ -52,13 +52,12 @@ FIELDS = {
 All vectors of a body are in axes of its ideal frame.
 """
 
-WORK = np.dtype([(name, np.int64 if name == "mode" else np.float64, shape) for name, shape in FIELDS.items()])
+WORK = np.dtype([(name, np.float64, shape) for name, shape in FIELDS.items()])
 
 
 def make_work():
     """Allocate the work record of a process, filled with NaN so that reading before writing shows."""
     work = np.zeros(1, WORK).view(np.recarray)[0]
     for name in FIELDS:
-        if name != "mode":
-            work[name][...] = np.nan
+        work[name][...] = np.nan
     return work

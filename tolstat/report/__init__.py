@@ -7,8 +7,9 @@ gets its table, or the page of the paper's study when its cases are the paper's.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from tolstat import fidelity
 from tolstat.errors import Fault, InputError
 from tolstat.files import writing
 from tolstat.report import text
@@ -53,8 +54,10 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
 
     For ``FILE.h5`` it writes ``FILE_exceedance.png``, ``.svg`` and ``.csv`` (the curves),
     ``FILE_quantiles.csv`` and, where the study sets limits, ``FILE_limits.csv``; for a sweep
-    ``FILE_sweep.png``, ``.svg`` and ``.csv``; for a list of cases ``FILE_cases.csv`` and, where they are those of
-    the paper's tables, the page ``FILE_paper.html`` and its tables ``FILE_tables.csv``.
+    ``FILE_sweep.png``, ``.svg`` and ``.csv``; for a list of cases ``FILE_cases.csv``, where variants have
+    notes the table ``FILE_cases.md`` and, where the cases are those of the paper's tables, the page ``FILE_paper.html``
+    and its tables ``FILE_tables.csv``. Loads that the study does not keep are left out; without any force or
+    torque there is no picture.
 
     Parameters
     ----------
@@ -79,36 +82,54 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
     stem = (Path(out_dir) if out_dir is not None else path.parent) / path.stem
     try:
         with ResultStore.open(path) as store:
+            stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
-                return _cases(store, stem)
+                return _noted(_cases(store, stem), stands_on)
             campaign = read(store)
-        return _sweep(campaign, stem) if campaign.method == "sweep" else _exceedance(campaign, stem)
+            stop = _stopped(store.stop) if store.stop else ""
+        report = _sweep(campaign, stem) if campaign.method == "sweep" else _exceedance(campaign, stem)
+        for note in (campaign.missing(), stop, stands_on):
+            report = _noted(report, note)
+        return report
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
         raise InputError([Fault(str(stem.parent), found, "name an existing folder with --out")]) from error
 
 
+def _noted(report: Report, note: str) -> Report:
+    return report._replace(notes=f"{report.notes}\n{note}") if note else report
+
+
 def _exceedance(campaign: Campaign, stem: Path) -> Report:
     from tolstat.report import exceedance, style
 
-    files = style.save(exceedance.figure(campaign), stem.with_name(f"{stem.name}_exceedance"))
-    files.append(_csv(exceedance.curves(campaign), stem, "exceedance"))
-    quantiles = exceedance.quantiles(campaign)
-    files.append(_csv(quantiles, stem, "quantiles"))
-    table = text.quantiles(quantiles)
+    files, table = [], "no largest load is kept; the results that are: tolstat export"
+    if campaign.drawn:
+        files = style.save(exceedance.figure(campaign), stem.with_name(f"{stem.name}_exceedance"))
+    if campaign.listed:
+        files.append(_csv(exceedance.curves(campaign), stem, "exceedance"))
+        quantiles = exceedance.quantiles(campaign)
+        files.append(_csv(quantiles, stem, "quantiles"))
+        table = text.quantiles(quantiles)
     if campaign.limits:
         limits = exceedance.limits(campaign)
         files.append(_csv(limits, stem, "limits"))
         table = text.limits(limits)
-    return Report(table, f"{campaign.head()}\n{exceedance.note(campaign)}", files)
+    return Report(table, f"{campaign.head()}\n{exceedance.note(campaign)}{_accuracy(campaign)}", files)
 
 
 def _sweep(campaign: Campaign, stem: Path) -> Report:
     from tolstat.report import style, sweep
 
-    files = style.save(sweep.figure(campaign), stem.with_name(f"{stem.name}_sweep"))
+    files = style.save(sweep.figure(campaign), stem.with_name(f"{stem.name}_sweep")) if campaign.drawn else []
     files.append(_csv(sweep.table(campaign), stem, "sweep"))
-    return Report(text.plain(sweep.worst(campaign)), campaign.head(), files)
+    return Report(text.plain(sweep.worst(campaign)), f"{campaign.head()}{_accuracy(campaign)}", files)
+
+
+def _accuracy(campaign: Campaign) -> str:
+    from tolstat.report import accuracy
+
+    return f"\n{accuracy.note(campaign.verification)}" if campaign.verification else ""
 
 
 def _cases(store: ResultStore, stem: Path) -> Report:
@@ -119,12 +140,30 @@ def _cases(store: ResultStore, stem: Path) -> Report:
     counts = store.counts()
     notes = f"{counts.done} of {counts.total} joints, {counts.failed} failed, {counts.not_settled} not settled"
     if not paper_source.matching(store):
+        notes = "\n".join([notes, *cases.advice(full)])
+        if full["note"].any():
+            files.append(_text(cases.markdown(full), stem, "cases.md"))
         return Report(text.plain(cases.worst(full)), notes, files)
     study = paper_source.read(store)
     page = stem.with_name(f"{stem.name}_paper.html")
     paper.write(study, page)
     files = [page, _csv(paper.entries(study), stem, "tables"), *files]
     return Report(paper.summary(study), notes, files)
+
+
+def _text(content: str, stem: Path, ending: str) -> Path:
+    path = stem.with_name(f"{stem.name}_{ending}")
+    with writing(path) as temporary:
+        temporary.write_text(content, encoding="utf-8")
+    return path
+
+
+def _stopped(stop: dict[str, Any]) -> str:
+    """Sentence about a campaign that ended when its precision was reached."""
+    return (
+        f"stopped by {stop['rule']} at {stop['joints']} joints; {stop['confidence']:.0%} interval corrected for "
+        f"{len(stop['looks'])} looks: {stop['lower']:.5f} to {stop['upper']:.5f}. Intervals above are not corrected."
+    )
 
 
 def _csv(frame: pd.DataFrame, stem: Path, what: str) -> Path:

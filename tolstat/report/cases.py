@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from tolstat.analysis import paper
-from tolstat.tables import BUSHINGS, Status
+from tolstat import kept
+from tolstat.analysis import accuracy, paper
+from tolstat.remedy import remedy
+from tolstat.store import verification
+from tolstat.study.design import IDEAL
+from tolstat.tables import BUSHINGS, Motion, Status
 
 if TYPE_CHECKING:
     from tolstat.store import ResultStore
+    from tolstat.tables import Variant
 
 
 def table(store: ResultStore) -> pd.DataFrame:
@@ -25,31 +31,120 @@ def table(store: ResultStore) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row a joint: ``variant``, what makes it (``values``), ``alpha [deg]``, ``case``, ``status``; force and
-        torque of each bushing, SI, and their Gamma, eq. (14), per cent.
+        One row a joint: ``variant``, what makes it (``values``), ``note``, ``alpha [deg]``, ``case``, ``status``,
+        ``motion``, ``cost`` in Newton iterations of the first joint, ``remedy``; force and torque of each bushing, SI,
+        and their Gamma, eq. (14), per cent; those that the study does not keep are left out. Where the file holds a
+        comparison with the reference (``tolstat verify``), also what `reference` gives.
     """
     design, results, alpha = store.design(), store.results(), store.errors()["operation.alpha"]
     variants = [store.variants[i] for i in design["variant"]]
     columns: dict[str, object] = {
         "variant": [variant.family for variant in variants],
         "values": ["; ".join(f"{key} = {value}" for key, value in variant.values.items()) for variant in variants],
+        "note": [variant.note for variant in variants],
         "alpha [deg]": np.degrees(alpha),
         "case": [store.case_names[i] for i in design["case"]],
         "status": [Status(int(code)).label for code in results["status"]],
+        "motion": [_motion(row) for row in results],
+        "revolutions": results["revolutions"],
+        "cost": results["newton_iterations"] / max(1, int(results["newton_iterations"][0])),
+        "remedy": [remedy(row, store.options | _own(v, "solver")) for row, v in zip(results, variants, strict=True)],
     }
     gamma = paper.gamma(results, design["group"])
     for b, bushing in enumerate(BUSHINGS):
         for load, (letter, unit) in enumerate((("F", "N"), ("T", "N*m"))):
+            if not kept.holds(store.columns, f"{bushing}.{letter}"):
+                continue
             columns[f"{bushing}.{letter} [{unit}]"] = results[f"{letter}_max"][:, b]
             columns[f"{bushing}.Gamma_{letter} [%]"] = gamma[:, b, load]
-    return pd.DataFrame(columns)
+    return pd.DataFrame(columns | reference(store))
+
+
+def reference(store: ResultStore) -> dict[str, object]:
+    """Compare every joint with the tight reference.
+
+    Parameters
+    ----------
+    store : ResultStore
+        File of the study.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        ``error_F``, ``error_T``: of the largest load of the worst bushing, relative to the largest of the kind; NaN for
+        joints that did not settle, and where the reference has no result. ``reference``: state of the reference, empty
+        where there was no comparison. ``reference_change``: what its largest loads change in a revolution, as errors
+        are measured. Empty where the file holds no comparison.
+    """
+    found = verification.read(store)
+    if found is None or accuracy.REFERENCE not in found.checks:
+        return {}
+    true = found.checks[accuracy.REFERENCE].results
+    error, change, state = np.full((store.n, 2), np.nan), np.full(store.n, np.nan), np.full(store.n, "", object)
+    error[found.rows] = accuracy.by_kind(accuracy.differences(found.base, true))[:, :2]
+    change[found.rows] = true["closure"]
+    state[found.rows] = [Status(int(code)).label for code in true["status"]]
+    return {"reference": state, "reference_change": change, "error_F": error[:, 0], "error_T": error[:, 1]}
+
+
+def _motion(row: np.void) -> str:
+    motion = Motion(int(row["motion"]))
+    return f"{motion.label} {row['period']}" if motion == Motion.SUBHARMONIC else motion.label
+
+
+def _own(variant: Variant, section: str) -> dict[str, Any]:
+    """Values of a variant in one section of the study, by key."""
+    return {k.partition(".")[2]: value for k, value in variant.values.items() if k.startswith(f"{section}.")}
+
+
+def markdown(full: pd.DataFrame) -> str:
+    """Table of `table` for a document: what makes each joint hard, and what became of it.
+
+    A line a joint; its largest force and torque, their errors where they are known, and its cost in units of the first
+    joint's.
+    """
+    heads = ["joint", "what makes it hard", "status", "motion", "revolutions", "max F (N)", "max T (N m)", "cost"]
+    checked = "reference" in full
+    heads += ["error of F", "error of T"] if checked else []
+    lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
+    force, torque = (full[_of_bushings(full, load)].max(axis=1) for load in ("F [N]", "T [N*m]"))
+    for i, row in enumerate(full.to_dict("records")):
+        name = row["variant"] if row["case"] == IDEAL else f"{row['variant']}, {row['case']}"
+        note = row["note"] if row["case"] == IDEAL else ""
+        numbers = (f"{x:.3g}" for x in (row["revolutions"], force[i], torque[i], row["cost"]))
+        cells = [name, note, row["status"], row["motion"], *numbers, *(_errors(row) if checked else [])]
+        lines.append(f"| {' | '.join(cells)} |".replace("nan", "–"))
+    return "\n".join(lines) + "\n"
+
+
+def _of_bushings(full: pd.DataFrame, what: str) -> list[str]:
+    return [name for bushing in BUSHINGS if (name := f"{bushing}.{what}") in full.columns]
+
+
+def _errors(row: Mapping[Any, Any]) -> list[str]:
+    """Cells of the errors of F and T, or the reason why there are none."""
+    if not row["reference"]:
+        return ["nothing to compare" if row["status"] != Status.OK.label else "not compared", "nan"]
+    if row["reference"] == Status.NEWTON_FAILED.label:
+        return ["reference gave up", "nan"]
+    wanders = f" ± {row['reference_change']:.0e}" if row["reference"] == Status.NOT_SETTLED.label else ""
+    return [f"{row[key]:.0e}{wanders}" for key in ("error_F", "error_T")]
+
+
+def advice(full: pd.DataFrame) -> list[str]:
+    """Lines of text on the joints that did not settle: which, and what to do about it."""
+    loose = full[full["remedy"] != ""]
+    return [f"{row['variant']}, {row['case']}: {row['remedy']}" for row in loose.to_dict("records")]
 
 
 def worst(full: pd.DataFrame) -> pd.DataFrame:
-    """Short form of `table`: of all bushings the largest change of force and of torque, with its sign."""
-    short = full[["variant", "alpha [deg]", "case", "status"]].copy()
+    """Short form of `table`: of all bushings kept the largest change of force and of torque, with its sign."""
+    short = full[["variant", "alpha [deg]", "case", "status", "motion"]].copy()
     for letter in "FT":
-        gamma = full[[f"{bushing}.Gamma_{letter} [%]" for bushing in BUSHINGS]].to_numpy(float)
+        columns = _of_bushings(full, f"Gamma_{letter} [%]")
+        if not columns:
+            continue
+        gamma = full[columns].to_numpy(float)
         size = np.where(np.isnan(gamma), -1.0, np.abs(gamma))
         short[f"Gamma_{letter} [%]"] = gamma[np.arange(len(gamma)), size.argmax(axis=1)]
     return short

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 
 import numpy as np
@@ -15,11 +16,13 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, quantile
-from tolstat.report import style
-from tolstat.report.source import LOADS, Campaign, load
+from tolstat.analysis.accuracy import KIND_OF, KINDS, OBSERVABLES, sizes
+from tolstat.report import accuracy, style
+from tolstat.report.source import Campaign, load
 from tolstat.tables import Status
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
+BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
 MAX_LEVELS, DRAWN_LEVELS = 600, 200
 """Most points of a curve in the CSV and in the picture; the file has every joint."""
 LIMIT_DASH, ZERO_DASH = (0.0, (8.0, 3.0)), (0.0, (1.0, 2.0))
@@ -39,19 +42,46 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         One row a limit in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
-        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence``. Loads in SI units.
+        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
+        `_budget`. Loads in SI units.
     """
     rows = []
+    numerical = accuracy.usual(campaign.verification) if campaign.verification else {}
     for name, level in campaign.limits.items():
         values, unit = load(campaign.results, name)
         share = exceedance.at(values, campaign.results["status"], level, confidence, campaign.iid)
         head = {"load": name, "unit": unit, "nominal": _nominal(campaign, name)}
-        rows.append({**head, **asdict(share), "confidence": confidence})
+        budget = _budget(campaign, name, level, confidence, numerical)
+        rows.append({**head, **asdict(share), "confidence": confidence, **budget})
     return pd.DataFrame(rows)
 
 
+def _budget(
+    campaign: Campaign, name: str, level: float, confidence: float, numerical: Mapping[str, float]
+) -> dict[str, float]:
+    """Bounds of a share with every load off by the numerical error, downwards and upwards.
+
+    Returns
+    -------
+    dict
+        ``numerical_error``, relative to the largest load of the kind in the joint, NaN where it is not known;
+        ``numerical_lower`` and ``numerical_upper``, the estimates; ``total_lower`` and ``total_upper``, the ends
+        ``outer_*`` of these, which cover numerical error, sampling and unresolved joints.
+    """
+    kind = KINDS[KIND_OF[OBSERVABLES.index(name)]]
+    error = numerical.get(kind, np.nan)
+    values = load(campaign.results, name)[0]
+    shift = error * sizes(campaign.results)[:, OBSERVABLES.index(name)]
+    status = campaign.results["status"]
+    if np.isnan(error):
+        return {"numerical_error": error} | dict.fromkeys(BUDGET, np.nan)
+    low, high = (exceedance.at(values + s, status, level, confidence, campaign.iid) for s in (-shift, shift))
+    bounds = (low.estimate, high.estimate, low.outer_lower, high.outer_upper)
+    return {"numerical_error": error, **dict(zip(BUDGET, bounds, strict=True))}
+
+
 def quantiles(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Quantiles of every bushing load, for a study that sets no limits.
+    """Quantiles of every bushing load kept (of the other loads where it is none), for a study that sets no limits.
 
     Returns
     -------
@@ -60,7 +90,7 @@ def quantiles(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
         ``confidence``. Loads in SI units.
     """
     rows = []
-    for name in LOADS:
+    for name in campaign.listed:
         values, unit = load(campaign.results, name)
         for share in SHARES:
             q = quantile.at(values, campaign.results["status"], share, confidence, campaign.iid)
@@ -70,7 +100,7 @@ def quantiles(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
 
 
 def curves(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Step curves of all bushing loads, one below the other.
+    """Step curves of the same loads, one below the other.
 
     Returns
     -------
@@ -79,7 +109,7 @@ def curves(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
         `MAX_LEVELS` levels a load.
     """
     parts = []
-    for name in LOADS:
+    for name in campaign.listed:
         table, unit = _curve(campaign, name, confidence, MAX_LEVELS)
         part = pd.DataFrame({field: table[field] for field in exceedance.CURVE.names or ()})
         part.insert(0, "load", name)
@@ -100,7 +130,7 @@ def note(campaign: Campaign) -> str:
 
 
 def figure(campaign: Campaign, confidence: float = 0.95) -> Figure:
-    """Draw the exceedance curves of all bushing loads.
+    """Draw the exceedance curves of all bushing loads that the study keeps.
 
     Parameters
     ----------
@@ -112,7 +142,7 @@ def figure(campaign: Campaign, confidence: float = 0.95) -> Figure:
     Returns
     -------
     Figure
-        Four panels; share of the joints on a logarithmic axis down to half a joint.
+        Four panels, empty where no load is kept; share of the joints on a logarithmic axis down to half a joint.
     """
     with style.settings():
         title = f"{campaign.name}: share of joints whose largest load exceeds x"
@@ -142,14 +172,19 @@ def _curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple
 
 def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: float) -> None:
     names = [f"{group}{i}.{letter}" for i in (1, 2, 3, 4)]
-    tables = [_curve(campaign, name, confidence, DRAWN_LEVELS)[0] for name in names]
+    tables = [
+        _curve(campaign, name, confidence, DRAWN_LEVELS)[0] if name in campaign.drawn else np.empty(0, exceedance.CURVE)
+        for name in names
+    ]
     unit = "N" if letter == "F" else "N m"
     ax.set_xlabel(f"x: largest |{letter}| over the revolution [{unit}]")
     if letter == "F":
         ax.set_ylabel("share of joints above x")
     levels = np.concatenate([table["level"] for table in tables])
     if not levels.size:
-        ax.text(0.5, 0.5, "no joint with a valid result", ha="center", transform=ax.transAxes)
+        held = any(name in campaign.drawn for name in names)
+        found = "no joint with a valid result" if held else "not kept by the study"
+        ax.text(0.5, 0.5, found, ha="center", transform=ax.transAxes)
         ax.set(xticks=[], yticks=[])
         return
     marked = _limit_levels(campaign, group, letter)

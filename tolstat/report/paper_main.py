@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +11,6 @@ from tolstat import rccc
 from tolstat.analysis import paper, paper_spectra
 from tolstat.analysis.paper_evidence import Evidence
 from tolstat.joint import Joint
-from tolstat.joint.sections import BeamAxes
 from tolstat.store import ResultStore
 from tolstat.tables import Status
 
@@ -125,35 +122,3 @@ def output_inertia(joint: Joint) -> float:
 def revolutions(results: NDArray[np.void]) -> Array:
     """Revolutions until settled, (n,); infinite where a joint did not settle."""
     return np.where(results["status"] == Status.OK, results["revolutions"], np.inf)
-
-
-def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
-    """The joint of a variant.
-
-    Parameters
-    ----------
-    joint : Joint
-        The joint of the study.
-    values : mapping
-        `Variant.values`: dotted key of the joint to SI value or word.
-    """
-    sections: dict[str, dict[str, Any]] = {}
-    for key, value in values.items():
-        section, _, name = key.partition(".")
-        sections.setdefault(section, {})[name] = tuple(value) if isinstance(value, list) else value
-    update = {name: _section(getattr(joint, name), own) for name, own in sections.items()}
-    return joint.model_copy(update=update)
-
-
-def _section(section: Any, values: Mapping[str, Any]) -> Any:
-    """A section with new values; keys of a table in it (the stiffness of a bushing) have a dot."""
-    flat = {key: value for key, value in values.items() if "." not in key}
-    tables: dict[str, dict[str, Any]] = {}
-    for key, value in values.items():
-        table, dot, name = key.partition(".")
-        if dot:
-            tables.setdefault(table, {})[name] = value
-    for table, own in tables.items():
-        before = getattr(section, table)
-        flat[table] = before.model_copy(update=own) if before is not None else BeamAxes.model_construct(**own)
-    return section.model_copy(update=flat)

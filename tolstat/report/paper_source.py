@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import paper, paper_choices, paper_laws, paper_statements, paper_statics
 from tolstat.analysis.paper_evidence import Answer
-from tolstat.joint import Joint
+from tolstat.joint import Joint, varied
 from tolstat.report import paper_main
-from tolstat.report.paper_main import Main, revolutions, varied
+from tolstat.report.paper_main import Main, revolutions
 from tolstat.store import ResultStore
-from tolstat.tables import Status, Variant
+from tolstat.tables import RESULT_COLUMNS, Status, Variant
 
 Array = NDArray[np.float64]
 AS_PRINTED = 1e7
@@ -152,8 +152,10 @@ class PaperStudy:
 
 
 def matching(store: ResultStore) -> bool:
-    """Whether a file is a complete study of the paper's cases with the histories that the page draws."""
-    if not store.case_names or not store.complete or not {"loads", "contact", "tau"} <= set(store.history_specs):
+    """Whether a file is a complete study of the paper's cases with all results and with what the page draws."""
+    if store.columns != RESULT_COLUMNS or not store.case_names or not store.complete:
+        return False
+    if not {"loads", "contact", "tau"} <= set(store.history_specs):
         return False
     design, alpha = store.design(), store.errors()["operation.alpha"]
     rows = _kept(design, alpha)

@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat import kept
 from tolstat.errors import Fault, InputError
-from tolstat.tables import BUSHINGS, ERROR_FIELDS, FAILED, PINS, Status
+from tolstat.store import verification
+from tolstat.store.verification import Verification
+from tolstat.study.selection import LIMIT_UNITS
+from tolstat.tables import BUSHINGS, ERROR_FIELDS, FAILED, PINS, RESULT_COLUMNS, UNSETTLED, Column, Status
 
 if TYPE_CHECKING:
     from tolstat.store import ResultStore
@@ -20,7 +24,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 METHODS = {"random": "random sampling", "sobol": "Sobol' points", "lhs": "Latin hypercube", "sweep": "sweep"}
 LOADS = tuple(f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT")
-"""The loads that every report shows: force and torque of each bushing."""
+"""The loads that every report shows, where they are kept: force and torque of each bushing."""
 _ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 _DISPLAY = {
     "m": ("mm", 1e3),
@@ -67,6 +71,10 @@ class Campaign:
         The joint without errors, where the campaign has one and it settled.
     patterns : tuple of str
         What the study sweeps; empty for a random campaign.
+    verification : Verification, optional
+        Some of the joints simulated in other ways, where the file holds that.
+    columns : tuple of Column
+        Columns of the results that the study keeps; the others are NaN.
     """
 
     name: str
@@ -76,6 +84,18 @@ class Campaign:
     results: NDArray[np.void]
     nominal: NDArray[np.void]
     patterns: tuple[str, ...] = ()
+    verification: Verification | None = None
+    columns: tuple[Column, ...] = RESULT_COLUMNS
+
+    @property
+    def drawn(self) -> tuple[str, ...]:
+        """Those of `LOADS` that the study keeps."""
+        return tuple(name for name in LOADS if kept.holds(self.columns, name))
+
+    @property
+    def listed(self) -> tuple[str, ...]:
+        """Loads that tables show: those of `drawn`, and all others that a study keeps which keeps none of these."""
+        return self.drawn or tuple(name for name in LIMIT_UNITS if kept.holds(self.columns, name))
 
     @property
     def iid(self) -> bool:
@@ -91,20 +111,35 @@ class Campaign:
         failed = self.count(*FAILED)
         pending = self.count(Status.PENDING)
         text = f"{len(self.results) - pending} joints ({METHODS.get(self.method, self.method)}), "
-        text += f"{failed} failed, {self.count(Status.NOT_SETTLED)} not settled"
+        text += f"{failed} failed, {self.count(*UNSETTLED)} not settled"
         return text + (f", {pending} still pending" if pending else "")
+
+    def missing(self) -> str:
+        """Sentence on the loads that a report would show and the study does not keep; empty where it keeps them all."""
+        names = [name for name in LOADS if name not in self.drawn]
+        return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
 
 
 def read(store: ResultStore) -> Campaign:
     """Take from a result file what a report needs; row 0 goes apart where it is the nominal joint."""
     errors, results = store.errors(), store.results()
     nominal = results[:0]
-    if store.sampling["nominal_first"]:
+    if store.sampling["nominal_first"] and store.rows.start == 0:
         nominal = results[:1][results["status"][:1] == Status.OK]
         errors, results = errors[1:], results[1:]
     patterns = tuple(_patterns(tomllib.loads(store.study_text).get("sweep", {})))
     method = str(store.sampling["method"])
-    return Campaign(store.study_name, method, store.limits, errors, results, nominal, patterns)
+    return Campaign(
+        store.study_name,
+        method,
+        store.limits,
+        errors,
+        results,
+        nominal,
+        patterns,
+        verification.read(store),
+        store.columns,
+    )
 
 
 def _patterns(table: Mapping[str, Any], before: str = "") -> Iterator[str]:

@@ -13,9 +13,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from tolstat import kept
 from tolstat.report import style
-from tolstat.report.source import LOADS, Axis, Campaign, load, swept_axes
-from tolstat.tables import FAILED, Status
+from tolstat.report.source import Axis, Campaign, load, swept_axes
+from tolstat.study.selection import LIMIT_UNITS
+from tolstat.tables import FAILED, SIMULATED, UNSETTLED, Status
 
 Mask = NDArray[np.bool_]
 MAX_LEGEND = 6
@@ -34,27 +36,30 @@ def table(campaign: Campaign) -> pd.DataFrame:
     -------
     DataFrame
         One row a joint, pending and failed ones included: the swept values, headed by label and unit
-        for the reader (``pin*.diameter [mm]``); ``status``; the loads of `source.LOADS`, SI, headed likewise;
-        ``psi``.
+        for the reader (``pin*.diameter [mm]``); ``status``; force and torque of each bushing, SI, headed likewise;
+        ``psi``. Loads that the study does not keep have no column.
     """
     columns: dict[str, object] = {_head(axis): axis.values for axis in swept_axes(campaign)}
     columns["status"] = [Status(int(code)).label for code in campaign.results["status"]]
-    for name in LOADS:
+    for name in campaign.listed:
         values, unit = load(campaign.results, name)
-        columns[f"{name} [{unit}]"] = values
-    columns["psi"] = load(campaign.results, "psi")[0]
+        columns[name if unit == "1" else f"{name} [{unit}]"] = values
+    if kept.holds(campaign.columns, "psi"):
+        columns["psi"] = load(campaign.results, "psi")[0]
     return pd.DataFrame(columns)
 
 
 def worst(campaign: Campaign) -> pd.DataFrame:
     """Short form of `table`: of the cross and of the fork bushings the largest force and torque."""
     full = table(campaign)
-    short = full[[c for c in full.columns if not str(c).startswith(("cross", "fork", "psi"))]].copy()
+    loads = [c for c in full.columns if str(c).partition(" ")[0] in LIMIT_UNITS] if campaign.drawn else []
+    short = full[[c for c in full.columns if c not in loads]].copy()
     for group in ("cross", "fork"):
         for unit in ("N", "N*m"):
             letter = "F" if unit == "N" else "T"
-            columns = [f"{group}{i}.{letter} [{unit}]" for i in (1, 2, 3, 4)]
-            short[f"{group}.{letter} [{unit}]"] = full[columns].max(axis=1)
+            columns = [c for c in loads if str(c).startswith(group) and str(c).endswith(f".{letter} [{unit}]")]
+            if columns:
+                short[f"{group}.{letter} [{unit}]"] = full[columns].max(axis=1)
     return short
 
 
@@ -101,20 +106,24 @@ def _note(axes: list[Axis]) -> str:
 
 
 def _panel(ax: Axes, campaign: Campaign, axes: list[Axis], group: str, letter: str) -> None:
-    loads = np.stack([load(campaign.results, f"{group}{i}.{letter}")[0] for i in (1, 2, 3, 4)])
+    names = [name for i in (1, 2, 3, 4) if (name := f"{group}{i}.{letter}") in campaign.drawn]
+    if not names:
+        ax.text(0.5, 0.5, "not kept by the study", ha="center", transform=ax.transAxes)
+        ax.set(xticks=[], yticks=[])
+        return
+    loads = [load(campaign.results, name)[0] for name in names]
     if len(axes) == 1:
-        for i, values in enumerate(loads):
+        for name, values in zip(names, loads, strict=True):
+            i = int(name.partition(".")[0][-1]) - 1
             every = np.ones(values.size, dtype=bool)
             _line(ax, campaign, axes[0].values, values, every, style.COLOURS[i], style.DASHES[i])
     else:
         for colour, rows in _combinations(axes):
-            _line(ax, campaign, axes[0].values, loads.max(axis=0), rows, colour, "-")
+            _line(ax, campaign, axes[0].values, np.max(loads, axis=0), rows, colour, "-")
     if len(campaign.nominal):
-        nominal = max(load(campaign.nominal, f"{group}{i}.{letter}")[0][0] for i in (1, 2, 3, 4))
+        nominal = max(load(campaign.nominal, name)[0][0] for name in names)
         ax.axhline(nominal, color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0)), zorder=1.5)
-    limits = {
-        campaign.limits[name] for name in (f"{group}{i}.{letter}" for i in (1, 2, 3, 4)) if name in campaign.limits
-    }
+    limits = {campaign.limits[name] for name in names if name in campaign.limits}
     bottom, top = ax.get_ylim()
     for limit in sorted(limits):
         if limit < top + 0.5 * (top - bottom):
@@ -135,11 +144,11 @@ def _line(
     """Draw one line over the joints `rows`; it is broken where a joint has no result."""
     order = np.flatnonzero(rows)[np.argsort(x[rows], kind="stable")]
     status = campaign.results["status"][order]
-    shown = np.where(np.isin(status, [Status.OK, Status.NOT_SETTLED]), values[order], np.nan)
+    shown = np.where(np.isin(status, SIMULATED), values[order], np.nan)
     ax.plot(x[order], shown, color=colour, ls=dash, marker="o", ms=3.2, zorder=3)
-    loose = status == Status.NOT_SETTLED
+    loose = np.isin(status, UNSETTLED)
     ax.plot(x[order][loose], shown[loose], ls="", marker="o", ms=6.5, mfc="white", mec=colour, zorder=4)
-    gone = ~np.isin(status, [Status.OK, Status.NOT_SETTLED, Status.PENDING])
+    gone = np.isin(status, FAILED)
     foot = np.full(int(gone.sum()), 0.02)
     ax.plot(x[order][gone], foot, ls="", marker="x", color=style.INK, transform=ax.get_xaxis_transform(), zorder=4)
 
@@ -173,7 +182,7 @@ def _legend(page: Figure, campaign: Campaign, axes: list[Axis]) -> None:
     if len(campaign.nominal):
         handles.append(Line2D([], [], color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0))))
         labels.append("nominal joint, largest")
-    if campaign.count(Status.NOT_SETTLED):
+    if campaign.count(*UNSETTLED):
         handles.append(Line2D([], [], ls="", marker="o", ms=6.5, mfc="white", mec=style.INK))
         labels.append("not settled")
     if campaign.count(*FAILED):

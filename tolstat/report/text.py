@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,12 +22,15 @@ def limits(table: pd.DataFrame) -> str:
     Returns
     -------
     str
-        One line a limit. The last column, there only when joints failed or did not settle, counts them below
-        and above the limit and, for independent samples, adds the interval.
+        One line a limit. A column that counts joints that failed or did not settle below and above the limit (and, for
+        independent samples, adds the interval) is there only when there are such joints. The last two, there only
+        when the numerical error is known, move every load by it, then add all that the columns before have.
     """
     unresolved = bool((table["n_failed"] + table["n_unsettled"]).any())
     rows = [["load", "nominal", "limit", "joints", "above", "share", "95 % interval"]]
     rows[0] += ["failed, unsettled both ways"] if unresolved else []
+    verified = bool(table["numerical_error"].notna().any())
+    rows[0] += ["numerical error both ways", "all together"] if verified else []
     for row in table.to_dict("records"):
         line = [row["load"], _value(row["nominal"], row["unit"]), _value(row["level"], row["unit"])]
         line += [str(row["n"]), str(row["count"]), _percent(row["estimate"])]
@@ -36,6 +39,9 @@ def limits(table: pd.DataFrame) -> str:
             iid = not math.isnan(row["outer_lower"])
             ends = ("outer_lower", "outer_upper") if iid else ("bound_lower", "bound_upper")
             line.append(_range(row[ends[0]], row[ends[1]]))
+        if verified:
+            line.append(_range(row["numerical_lower"], row["numerical_upper"]))
+            line.append(_range(row["total_lower"], row["total_upper"]))
         rows.append(line)
     return align(rows)
 
@@ -66,6 +72,14 @@ def quantiles(table: pd.DataFrame) -> str:
     return align(rows)
 
 
+def accuracy(table: pd.DataFrame) -> str:
+    """Text of `accuracy.distribution`: one line a kind of load and check."""
+    rows = [["load", "error", "joints", "median", "95 % below", "worst"]]
+    for row in table.itertuples(index=False):
+        rows.append([str(row.load), str(row.error), str(row.joints), *(_small(x) for x in row[3:])])
+    return align(rows)
+
+
 def plain(table: pd.DataFrame) -> str:
     """Text of any frame, numbers to five digits, headed by its columns."""
     rows = [[str(column) for column in table.columns]]
@@ -74,18 +88,34 @@ def plain(table: pd.DataFrame) -> str:
     return align(rows)
 
 
-def align(rows: list[list[str]]) -> str:
-    """Align rows of text in columns: the first to the left, the others to the right."""
+def records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows of a frame for JSON, which has no NaN and no infinity: they are null."""
+
+    def plain_number(x: Any) -> Any:
+        x = x.item() if hasattr(x, "item") else x
+        return None if isinstance(x, float) and not math.isfinite(x) else x
+
+    return [{str(k): plain_number(v) for k, v in row.items()} for row in table.to_dict("records")]
+
+
+def align(rows: list[list[str]], text_last: bool = False) -> str:
+    """Align rows of text in columns: the first to the left, the others to the right; the last to the left if wanted."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for row in rows:
         cells = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+        if text_last:
+            cells[-1] = row[-1]
         lines.append("  ".join([row[0].ljust(widths[0]), *cells]).rstrip())
     return "\n".join(lines)
 
 
 def _value(x: float, unit: str) -> str:
     return "-" if math.isnan(x) else f"{x:.4g} {UNITS.get(unit, unit)}".strip()
+
+
+def _small(x: float) -> str:
+    return "-" if math.isnan(x) else f"{x:.1e}"
 
 
 def _percent(share: float) -> str:

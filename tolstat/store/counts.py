@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import FAILED, Status
+from tolstat.tables import FAILED, UNSETTLED, Status
 
 
 class Counts(NamedTuple):
@@ -35,6 +35,6 @@ class Counts(NamedTuple):
         return Counts(
             self.total,
             self.done + int(np.count_nonzero(status != Status.PENDING)),
-            self.not_settled + int(np.count_nonzero(status == Status.NOT_SETTLED)),
+            self.not_settled + int(np.count_nonzero(np.isin(status, UNSETTLED))),
             self.failed + int(np.count_nonzero(np.isin(status, FAILED))),
         )

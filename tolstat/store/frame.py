@@ -13,27 +13,29 @@ from tolstat.tables import Status
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tolstat.store.result_store import ResultStore
+    from tolstat.store.reader import Reader
 
 LABELS = np.array([s.label for s in Status], dtype=object)
 
 
-def to_pandas(store: ResultStore, units: bool = False) -> pd.DataFrame:
+def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
     """Put a campaign into one frame, see `ResultStore.to_pandas`."""
     import pandas as pd
 
     errors, results = store.errors(), store.results()
     data: dict[tuple[str, str], NDArray[Any]] = _design(store) if store.case_names else {}
     data |= {(c.name, c.unit): c.of(errors) for c in tables.ERROR_COLUMNS}
-    data |= {(c.name, c.unit): c.of(results) for c in tables.RESULT_COLUMNS}
+    data |= {(c.name, c.unit): c.of(results) for c in store.columns}
+    if store.retries:
+        data["attempt", "1"] = store.attempt()
     data["status", "1"] = LABELS[results["status"]]
-    index = pd.RangeIndex(store.n, name="row")
+    index = pd.RangeIndex(store.rows.start, store.rows.stop, name="row")
     if units:
         return pd.DataFrame(data, index=index)
     return pd.DataFrame({name: values for (name, _), values in data.items()}, index=index)
 
 
-def _design(store: ResultStore) -> dict[tuple[str, str], NDArray[Any]]:
+def _design(store: Reader) -> dict[tuple[str, str], NDArray[Any]]:
     """Which of the listed joints each row is, names in place of indices where there are names."""
     design = store.design()
     families = np.array([variant.family for variant in store.variants], dtype=object)

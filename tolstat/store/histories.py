@@ -12,6 +12,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,11 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.files import writing
-from tolstat.store.result_file import fault
+from tolstat.store.result_file import fault, put_attributes
 from tolstat.tables import HistorySpec
 
 CHUNK_BYTES = 1 << 16
 """About how much of a history one compressed chunk holds."""
+HISTORY_BYTES = 1 << 25
+"""About how much of the histories is copied at a time."""
 
 
 def rows_per_chunk(spec: HistorySpec, n: int) -> int:
@@ -43,9 +46,21 @@ def create_dataset(group: h5py.Group, name: str, n: int, spec: HistorySpec) -> h
         shuffle=True,
         fillvalue=spec.blank(1).flat[0],
     )
-    dataset.attrs["units"] = spec.unit
-    dataset.attrs["description"] = spec.description
+    put_attributes(dataset, {"units": spec.unit, "description": spec.description})
     return dataset
+
+
+def attach_scales(dataset: h5py.Dataset, row: h5py.Dataset, spec: HistorySpec) -> None:
+    """Name the axes of a history: the first is that of the rows, the others are those of `spec`."""
+    dataset.dims[0].attach_scale(row)
+    name = dataset.name.rpartition("/")[2]
+    given = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
+    for k, (axis, size) in enumerate(zip(given, spec.shape, strict=True), 1):
+        if axis not in dataset.parent:
+            scale = dataset.parent.create_dataset(axis, data=np.arange(size, dtype="i4"))
+            scale.make_scale(axis)
+            put_attributes(scale, {"units": "1", "description": "index along this axis, from 0"})
+        dataset.dims[k].attach_scale(dataset.parent[axis])
 
 
 class Index(NamedTuple):
@@ -108,12 +123,19 @@ class HistoryParts:
         if self._next is None:
             paths = self.paths()
             self._next = int(paths[-1].stem) + 1 if paths else 0
-        with writing(self.folder / f"{self._next:08d}.h5") as temporary, h5py.File(temporary, "w") as file:
+        content = BytesIO()  # on a full disk plain writing fails clearly, and HDF5 does not
+        with h5py.File(content, "w") as file:
             file.attrs["campaign"] = self.campaign
             file["rows"] = rows
             for name, spec in self.specs.items():
                 create_dataset(file, name, len(rows), spec)[...] = arrays[name]
+        with writing(self.folder / f"{self._next:08d}.h5") as temporary:
+            temporary.write_bytes(content.getbuffer())
         self._next += 1
+
+    def size(self) -> int:
+        """Bytes of all parts."""
+        return sum(path.stat().st_size for path in self.paths())
 
     def paths(self) -> list[Path]:
         """Finished parts in the order in which they were written."""
@@ -161,8 +183,8 @@ class HistoryParts:
         self._check_held(index.part[rows[done]])
         return self._gather(name, rows, index)
 
-    def gather_into(self, group: h5py.Group) -> None:
-        """Copy the histories of all rows to datasets in `group`, a few chunks at a time.
+    def gather_into(self, file: h5py.File) -> None:
+        """Copy the histories of all rows to datasets in the group ``histories``, a few chunks at a time.
 
         Raises
         ------
@@ -171,8 +193,10 @@ class HistoryParts:
         """
         index = self.index()
         self._check_held(index.part)
+        group = file.create_group("histories")
         for name, spec in self.specs.items():
             dataset = create_dataset(group, name, self.n, spec)
+            attach_scales(dataset, file["row"], spec)
             step = 16 * rows_per_chunk(spec, self.n)
             for first in range(0, self.n, step):
                 rows = np.arange(first, min(first + step, self.n))

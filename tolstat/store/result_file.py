@@ -6,8 +6,7 @@ import errno
 import hashlib
 import json
 import os
-import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -18,22 +17,31 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import tables
+from tolstat import kept, tables
 from tolstat.errors import Fault, StoreError
-from tolstat.files import writing
+from tolstat.files import check_room, writing
+from tolstat.store.integrity import errors_hash, seal
 from tolstat.store.provenance import git_commit, versions
-from tolstat.tables import HistorySpec
+from tolstat.tables import HistorySpec, Options
 
 if TYPE_CHECKING:
     from tolstat.study import Study
 
 FILETYPE = "tolstat campaign"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+LONGEST_FIXED = 32_000
+"""Bytes of the longest text that is an attribute of fixed length: HDF5 allows some 64 kB."""
+OVERHEAD = 800
+"""Bytes that HDF5 needs for a column beside its values."""
+BLOCK = 1 << 16
+"""Rows of a column written at a time where it is not known beforehand."""
 
 
 def campaign_digest(file: h5py.File) -> str:
-    """Hash of what tells a campaign from others: the study's identity and the code that began it."""
-    texts = (str(file.attrs[name]) for name in ("identity", "versions"))
+    """Hash of what tells a campaign from others: the study's identity, the code that began it, and the rows held."""
+    texts = [text(file.attrs, name) for name in ("identity", "versions")]
+    if "first_row" in file.attrs:
+        texts.append(f"{int(file.attrs['first_row'])} {file['results/status'].shape[0]}")
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
 
 
@@ -42,7 +50,13 @@ def judgement(study: Study) -> dict[str, str]:
     return {"study": study.text, "study_name": study.name, "limits": json.dumps(study.limits, allow_nan=False)}
 
 
-def attributes(study: Study, specs: Mapping[str, HistorySpec], dimensions: Mapping[str, int]) -> dict[str, Any]:
+def attributes(
+    study: Study,
+    specs: Mapping[str, HistorySpec],
+    dimensions: Mapping[str, int],
+    options: Options | None = None,
+    fidelity: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
     """Make the attributes of a new file: all that a reader needs beyond the tables.
 
     Parameters
@@ -53,20 +67,25 @@ def attributes(study: Study, specs: Mapping[str, HistorySpec], dimensions: Mappi
         Histories that the campaign keeps.
     dimensions : mapping of str to int
         Which dimension of the sequence each error is drawn from.
+    options, fidelity : Options and mapping, optional
+        Settings that ``solver.fidelity = "auto"`` chose, and its record.
     """
     sampling = study.sampling.model_dump(mode="json")
     structured = {
         "identity": study.identity(),
         "joint": study.joint.model_dump(mode="json"),
-        "options": study.solver.options()._asdict(),
+        "options": (options or study.solver.options())._asdict(),
+        "fidelity": dict(fidelity or {}),
         "design": {"cases": study.case_names, "variants": [variant._asdict() for variant in study.variants]},
         "sampling": sampling | {"dimensions": dict(dimensions)},
         "versions": versions(),
         "histories": specs,
+        "retries": [],
     }
     plain = {
         "filetype": FILETYPE,
         "schema_version": SCHEMA_VERSION,
+        "campaign_rows": study.rows,
         "git_commit": git_commit(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
     }
@@ -74,31 +93,161 @@ def attributes(study: Study, specs: Mapping[str, HistorySpec], dimensions: Mappi
     return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
 
 
-def pending_results(n: int) -> NDArray[np.void]:
-    """Make the table RESULT of joints not simulated yet: status PENDING, floats NaN."""
-    table = np.zeros(n, tables.RESULT)
-    for field in tables.RESULT_FIELDS:
-        if np.dtype(field.dtype).kind == "f":
-            table[field.name] = np.nan
-    return table
+def size_of_new(n: int, results: tuple[tables.Column, ...]) -> int:
+    """About how many bytes a new file of `n` rows with these results takes at most, without long attributes."""
+    groups = (tables.DESIGN_COLUMNS, tables.ERROR_COLUMNS, results, tables.LEDGER_COLUMNS)
+    columns = [np.dtype(c.dtype).itemsize for group in groups for c in group]
+    return n * sum(columns) + OVERHEAD * len(columns)
 
 
-def create_table(group: h5py.Group, columns: tuple[tables.Column, ...], table: NDArray[np.void]) -> None:
+def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:
+    """Write attributes; texts in UTF-8 of fixed length, as MATLAB and Fortran read them, but for very long ones."""
+    for name, value in values.items():
+        data: Any = value
+        dtype = None
+        if isinstance(value, str) and len(value.encode()) <= LONGEST_FIXED:
+            data = value.encode()
+            dtype = h5py.string_dtype("utf-8", max(1, len(data)))
+        holder.attrs.create(name, data, dtype=dtype)
+
+
+def text(attrs: h5py.AttributeManager, name: str) -> str:
+    """Text of an attribute, of fixed or variable length.
+
+    Raises
+    ------
+    KeyError
+        When there is none of that name.
+    ValueError
+        When it is something else than a text in UTF-8.
+    """
+    value = attrs[name]
+    if isinstance(value, bytes):
+        return value.decode("utf-8")
+    if isinstance(value, str):
+        return value
+    raise ValueError(f"attribute {name} is no text")
+
+
+def fill(
+    file: h5py.File,
+    attrs: Mapping[str, str | int | float],
+    rows: range,
+    errors: Iterable[NDArray[np.void]],
+    design: NDArray[np.void] | None,
+) -> None:
+    """Fill an empty file with everything but histories, all rows pending.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The file.
+    attrs : mapping
+        See `attributes`.
+    rows : range
+        Rows of the campaign that the file holds.
+    errors : iterable of table ERROR
+        Errors of these rows, block after block.
+    design : (len(rows),) table DESIGN, optional
+        What each row is, for a study that lists its joints.
+    """
+    n = len(rows)
+    put_attributes(file, dict(attrs) | {"first_row": rows.start})
+    scale = file.create_dataset("row", (n,), "i8", dcpl=_allocated(None))
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
+        scale[first:last] = np.arange(rows.start + first, rows.start + last)
+    scale.make_scale("row")
+    put_attributes(scale, {"units": "1", "description": "row of the campaign: the joint's number"})
+    if design is not None:
+        create_table(file, "design", tables.DESIGN_COLUMNS, n, [design])
+    create_table(file, "results", kept.columns(json.loads(str(attrs["identity"]))), n)
+    create_table(file, "ledger", (*tables.LEDGER_COLUMNS, *history_check_columns(attrs)), n)
+    session = file.create_dataset("session", (2,), "f8", dcpl=_allocated("f8", 0.0))
+    put_attributes(session, {"units": "s, 1", "description": "of the run under way: start (Unix time), joints done"})
+    create_table(file, "errors", tables.ERROR_COLUMNS, n, _checked(file, rows, errors, design))
+    seal(file)
+
+
+def history_check_columns(attrs: Mapping[str, Any]) -> tuple[tables.Column, ...]:
+    """Columns of the ledger for the histories that are kept."""
+    return tuple(check_column(name) for name in json.loads(attrs["histories"]))
+
+
+def check_column(history: str) -> tables.Column:
+    """Column of the ledger with the checksums of a history."""
+    return tables.Column(f"{history}_check", "1", f"CRC-32 of the joint's {history}", "u4", f"{history}_check", ())
+
+
+def _checked(
+    file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]], design: NDArray[np.void] | None
+) -> Iterator[NDArray[np.void]]:
+    """Pass the blocks of `errors` on, writing their checksums."""
+    first = 0
+    for block in errors:
+        here = slice(first, first + len(block))
+        part = None if design is None else design[here]
+        file["ledger/errors_check"][here] = errors_hash(rows.start + first, block, part)
+        yield block
+        first = here.stop
+
+
+def create_table(
+    file: h5py.File,
+    name: str,
+    columns: tuple[tables.Column, ...],
+    n: int,
+    blocks: Iterable[NDArray[np.void]] | None = None,
+    scale: h5py.Dataset | None = None,
+) -> None:
     """Write a table column by column, each a contiguous dataset that can be overwritten in place.
 
     Parameters
     ----------
-    group : h5py.Group
-        Where the datasets go.
+    file : h5py.File
+        File with the dimension scale ``row``.
+    name : str
+        Group of the datasets.
     columns : tuple of Column
         Columns of the table.
-    table : (n,) structured array
-        Its values.
+    n : int
+        Its rows.
+    blocks : iterable of structured array, optional
+        Its values, one block of rows after the other; without them floats are NaN and integers 0.
+    scale : h5py.Dataset, optional
+        Dimension scale of the rows; ``row`` of the file without it.
     """
+    group, row = file.create_group(name), scale or file["row"]
     for c in columns:
-        dataset = group.create_dataset(c.name, data=c.of(table), dtype=c.dtype)
-        dataset.attrs["units"] = c.unit
-        dataset.attrs["description"] = c.description
+        blank = np.nan if np.dtype(c.dtype).kind == "f" else 0
+        dataset = group.create_dataset(
+            c.name, (n,), c.dtype, dcpl=_allocated(c.dtype, blank if blocks is None else None)
+        )
+        dataset.dims[0].attach_scale(row)
+        put_attributes(dataset, {"units": c.unit, "description": c.description})
+    first = 0
+    for block in blocks or ():
+        for c in columns:
+            group[c.name][first : first + len(block)] = c.of(block)
+        first += len(block)
+    if blocks is not None and first != n:
+        raise ValueError(f"{first} rows of {name} given, {n} expected")
+
+
+def _allocated(dtype: str | None, fill: float | None = None) -> h5py.h5p.PropDCID:
+    """Properties of a dataset whose whole space is taken, and filled if a value is given, when it is made."""
+    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
+    if fill is not None:
+        properties.set_fill_value(np.array(fill, dtype))
+    return properties
+
+
+def get(dataset: h5py.Dataset, rows: NDArray[np.intp]) -> NDArray[Any]:
+    """Values of the `rows` of a column, (m,)."""
+    begin = rows.min()
+    return np.asarray(dataset[begin : rows.max() + 1][rows - begin])
 
 
 def put(dataset: h5py.Dataset, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
@@ -136,18 +285,44 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
         if not h5py.is_hdf5(path):
             raise fault(path, "is not an HDF5 file", "give a file that tolstat run has made") from error
         raise fault(path, f"is damaged: {error}", "run the campaign again with another --out") from error
-    if mode != "r" and not _is_at(file, path):
+    if mode != "r" and not is_at(file, path):
         # opened before another process replaced it and locked after: nobody else will ever see this file
         file.close()
         raise fault(path, "is being written by another process", "wait for it or stop it")
     return file
 
 
-def _is_at(file: h5py.File, path: Path) -> bool:
+def is_at(file: h5py.File, path: Path) -> bool:
+    """Whether an open file is the one of that name."""
     return path.exists() and os.path.samestat(os.fstat(file.id.get_vfd_handle()), path.stat())
 
 
-def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None]) -> h5py.File:
+def copy_open(file: h5py.File, path: Path) -> None:
+    """Copy an open file, whose name may be gone, to `path`."""
+    file.flush()
+    handle = file.id.get_vfd_handle()
+    with open(path, "wb") as copy:
+        offset = 0
+        while chunk := os.pread(handle, 1 << 20, offset):
+            copy.write(chunk)
+            offset += len(chunk)
+
+
+def is_locked(path: Path) -> bool:
+    """Whether a process writes the file; asked for a moment, and so as not to hinder it."""
+    try:
+        import fcntl
+    except ImportError:  # a system without: nobody knows
+        return False
+    with open(path, "rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError as error:
+            return error.errno in (errno.EAGAIN, errno.EWOULDBLOCK)
+    return False
+
+
+def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
     """Change more of a file than numbers, by way of a copy: a kill leaves the file as it was or as it shall be.
 
     No other process can write in between: `held` stays open and locked until the copy has its lock and the name.
@@ -160,40 +335,25 @@ def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None]) ->
         The same, open for writing; closed afterwards.
     change : callable
         Told the copy, open for writing.
+    growth : int
+        By about how many bytes it makes the copy larger.
 
     Returns
     -------
     h5py.File
         What is now at `path`, open for writing.
     """
-    held.flush()
+    check_room(path, held.id.get_filesize() + growth)
     with ExitStack() as opened:
         with writing(path) as temporary:
-            shutil.copyfile(path, temporary)
+            copy_open(held, temporary)
             with open_hdf5(temporary, "r+") as file:
                 change(file)
+                seal(file)
             copy = opened.enter_context(open_hdf5(temporary, "r+"))
         opened.pop_all()
     held.close()
     return copy
-
-
-def check_schema(path: Path, file: h5py.File) -> None:
-    """Check that an HDF5 file is a result file that this version can read.
-
-    Raises
-    ------
-    StoreError
-        When it is not.
-    """
-    filetype = file.attrs.get("filetype")
-    if filetype != FILETYPE:
-        found = f"is HDF5, but of type {filetype!r} instead of {FILETYPE!r}"
-        raise fault(path, found, "give a file that tolstat run has made")
-    version = int(file.attrs["schema_version"])
-    if version > SCHEMA_VERSION:
-        found = f"has schema version {version}, this tolstat reads up to {SCHEMA_VERSION}"
-        raise fault(path, found, "use a newer tolstat")
 
 
 def fault(path: Path, found: str, remedy: str) -> StoreError:

@@ -10,42 +10,44 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import tables
+from tolstat import kept
 from tolstat.errors import StoreError
-from tolstat.files import writing
-from tolstat.store.counts import Counts
-from tolstat.store.frame import to_pandas
-from tolstat.store.histories import HistoryParts
+from tolstat.files import check_room, writing
+from tolstat.store.checks import DAMAGED
+from tolstat.store.histories import HISTORY_BYTES
+from tolstat.store.integrity import history_checks, results_hash
+from tolstat.store.reader import Reader, parts_folder
 from tolstat.store.result_file import (
     attributes,
-    campaign_digest,
-    check_schema,
-    create_table,
+    copy_open,
     fault,
+    fill,
+    get,
+    is_at,
     judgement,
     open_hdf5,
-    pending_results,
     put,
+    put_attributes,
     replace,
+    size_of_new,
+    text,
 )
-from tolstat.tables import HistorySpec, Simulation, Status, Variant
+from tolstat.tables import HistorySpec, Options, Simulation, Status
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tolstat.study import Study
 
 
-class ResultStore:
+class ResultStore(Reader):
     """A result file; make one with `create` or `open`, and use it as a context manager.
 
     Attributes
@@ -53,11 +55,18 @@ class ResultStore:
     path : Path
         The file.
     n : int
-        Number of joints.
+        Number of joints in the file.
+    rows : range
+        Their rows in the campaign: all of them, unless the file holds a slice. Row i of every table is row
+        ``rows[i]`` of the campaign.
+    campaign_rows : int
+        Number of rows of the campaign.
     study_name, study_text : str
         Name of the study and the TOML that it was read from.
     identity : dict
         Everything that decides the numbers, by dotted key.
+    columns : tuple of Column
+        Columns of the results that the campaign keeps, in the order of the table.
     joint, options, sampling, versions : dict
         The joint as resolved, solver options, sampling (with ``dimensions``), versions of what ran.
     limits : dict of str to float
@@ -68,40 +77,27 @@ class ResultStore:
         Family and values (dotted key of the joint to SI value or word) of each of its joints; empty likewise.
     created, git_commit : str
         Time of creation (UTC) and commit of the code, if known.
+    stop : dict
+        Where a precision asked for was reached before all rows were simulated: the rule and what it found; else empty.
+    retries : list of dict
+        Settings with which joints were simulated again, in their order; see `attempt`.
     history_specs : dict of str to HistorySpec
         Histories asked for; empty if none.
     """
-
-    def __init__(self, path: Path, file: h5py.File) -> None:
-        self.path = path
-        self._file = file
-        attrs = file.attrs
-        self._read_judgement()
-        self.created = str(attrs["created"])
-        self.git_commit = str(attrs["git_commit"])
-        self.identity: dict[str, Any] = json.loads(attrs["identity"])
-        self.joint: dict[str, Any] = json.loads(attrs["joint"])
-        self.options: dict[str, Any] = json.loads(attrs["options"])
-        self.sampling: dict[str, Any] = json.loads(attrs["sampling"])
-        self.versions: dict[str, str] = json.loads(attrs["versions"])
-        design: dict[str, Any] = json.loads(attrs["design"])
-        self.case_names: tuple[str, ...] = tuple(design["cases"])
-        self.variants = tuple(Variant(**variant) for variant in design["variants"])
-        specs: dict[str, Any] = json.loads(attrs["histories"])
-        self.history_specs = {k: HistorySpec(tuple(shape), *rest) for k, (shape, *rest) in specs.items()}
-        self.n = int(file["results/status"].shape[0])
-        self._parts = HistoryParts(_parts_folder(path), self.n, self.history_specs, campaign_digest(file))
 
     @classmethod
     def create(
         cls,
         path: str | Path,
         study: Study,
-        errors: NDArray[np.void],
+        errors: NDArray[np.void] | Iterable[NDArray[np.void]],
         histories: Mapping[str, HistorySpec] | None = None,
         dimensions: Mapping[str, int] | None = None,
+        rows: range | None = None,
+        options: Options | None = None,
+        fidelity: Mapping[str, Any] | None = None,
     ) -> Self:
-        """Create the file of a new campaign, all rows pending, and open it for writing.
+        """Create the file of a new campaign, or of a slice of it, all rows pending, and open it for writing.
 
         Parameters
         ----------
@@ -109,12 +105,16 @@ class ResultStore:
             The file; must not exist.
         study : Study
             What is to be kept of it goes into the file's attributes.
-        errors : (n,) table ERROR
-            Errors of every joint.
+        errors : (n,) table ERROR, or iterable of tables
+            Errors of every joint of the file; as blocks of rows, one after the other, where they are many.
         histories : mapping of str to HistorySpec, optional
             Load histories to keep.
         dimensions : mapping of str to int, optional
             Which dimension of the sequence each error is drawn from.
+        rows : range, optional
+            Rows of the campaign that the file shall hold; all without it.
+        options, fidelity : Options and mapping, optional
+            Settings that ``solver.fidelity = "auto"`` chose, and its record.
 
         Raises
         ------
@@ -123,19 +123,18 @@ class ResultStore:
         """
         path = Path(path)
         specs = {name: HistorySpec(*spec) for name, spec in (histories or {}).items()}
-        parts = _parts_folder(path)
+        parts = parts_folder(path)
         if parts.exists():
             raise fault(parts, "holds histories of another campaign", "delete it or use another --out")
         if not path.parent.is_dir():
             raise fault(path, "cannot be written: no such folder", "make the folder first")
+        held = range(study.rows) if rows is None else rows
         try:
+            check_room(path, size_of_new(len(held), kept.columns(study.identity())))
             with writing(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
-                file.attrs.update(attributes(study, specs, dimensions or {}))
-                if study.case_names:
-                    create_table(file.create_group("design"), tables.DESIGN_COLUMNS, study.design)
-                create_table(file.create_group("errors"), tables.ERROR_COLUMNS, errors)
-                pending = pending_results(len(errors))
-                create_table(file.create_group("results"), tables.RESULT_COLUMNS, pending)
+                blocks = [errors] if isinstance(errors, np.ndarray) else errors
+                design = study.design[held.start : held.stop] if study.case_names else None
+                fill(file, attributes(study, specs, dimensions or {}, options, fidelity), held, blocks, design)
         except FileExistsError as error:
             raise fault(path, "exists already", "go on with it, delete it, or use another --out") from error
         except OSError as error:
@@ -166,46 +165,17 @@ class ResultStore:
         path = Path(path)
         file = open_hdf5(path, mode)
         try:
-            check_schema(path, file)
             store = cls(path, file)
-        except KeyError as error:
-            file.close()
-            raise fault(path, f"is damaged: {error}", "run the campaign again with another --out") from error
         except StoreError:
             file.close()
             raise
+        except DAMAGED as error:
+            file.close()
+            raise fault(path, f"is damaged: {error}", "run the campaign again with another --out") from error
         if mode == "r+":
+            store._make_pending(store.damaged())
             store._forget_lost_histories()
         return store
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    @property
-    def complete(self) -> bool:
-        """Whether no row is pending."""
-        return self.pending().size == 0
-
-    def status(self) -> NDArray[np.uint8]:
-        """Status of every joint, (n,)."""
-        return np.asarray(self._file["results/status"][:])
-
-    def counts(self) -> Counts:
-        """How far the campaign is."""
-        return Counts(self.n, 0, 0, 0).after(self.status())
-
-    def pending(self) -> NDArray[np.intp]:
-        """Rows still to be simulated, ascending."""
-        return np.flatnonzero(self.status() == Status.PENDING)
 
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
         """Write the results of `rows`; when this returns they are on the disk and no longer pending.
@@ -230,16 +200,28 @@ class ResultStore:
         try:
             if self.history_specs:
                 self._parts.add(rows, simulation.histories)
-            for column in tables.RESULT_COLUMNS:
+            for column in self.columns:
                 if column.name != "status":
                     self._put(column.name, rows, column.of(results))
+            self._put_checks(rows, simulation)
             self._sync()
             self._put("status", rows, results["status"])
             self._sync()
+            self._check_there()
         except OSError as error:
             reason = error.strerror or str(error)
             remedy = "make room and run the campaign again: finished joints are kept"
             raise fault(self.path, f"cannot be written: {reason}", remedy) from error
+
+    def begin_session(self, done: int) -> None:
+        """Note for others who look at the file that a run begins, `done` joints being done."""
+        self._file["session"][:] = time.time(), done
+        self._sync()
+
+    def end_session(self) -> None:
+        """Note that the run is over. One that is killed cannot: that nobody holds the lock tells as much."""
+        self._file["session"][:] = 0.0
+        self._sync()
 
     def finish(self) -> None:
         """Take the histories of a complete campaign into the file.
@@ -254,7 +236,7 @@ class ResultStore:
         if not self.history_specs or not self.complete:
             return
         if "histories" not in self._file:
-            self._replace(lambda file: self._parts.gather_into(file.create_group("histories")))
+            self._replace(self._parts.gather_into, self._parts.size())
         self._parts.remove()
 
     def judge_by(self, study: Study) -> None:
@@ -268,117 +250,93 @@ class ResultStore:
             When there is no room for a second copy of the file.
         """
         wanted = judgement(study)
-        if any(self._file.attrs[name] != value for name, value in wanted.items()):
-            self._replace(lambda file: file.attrs.update(wanted))
+        if any(text(self._file.attrs, name) != value for name, value in wanted.items()):
+            self._replace(lambda file: put_attributes(file, wanted))
             self._read_judgement()
 
-    def design(self) -> NDArray[np.void]:
-        """Variant, case and group of every joint, (n,) table DESIGN.
+    def note_stop(self, stop: Mapping[str, Any]) -> None:
+        """Note that, and why, the campaign ends before all rows are simulated; does nothing where that is noted.
 
         Raises
         ------
         StoreError
-            When the study does not list its joints.
+            When there is no room for a second copy of the file.
         """
-        if "design" not in self._file:
-            remedy = 'give the file of a study with sampling.method = "cases"'
-            raise fault(self.path, "has no list of cases and variants", remedy)
-        return self._read("design", tables.DESIGN_COLUMNS, tables.DESIGN)
+        if self.stop != stop:
+            self._replace(lambda file: put_attributes(file, {"stop": json.dumps(stop, allow_nan=False)}))
+            self.stop = dict(stop)
 
-    def errors(self) -> NDArray[np.void]:
-        """Errors of every joint, (n,) table ERROR."""
-        return self._read("errors", tables.ERROR_COLUMNS, tables.ERROR)
-
-    def results(self) -> NDArray[np.void]:
-        """Results of every joint, (n,) table RESULT; those of a joint that is PENDING mean nothing."""
-        return self._read("results", tables.RESULT_COLUMNS, tables.RESULT)
-
-    def histories(self, name: str, rows: NDArray[np.intp] | None = None) -> NDArray[Any]:
-        """Load histories of one kind.
+    def begin_retry(self, rows: NDArray[np.intp], entry: Mapping[str, Any]) -> None:
+        """Make joints pending that are to be simulated again, with settings other than the study's.
 
         Parameters
         ----------
-        name : str
-            One of `history_specs`.
-        rows : (m,) array of int, optional
-            Rows to read; all without it.
-
-        Returns
-        -------
-        (m, ...) array
-            NaN for joints that are pending or have no results.
+        rows : (m,) array of int
+            Rows of this file.
+        entry : mapping
+            What `retries` is to say of it; ``options`` are the settings of the solver.
 
         Raises
         ------
         StoreError
-            When the file holds no such histories, or those of joints that are done are gone.
+            When there is no room for a second copy of the file.
         """
-        if name not in self.history_specs:
-            held = ", ".join(self.history_specs) or "none"
-            remedy = 'set histories = "full" or "harmonics" in [output] of the study and run it anew'
-            raise fault(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
-        rows = np.arange(self.n) if rows is None else np.asarray(rows, dtype=np.intp)
-        if "histories" not in self._file:
-            done = self.status()[rows] != Status.PENDING  # asked first: histories are there before the status
-            try:
-                return self._parts.read(name, rows, done)
-            except StoreError:
-                if not self._reopen():
-                    raise
-        unique, back = np.unique(rows, return_inverse=True)
-        return np.asarray(self._file["histories"][name][unique])[back]
+        retries = [*self.retries, dict(entry)]
 
-    def to_pandas(self, units: bool = False) -> pd.DataFrame:
-        """Errors and results as one frame, a row per joint, none dropped.
+        def change(file: h5py.File) -> None:
+            put_attributes(file, {"retries": json.dumps(retries, allow_nan=False)})
+            put(file["ledger/attempt"], rows, np.full(rows.size, len(retries), np.int32))
+            put(file["results/status"], rows, np.full(rows.size, Status.PENDING, np.uint8))
+            if "histories" in file:
+                del file["histories"]
 
-        Parameters
-        ----------
-        units : bool
-            Give the columns a second level with the SI unit.
+        if "histories" in self._file:
+            self._parts.remove()  # of an attempt to come here that was stopped
+            size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in self.history_specs.values()))
+            for first in range(0, self.n, size):
+                some = np.arange(first, min(first + size, self.n))
+                self._parts.add(some, {name: self.histories(name, some) for name in self.history_specs})
+        self._replace(change)
+        self.retries = retries
 
-        Returns
-        -------
-        pandas.DataFrame
-            Index ``row``; the errors' columns, then the results'; ``status`` as text. Before them, where the study
-            lists its joints, name of the case, index and family of the variant, and group.
-        """
-        return to_pandas(self, units)
-
-    def _read_judgement(self) -> None:
-        attrs = self._file.attrs
-        self.study_name = str(attrs["study_name"])
-        self.study_text = str(attrs["study"])
-        self.limits: dict[str, float] = json.loads(attrs["limits"])
-
-    def _replace(self, change: Callable[[h5py.File], None]) -> None:
+    def _replace(self, change: Callable[[h5py.File], None], growth: int = 0) -> None:
         try:
-            self._file = replace(self.path, self._file, change)
+            self._file = replace(self.path, self._file, change, growth)
         except OSError as error:
             reason = error.strerror or str(error)
             remedy = "make room for a second copy and run the campaign again: finished joints are kept"
             raise fault(self.path, f"cannot be replaced: {reason}", remedy) from error
 
-    def _reopen(self) -> bool:
-        """Go over to the file that has taken this one's place with the histories in it; whether there is one."""
-        if self._file.mode != "r":
-            return False
-        file = open_hdf5(self.path, "r")
-        if "histories" not in file or campaign_digest(file) != self._parts.campaign:
-            file.close()
-            return False
-        self._file.close()
-        self._file = file
-        return True
-
     def _put(self, name: str, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
         put(self._file["results"][name], rows, values)
 
-    def _read(self, group: str, columns: tuple[tables.Column, ...], dtype: Any) -> NDArray[np.void]:
-        table = np.empty(self.n, dtype)
-        # The status comes first among the results: what it declares valid was written before it was.
-        for c in columns:
-            c.of(table)[:] = self._file[group][c.name][:]
-        return table
+    def _check_there(self) -> None:
+        """Put the file back if somebody has deleted it; the system keeps it as long as it is open.
+
+        Raises
+        ------
+        StoreError
+            When it was gone.
+        """
+        if is_at(self._file, self.path):
+            return
+        taken = self.path.exists()
+        path = self.path.with_name(f"{self.path.stem}.saved{self.path.suffix}") if taken else self.path
+        with writing(path, overwrite=False) as temporary:
+            copy_open(self._file, temporary)
+        found = "was replaced by another file" if taken else "was deleted"
+        remedy = f"{path} holds all finished joints; run the campaign again to go on" + (
+            f" with --out {path}" if taken else ""
+        )
+        raise fault(self.path, f"{found} while the campaign went on", remedy)
+
+    def _put_checks(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
+        ledger = self._file["ledger"]
+        for name in self.history_specs:
+            checks = history_checks(simulation.histories[name], rows + self.rows.start)
+            put(ledger[f"{name}_check"], rows, checks)
+        errors, attempt = (get(ledger[name], rows) for name in ("errors_check", "attempt"))
+        put(ledger["results_check"], rows, results_hash(errors, attempt, simulation.results, self.columns))
 
     def _sync(self) -> None:
         self._file.flush()
@@ -389,11 +347,9 @@ class ResultStore:
         if not self.history_specs or "histories" in self._file:
             return
         part = self._parts.index().part
-        lost = np.flatnonzero((part < 0) & (self.status() != Status.PENDING))
-        if lost.size:
-            self._put("status", lost, np.full(lost.size, Status.PENDING, np.uint8))
+        self._make_pending(np.flatnonzero((part < 0) & (self.status() != Status.PENDING)))
+
+    def _make_pending(self, rows: NDArray[np.intp]) -> None:
+        if rows.size:
+            self._put("status", rows, np.full(rows.size, Status.PENDING, np.uint8))
             self._sync()
-
-
-def _parts_folder(path: Path) -> Path:
-    return path.with_name(path.name + ".parts")

@@ -48,7 +48,12 @@ class Copula:
         ndarray, (n, m)
             Uniform in each column, correlated across; the first column is unchanged but for rounding.
         """
-        correlated: Array = ndtr(ndtri(u) @ np.linalg.cholesky(self.matrix).T)
+        scores, factor = ndtri(u), np.linalg.cholesky(self.matrix)
+        # term by term: a matrix product rounds a row by the number of rows that are multiplied with it
+        mixed = np.zeros_like(scores)
+        for i, j in zip(*np.nonzero(factor), strict=True):
+            mixed[:, i] += factor[i, j] * scores[:, j]
+        correlated: Array = ndtr(mixed)
         return np.clip(correlated, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
 
 

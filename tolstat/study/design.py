@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.joint import Joint
+from tolstat.joint import Joint, Operation
+from tolstat.joint.model import merged
+from tolstat.study.model import Solver
 from tolstat.tables import DESIGN, Variant
 
 IDEAL = "ideal"
@@ -29,6 +31,10 @@ class Design:
         In the order of the file, families expanded.
     joints : tuple of Joint
         The joint of each variant.
+    operations : tuple of Operation
+        The operating point of each; the grid's values go before.
+    solvers : tuple of Solver
+        The numerical settings of each.
     cases : dict
         Name of a case to its errors (SI), `IDEAL` first.
     points : tuple of dict
@@ -39,6 +45,8 @@ class Design:
 
     variants: tuple[Variant, ...]
     joints: tuple[Joint, ...]
+    operations: tuple[Operation, ...]
+    solvers: tuple[Solver, ...]
     cases: dict[str, dict[str, float]]
     points: tuple[dict[str, float], ...]
     table: NDArray[np.void]
@@ -87,12 +95,14 @@ def table(cases: Sequence[Sequence[int]], points: int) -> NDArray[np.void]:
     return np.array(rows, DESIGN)
 
 
-def sobol(n: int, dimensions: int, seed: int) -> NDArray[np.float64]:
-    """Scrambled Sobol' points in the unit cube, (n, dimensions), at the middle of their cells."""
+def sobol(n: int, dimensions: int, seed: int, first: int = 0) -> NDArray[np.float64]:
+    """Scrambled Sobol' points `first` and following in the unit cube, (n, dimensions), at the middle of their cells."""
     from scipy.stats import qmc
 
     engine = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
-    points: NDArray[np.float64] = engine.random_base2(max(n - 1, 0).bit_length())[:n]
+    # from the start SciPy asks for a power of two
+    start = engine.fast_forward(first).random(n) if first else engine.random_base2(max(n - 1, 0).bit_length())
+    points: NDArray[np.float64] = start[:n]
     return points + 2.0 ** -(SOBOL_BITS + 1)
 
 
@@ -110,3 +120,15 @@ def flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
             yield from flat(inner, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", list(inner) if isinstance(inner, tuple) else inner
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables in tables from dotted keys: the inverse of `flat`."""
+    result: dict[str, Any] = {}
+    for key, value in values.items():
+        *tables, name = key.split(".")
+        inner: Any = value if not tables else {name: value}
+        for part in reversed(tables[1:]):
+            inner = {part: inner}
+        result = merged(result, {tables[0] if tables else name: inner})
+    return result

@@ -7,17 +7,18 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from tolstat import joint, schema
+from tolstat import joint, kept, schema
 from tolstat.errors import Fault, InputError, gather
 from tolstat.joint import Joint, Operation
 from tolstat.schema import read_toml
-from tolstat.study import listing, selection
+from tolstat.study import fatigue, listing, selection
 from tolstat.study.correlation import Copula, assemble
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Correlation, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Claims, Entry
 from tolstat.study.tolerance_entry import Site
 from tolstat.study.tolerance_kinds import distribution
+from tolstat.tables import FINEST_STEPS
 from tolstat.tolerance import Distribution
 
 ModelT = TypeVar("ModelT", bound=schema.Strict)
@@ -40,6 +41,8 @@ class StudyFile:
         The file.
     sections : iterable of str
         Top-level keys that it may have.
+    text : str, optional
+        What to read instead of the file's content.
 
     Raises
     ------
@@ -47,11 +50,11 @@ class StudyFile:
         When the file is not readable TOML.
     """
 
-    def __init__(self, path: Path, sections: Iterable[str]) -> None:
+    def __init__(self, path: Path, sections: Iterable[str], text: str | None = None) -> None:
         self.path = path
         self.place = str(path)
-        self.data = read_toml(path)
-        self.text = path.read_text(encoding="utf-8")
+        self.data = read_toml(path, text)
+        self.text = path.read_text(encoding="utf-8") if text is None else text
         self._faults: list[Fault] = []
         self._claims = Claims(self.place)
         self._toleranced: dict[str, str] = {}
@@ -167,8 +170,15 @@ class StudyFile:
                 limits |= dict.fromkeys(names, value)
         return limits
 
-    def listed(self, nominal: Joint | None) -> Design | None:
-        """``[grid]``, ``[[case]]`` and ``[[variant]]``: joints listed one by one, variants of `nominal`."""
+    def fatigue(self) -> fatigue.Fatigue:
+        """``[fatigue]``: what the cycles of the loads are judged by."""
+        with gather(self._faults):
+            return fatigue.read(self.data.get("fatigue", {}), self.place)
+        return fatigue.Fatigue()
+
+    def listed(self, joint: Joint | None, operation: Operation | None, solver: Solver | None) -> Design | None:
+        """``[grid]``, ``[[case]]`` and ``[[variant]]``: joints listed one by one, variants of `joint`."""
+        nominal = listing.Nominal(joint, operation, solver) if joint and operation and solver else None
         with gather(self._faults):
             return listing.read(self.data, nominal, self.place, self.path.parent)
         return None
@@ -192,12 +202,40 @@ class StudyFile:
         if points > MAX_ROWS:
             self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
 
-    def check_harmonics(self, output: Output, solver: Solver) -> None:
-        """Find harmonics that the steps of a revolution cannot carry."""
-        most = (solver.steps_per_rev - 1) // 2
-        if output.histories == "harmonics" and output.harmonics > most:
-            found = f"{output.harmonics} harmonics from {solver.steps_per_rev} steps a revolution"
+    def check_one_joint(self, solver: Solver) -> None:
+        """Find what only a campaign can do."""
+        if solver.fidelity == "auto":
+            remedy = 'write "dynamic", "quasistatic" or "ideal"'
+            self._fault(("solver", "fidelity"), "'auto' needs the joints of a campaign to choose by", remedy)
+
+    def check_histories(self, output: Output, solver: Solver, listed: Design | None) -> None:
+        """Find histories of different lengths, and harmonics that the steps of a revolution cannot carry.
+
+        ``auto`` takes as many steps as the harmonics need.
+        """
+        different = {s.steps_per_rev for s in listed.solvers} if listed else set()
+        if output.histories != "none" and len(different) > 1:
+            found = f"histories of {', '.join(map(str, sorted(different)))} steps a revolution"
+            remedy = "give all variants the same solver.steps_per_rev, or keep no histories"
+            self._fault(("output", "histories"), found, remedy)
+        steps = FINEST_STEPS if solver.fidelity == "auto" else solver.steps_per_rev
+        most = (steps - 1) // 2
+        if "harmonics" in output.histories and output.harmonics > most:
+            found = f"{output.harmonics} harmonics from {steps} steps a revolution"
             self._fault(("output", "harmonics"), found, f"give at most {most}, or more solver.steps_per_rev")
+
+    def check_fatigue(self, output: Output) -> None:
+        """Find a judgement on cycles that are not kept."""
+        if "fatigue" in self.data and output.histories == "none":
+            self._fault(("fatigue",), "has no effect without cycles", 'write histories = "cycles" in [output]')
+
+    def check_limits(self, output: Output, limits: Mapping[str, float]) -> None:
+        """Find limits of loads that are not kept."""
+        held = {c.name for c in output.columns}
+        lacking = [name for load in limits for name in kept.needed(load) if name not in held]
+        if lacking:
+            found = f"leaves out what [limits] judges by: {', '.join(lacking)}"
+            self._fault(("output", "results"), found, "add these, or remove their limits")
 
     def _table(self, section: str) -> Mapping[str, Any]:
         table = self.data.get(section, {})

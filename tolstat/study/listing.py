@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from tolstat import joint, schema
 from tolstat.errors import Fault, InputError, gather
-from tolstat.joint import Joint
+from tolstat.joint import Joint, Operation
 from tolstat.joint.model import merged
 from tolstat.study import selection
-from tolstat.study.design import IDEAL, Design, cube, flat, table
-from tolstat.study.model import MAX_ROWS, CaseEntry, Range, VariantEntry
+from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
+from tolstat.study.model import MAX_ROWS, CaseEntry, Range, Solver, VariantEntry
 from tolstat.study.selection import UNITS, Claims, Entry
 from tolstat.tables import Variant
 
@@ -28,15 +28,33 @@ class Axis(NamedTuple):
     values: list[float]
 
 
-def read(data: Mapping[str, Any], nominal: Joint | None, place: str, folder: Path) -> Design | None:
+class Nominal(NamedTuple):
+    """What variants differ from: ``[joint]``, ``[operation]`` and ``[solver]`` of the study."""
+
+    joint: Joint
+    operation: Operation
+    solver: Solver
+
+
+class Listed(NamedTuple):
+    """A variant, the joint, operating point and settings that it is, and the cases that are run with it."""
+
+    variant: Variant
+    joint: Joint
+    operation: Operation
+    solver: Solver
+    run: list[int]
+
+
+def read(data: Mapping[str, Any], nominal: Nominal | None, place: str, folder: Path) -> Design | None:
     """Read the three sections.
 
     Parameters
     ----------
     data : mapping
         The study's file.
-    nominal : Joint, optional
-        The joint of ``[joint]``; without it variants are not read.
+    nominal : Nominal, optional
+        What the study says without variants; without it they are not read.
     place : str
         File that faults name.
     folder : Path
@@ -45,7 +63,7 @@ def read(data: Mapping[str, Any], nominal: Joint | None, place: str, folder: Pat
     Returns
     -------
     Design
-        None where there is no joint.
+        None where there is no `nominal`.
 
     Raises
     ------
@@ -55,7 +73,7 @@ def read(data: Mapping[str, Any], nominal: Joint | None, place: str, folder: Pat
     faults: list[Fault] = []
     axes: list[Axis] = []
     cases: dict[str, dict[str, float]] = {IDEAL: {}}
-    variants: list[tuple[Variant, Joint, list[int]]] = []
+    variants: list[Listed] = []
     with gather(faults):
         axes = list(_grid(data.get("grid", {}), place, faults))
     with gather(faults):
@@ -63,16 +81,17 @@ def read(data: Mapping[str, Any], nominal: Joint | None, place: str, folder: Pat
     if nominal is not None:
         with gather(faults):
             variants = _Variants(data["joint"], nominal, place, folder).read(data.get("variant", []), list(cases))
+            faults += _clashes(data.get("variant", []), axes, place)
     points = tuple(_points(axes))
-    rows = len(points) * sum(len(run) for *_, run in variants)
+    rows = len(points) * sum(len(one.run) for one in variants)
     if rows > MAX_ROWS:
         faults.append(Fault(f"{place}: variant", f"makes {rows} joints", f"stay below {MAX_ROWS}"))
     if faults:
         raise InputError(faults)
     if nominal is None:
         return None
-    names, joints, runs = zip(*variants, strict=True)
-    return Design(names, joints, cases, points, table(runs, len(points)))
+    names, joints, operations, solvers, runs = zip(*variants, strict=True)
+    return Design(names, joints, operations, solvers, cases, points, table(runs, len(points)))
 
 
 def _grid(section: Any, place: str, faults: list[Fault]) -> Iterator[Axis]:
@@ -120,6 +139,17 @@ def _cases(section: Any, axes: list[Axis], place: str, faults: list[Fault]) -> d
     return cases
 
 
+def _clashes(section: list[Any], axes: list[Axis], place: str) -> list[Fault]:
+    """Keys of the operating point that a variant and the grid both give."""
+    taken = {name for axis in axes for name in axis.names}
+    return [
+        Fault(f"{place}: variant[{number}].operation.{key}", "is decided by grid already", "leave one of the two out")
+        for number, item in enumerate(section)
+        for key in item.get("operation", {})
+        if f"operation.{key}" in taken
+    ]
+
+
 class _Variants:
     """``[[variant]]``: joints that the keys of an entry make of the study's joint.
 
@@ -127,24 +157,24 @@ class _Variants:
     ----------
     study : mapping
         ``[joint]`` of the study.
-    nominal : Joint
-        The joint that it gives.
+    nominal : Nominal
+        The joint that it gives, operating point and settings.
     place, folder
         As in `read`.
     """
 
-    def __init__(self, study: Mapping[str, Any], nominal: Joint, place: str, folder: Path) -> None:
+    def __init__(self, study: Mapping[str, Any], nominal: Nominal, place: str, folder: Path) -> None:
         self._study = study
         self._nominal = nominal
         self._place = place
         self._folder = folder
 
-    def read(self, section: Any, cases: list[str]) -> list[tuple[Variant, Joint, list[int]]]:
-        """Variants in the order of the file, with their joints and the cases that are run with each."""
+    def read(self, section: Any, cases: list[str]) -> list[Listed]:
+        """Variants in the order of the file, families expanded."""
         everything = list(range(len(cases)))
         entries = _tables(section, "variant", self._place)
         if not entries:
-            return [(Variant("joint", {}), self._nominal, everything)]
+            return [Listed(Variant("joint", {}), *self._nominal, everything)]
         faults: list[Fault] = []
         variants = []
         for number, item in enumerate(entries):
@@ -154,7 +184,7 @@ class _Variants:
                 run = everything if entry.cases is None else [0]
                 with gather(faults):
                     run = sorted({*run, *self._numbers(entry.cases or [], cases, at)})
-                variants += [(*variant, run) for variant in self._expanded(entry, at)]
+                variants += self._expanded(entry, run, at)
         if faults:
             raise InputError(faults)
         return variants
@@ -166,15 +196,38 @@ class _Variants:
             raise InputError([Fault(where, f"no case {name!r}", schema.did_you_mean(name, cases)) for name in unknown])
         return [cases.index(name) for name in names]
 
-    def _expanded(self, entry: VariantEntry, at: Section) -> list[tuple[Variant, Joint]]:
+    def _expanded(self, entry: VariantEntry, run: list[int], at: Section) -> list[Listed]:
         keys = merged(self._study, entry.joint)
         made = [self._joint(keys, (*at, "joint"))]
         ranges = dict(_ranges(entry.vary, (*at, "vary"), self._place))
         if ranges:
             members = self._members(entry, keys, ranges, (*at, "vary"))
             made = [self._joint(merged(keys, own), (*at, "vary")) for own in members]
+        operation, solver = self._settings(entry, at)
+        own = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
+        own |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
         written = [key for key, _ in flat(entry.joint)] + list(ranges)
-        return [(Variant(entry.name, self._values(joint, written)), joint) for joint in made]
+        return [
+            Listed(Variant(entry.name, self._values(joint, written) | own, entry.note), joint, operation, solver, run)
+            for joint in made
+        ]
+
+    def _settings(self, entry: VariantEntry, at: Section) -> tuple[Operation, Solver]:
+        """Operating point and numerical settings of a variant: the study's, with the entry's own keys over them."""
+        faults: list[Fault] = []
+        operation, solver = self._nominal.operation, self._nominal.solver
+        with gather(faults):
+            keys = operation.model_dump(mode="json") | entry.operation
+            operation = schema.validate(Operation, keys, self._place, prefix=(*at, "operation"))
+        if entry.solver.get("fidelity") == "auto":
+            where = f"{self._place}: {schema.dotted((*at, 'solver', 'fidelity'))}"
+            faults.append(Fault(where, "'auto' is for all joints of a study", "write it in [solver]"))
+        with gather(faults):
+            keys = solver.model_dump(exclude_unset=True) | entry.solver
+            solver = schema.validate(Solver, keys, self._place, prefix=(*at, "solver"))
+        if faults:
+            raise InputError(faults)
+        return operation, solver
 
     def _members(
         self, entry: VariantEntry, keys: Mapping[str, Any], ranges: Mapping[str, Range], at: Section
@@ -182,7 +235,7 @@ class _Variants:
         """Keys of each joint of a family, as a joint file writes them."""
         assert entry.points is not None
         ends = [{key: getattr(r, end) for key, r in ranges.items()} for end in ("start", "stop")]
-        start, stop = (self._joint(merged(keys, _nested(end)), at) for end in ends)
+        start, stop = (self._joint(merged(keys, nested(end)), at) for end in ends)
         low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
         faults = []
         for key in ranges:
@@ -198,14 +251,14 @@ class _Variants:
         values = [
             {key: low[key] + s * (high[key] - low[key]) for key, s in zip(ranges, row, strict=True)} for row in shares
         ]
-        return [_nested({key: _written(value, text[key]) for key, value in own.items()}) for own in values]
+        return [nested({key: _written(value, text[key]) for key, value in own.items()}) for own in values]
 
     def _joint(self, keys: Mapping[str, Any], at: Section) -> Joint:
         overrides = {key: value for key, value in keys.items() if key != "base"}
         return joint.load(keys["base"], overrides, self._place, self._folder, schema.dotted(at))
 
     def _values(self, made: Joint, written: list[str]) -> dict[str, Any]:
-        nominal = dict(flat(self._nominal.model_dump(exclude={"description"})))
+        nominal = dict(flat(self._nominal.joint.model_dump(exclude={"description"})))
         values = dict(flat(made.model_dump(exclude={"description"})))
         return {key: value for key, value in values.items() if key in written or nominal.get(key) != value}
 
@@ -223,18 +276,6 @@ def _ranges(section: Mapping[str, Any], at: Section, place: str, before: str = "
             yield from _ranges(value, (*at, key), place, f"{before}{key}.")
         else:
             yield f"{before}{key}", schema.validate(Range, value, place, prefix=(*at, key))
-
-
-def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables in tables from dotted keys."""
-    nested: dict[str, Any] = {}
-    for key, value in values.items():
-        *tables, name = key.split(".")
-        inner: Any = value if not tables else {name: value}
-        for part in reversed(tables[1:]):
-            inner = {part: inner}
-        nested = merged(nested, {tables[0] if tables else name: inner})
-    return nested
 
 
 def _written(value: float, like: str | float) -> str | float:

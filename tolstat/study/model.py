@@ -5,25 +5,39 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from tolstat import units
+from tolstat import kept, units
 from tolstat.schema import Strict, refuse
+from tolstat.study import selection
 from tolstat.study.tolerance_entry import Value
-from tolstat.tables import Method, Options, Start
+from tolstat.tables import Column, Fidelity, Method, Options, Start
 
 _DEFAULTS = Options()
 
 MAX_ROWS = 10_000_000
-"""Most joints of a campaign: what a result file and its tables can hold in memory."""
+"""Most joints of a list, a grid or a Latin hypercube: tables of them are held in memory."""
+MAX_SAMPLES = 1_000_000_000
+"""Most joints of a campaign whose samples can be drawn in parts: Sobol' sequences of 30 bits end soon after."""
 
 Number = units.Number
 Flag = Annotated[bool, Field(strict=True)]
 
 
 class Solver(Strict):
-    """``[solver]``: numerical settings, the same for every joint."""
+    """``[solver]``: numerical settings, the same for every joint but those of a variant that has its own.
 
+    Attributes
+    ----------
+    fidelity : str
+        ``dynamic``: integration until settled; ``quasistatic``: equilibrium at each angle; ``ideal``: closed forms of
+        the joint without errors; ``auto``: the cheapest of them, and of steps a revolution, that meets the budget.
+    error_budget : float
+        Largest error of a load that ``auto`` allows, relative to the joint's largest load of the kind.
+    """
+
+    fidelity: Literal["dynamic", "quasistatic", "ideal", "auto"] = "dynamic"
+    error_budget: Annotated[Number, Field(ge=1e-6, lt=1)] = 0.005
     method: Literal["bdf2", "generalized_alpha", "tr_bdf2"] = "bdf2"
     start: Literal["static", "ramp"] = "static"
     steps_per_rev: Annotated[int, Field(strict=True, ge=12, le=20_000)] = _DEFAULTS.steps_per_rev
@@ -34,11 +48,20 @@ class Solver(Strict):
     max_halvings: Annotated[int, Field(strict=True, ge=0, le=20)] = _DEFAULTS.max_halvings
     rho_inf: Annotated[Number, Field(ge=0, le=1)] = _DEFAULTS.rho_inf
 
+    @model_validator(mode="after")
+    def _auto(self) -> Self:
+        auto = self.fidelity == "auto"
+        if not auto and "error_budget" in self.model_fields_set:
+            raise refuse(f"error_budget is given with fidelity {self.fidelity!r}", 'leave it out, or write "auto"')
+        if auto and "steps_per_rev" in self.model_fields_set:
+            raise refuse("steps_per_rev is given with fidelity 'auto'", "leave it out: auto chooses it")
+        return self
+
     def options(self) -> Options:
-        """Return the settings as the kernel takes them."""
+        """Return the settings as the kernel takes them; for ``auto``, which a campaign resolves, of ``dynamic``."""
         return Options(
-            method=Method[self.method.upper()],
-            start=Start[self.start.upper()],
+            method=int(Method[self.method.upper()]),
+            start=int(Start[self.start.upper()]),
             steps_per_rev=self.steps_per_rev,
             max_revs=self.max_revs,
             settle_tol=self.settle_tol,
@@ -46,6 +69,7 @@ class Solver(Strict):
             newton_max_iter=self.newton_max_iter,
             max_halvings=self.max_halvings,
             rho_inf=self.rho_inf,
+            fidelity=int(Fidelity.DYNAMIC if self.fidelity == "auto" else Fidelity[self.fidelity.upper()]),
         )
 
 
@@ -66,7 +90,7 @@ class Sampling(Strict):
     """
 
     method: Literal["random", "sobol", "lhs", "sweep", "cases"] = "random"
-    n: Annotated[int, Field(strict=True, ge=1, le=MAX_ROWS)] | None = None
+    n: Annotated[int, Field(strict=True, ge=1, le=MAX_SAMPLES)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Flag = True
 
@@ -83,16 +107,50 @@ class Sampling(Strict):
             raise refuse(f"n is given with {self.method!r}", "leave n out: the file lists the joints")
         if drawn and self.n is None:
             raise refuse("missing key n", "add n, the number of joints, for example n = 1024")
+        if self.method == "lhs" and self.n is not None and self.n > MAX_ROWS:
+            raise refuse(f"a Latin hypercube of {self.n} joints", f"stay at {MAX_ROWS}, or draw them another way")
         if self.method == "cases" and self.nominal_first:
             raise refuse("nominal_first with 'cases'", "leave it out: each group of joints has the ideal one")
         return self
 
 
-class Output(Strict):
-    """``[output]``: what is stored beside the results of each joint."""
+def _selecting(pattern: str) -> str:
+    if selection.select(pattern, kept.NAMES):
+        return pattern
+    anywhere = f"*.{pattern}"
+    halves = selection.select(anywhere, kept.NAMES)
+    remedy = f"did you mean {anywhere!r}?" if halves else selection.instead(pattern, kept.NAMES)
+    raise refuse(f"{pattern!r} selects nothing", remedy)
 
-    histories: Literal["none", "full", "harmonics"] = "none"
+
+class Output(Strict):
+    """``[output]``: what is stored of each joint.
+
+    Attributes
+    ----------
+    results : list of str, optional
+        Names of columns of the results, or patterns of them, that are stored beside those that always are; all without.
+    histories : str
+        What is stored beside the results.
+    harmonics : int
+        Fourier coefficients up to this order, where `histories` has them.
+    """
+
+    results: Annotated[list[Annotated[str, AfterValidator(_selecting)]], Field(min_length=1)] | None = None
+    histories: Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"] = "none"
     harmonics: Annotated[int, Field(strict=True, ge=0, le=10_000)] = 16
+
+    def identity(self) -> dict[str, Any]:
+        """What of it decides the numbers stored: names in place of patterns, none where all results are kept."""
+        selected = [name for pattern in self.results or () for name in selection.select(pattern, kept.NAMES)]
+        names = kept.chosen(selected) if self.results else None
+        rest = self.model_dump(exclude={"results"})
+        return rest if names is None else rest | {"results": names}
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns of the results that are kept."""
+        return kept.columns({kept.KEY: self.identity().get("results")})
 
 
 class Correlation(Strict):
@@ -139,6 +197,10 @@ class VariantEntry(Strict):
         Keys of the joint that the family varies, and how far.
     cases : list of str, optional
         The cases that are run; all without it. The joint without errors is always run.
+    operation, solver : dict
+        Keys in place of those of ``[operation]`` and ``[solver]``.
+    note : str
+        A word on it for the reader of the report.
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -148,6 +210,9 @@ class VariantEntry(Strict):
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     vary: Annotated[dict[str, Any], Field(default_factory=dict)]
     cases: list[str] | None = None
+    operation: Annotated[dict[str, Any], Field(default_factory=dict)]
+    solver: Annotated[dict[str, Any], Field(default_factory=dict)]
+    note: str = ""
 
     @model_validator(mode="after")
     def _family(self) -> Self:

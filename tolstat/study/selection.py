@@ -158,7 +158,7 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
     selected = select(entry.pattern, units)
     where = f"{place}: {dotted(entry.path)}"
     if not selected:
-        raise InputError([Fault(where, "selects nothing", _instead(entry.pattern, list(units)))])
+        raise InputError([Fault(where, "selects nothing", instead(entry.pattern, list(units)))])
     kinds = sorted({units[name] for name in selected})
     if len(kinds) > 1:
         found = f"selects quantities of different kinds ({', '.join(kinds)})"
@@ -166,7 +166,7 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
     return selected
 
 
-def _instead(pattern: str, names: Sequence[str]) -> str:
+def instead(pattern: str, names: Sequence[str]) -> str:
     """Remedy for a pattern that selects nothing: which half of it is wrong."""
     feature, _, key = pattern.partition(".")
     features = list(dict.fromkeys(name.partition(".")[0] for name in names))

@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat import kept
 from tolstat.errors import Fault, InputError
 from tolstat.joint import Joint, Operation
 from tolstat.study.correlation import Copula
 from tolstat.study.design import Design, flat
+from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
+from tolstat.study.selection import LIMIT_UNITS
 from tolstat.tables import DESIGN, Variant
 from tolstat.tolerance import Distribution
 
@@ -73,6 +76,8 @@ class Study(Case):
         The joints listed one by one; None unless ``sampling.method`` is ``cases``.
     limits : dict
         Result name (``cross1.F``, ``fork2.T``, ``pin1.contact``, ``psi``) to limit (SI).
+    fatigue : Fatigue
+        What the cycles of the loads are judged by.
     output : Output
         What is stored beside the results.
     """
@@ -84,11 +89,17 @@ class Study(Case):
     sweep: tuple[SweepAxis, ...] = ()
     listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
+    fatigue: Fatigue = field(default_factory=Fatigue)
 
     @property
     def joints(self) -> tuple[Joint, ...]:
         """Nominal joint of each variant."""
         return self.listed.joints if self.listed else (self.joint,)
+
+    @property
+    def solvers(self) -> tuple[Solver, ...]:
+        """Numerical settings of each of `joints`."""
+        return self.listed.solvers if self.listed else (self.solver,)
 
     @property
     def variants(self) -> tuple[Variant, ...]:
@@ -103,7 +114,7 @@ class Study(Case):
     @property
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where joints are not listed."""
-        return self.listed.table if self.listed else np.zeros(self.rows, DESIGN)
+        return self.listed.table if self.listed else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
     @property
     def samples(self) -> int:
@@ -116,6 +127,13 @@ class Study(Case):
     def rows(self) -> int:
         """Number of rows of every table of this study."""
         return self.samples + self.sampling.nominal_first
+
+    @property
+    def asked(self) -> list[str]:
+        """Loads asked for: those with limits, else those that the study selects to keep; empty if it does neither."""
+        if self.limits or self.output.results is None:
+            return list(self.limits)
+        return [load for load in LIMIT_UNITS if kept.holds(self.output.columns, load)]
 
     def identity(self) -> dict[str, Any]:
         """Everything that decides the numbers, as dotted key to JSON value.
@@ -132,7 +150,7 @@ class Study(Case):
             "correlation": {"names": list(self.copula.names), "matrix": self.copula.matrix.tolist()},
             "sampling": self.sampling.model_dump(),
             "sweep": [[list(axis.names), axis.start, axis.stop, axis.points] for axis in self.sweep],
-            "output": self.output.model_dump(),
+            "output": self.output.identity(),
         }
         return dict(flat(parts | (self.listed.identity() if self.listed else {})))
 
@@ -152,6 +170,8 @@ def load_case(path: str | Path) -> Case:
     operation = file.model("operation", Operation, required=True)
     solver = file.model("solver", Solver)
     errors = file.errors()
+    if solver is not None:
+        file.check_one_joint(solver)
     file.finish()
     assert joint is not None
     assert operation is not None
@@ -161,11 +181,11 @@ def load_case(path: str | Path) -> Case:
 
 SECTIONS = (
     *("joint", "operation", "solver", "errors", "tolerances", "correlation"),
-    *("sampling", "sweep", "grid", "case", "variant", "limits", "output"),
+    *("sampling", "sweep", "grid", "case", "variant", "limits", "fatigue", "output"),
 )
 
 
-def load(path: str | Path, n: int | None = None) -> Study:
+def load(path: str | Path, n: int | None = None, text: str | None = None) -> Study:
     """Read a study file.
 
     Parameters
@@ -174,6 +194,8 @@ def load(path: str | Path, n: int | None = None) -> Study:
         TOML file.
     n : int, optional
         Number of joints instead of the file's ``sampling.n``.
+    text : str, optional
+        TOML to read instead of the file's; `path` is then only what faults and relative paths refer to.
 
     Returns
     -------
@@ -185,7 +207,7 @@ def load(path: str | Path, n: int | None = None) -> Study:
     InputError
         With every fault of the file, of the joint file and of measured data that it names.
     """
-    file = StudyFile(Path(path), SECTIONS)
+    file = StudyFile(Path(path), SECTIONS, text)
     if n is not None:
         file.override("sampling", "n", n)
     joint = file.joint()
@@ -197,12 +219,18 @@ def load(path: str | Path, n: int | None = None) -> Study:
     sampling = file.model("sampling", Sampling, required=True)
     sweep = file.sweep()
     limits = file.limits()
+    fatigue = file.fatigue()
     output = file.model("output", Output)
-    listed = file.listed(joint) if sampling is not None and sampling.method == "cases" else None
+    listed = None
+    if sampling is not None and sampling.method == "cases":
+        listed = file.listed(joint, operation, solver)
     if sampling is not None:
         file.check_method(sampling, sweep)
+    if output is not None:
+        file.check_fatigue(output)
+        file.check_limits(output, limits)
     if output is not None and solver is not None:
-        file.check_harmonics(output, solver)
+        file.check_histories(output, solver, listed)
     file.finish()
     assert joint is not None
     assert operation is not None
@@ -223,4 +251,5 @@ def load(path: str | Path, n: int | None = None) -> Study:
         sweep=sweep,
         listed=listed,
         limits=limits,
+        fatigue=fatigue,
     )

@@ -1,0 +1,108 @@
+"""Capability: exact intervals of normal loads, indices of quantiles for others, coverage, unresolved joints."""
+
+import numpy as np
+import pytest
+from scipy.special import nctdtr
+from scipy.stats import lognorm, norm
+
+from tolstat.analysis import capability, exceedance
+from tolstat.tables import Status
+
+SEEDS = 2000
+LIMIT = 3.0
+TRUE_CPK = 1.0
+"""Of a standard normal load."""
+
+
+def within(lower, upper, truth):
+    return float(np.mean((lower <= truth) & (truth <= upper)))
+
+
+def slack(seeds):
+    return 3.0 * np.sqrt(0.95 * 0.05 / seeds)
+
+
+def indices(n):
+    loads = np.random.default_rng(51).standard_normal((SEEDS, n))
+    return (LIMIT - loads.mean(axis=1)) / (3.0 * loads.std(axis=1, ddof=1))
+
+
+@pytest.mark.parametrize("n", [8, 60])
+def test_interval_of_a_normal_load_covers_and_one_that_forgets_sigma_does_not(n):
+    cpk = indices(n)
+    assert abs(within(*capability.cpk_interval(cpk, n), TRUE_CPK) - 0.95) < slack(SEEDS)
+    half = norm.ppf(0.975) / (3.0 * np.sqrt(n))  # as though sigma were known
+    assert within(cpk - half, cpk + half, TRUE_CPK) < 0.95 - slack(SEEDS)
+
+
+@pytest.mark.parametrize(("cpk", "n"), [(-0.4, 5), (0.0, 30), (1.33, 30), (1.1, 100_000)])
+def test_ends_are_where_the_estimate_is_at_the_edge_of_its_distribution(cpk, n):
+    scale = 3.0 * np.sqrt(n)
+    lower, upper = capability.cpk_interval(cpk, n, 0.9)
+    assert lower < cpk < upper
+    assert nctdtr(n - 1, scale * lower, scale * cpk) == pytest.approx(0.95, abs=1e-3)
+    assert nctdtr(n - 1, scale * upper, scale * cpk) == pytest.approx(0.05, abs=1e-3)
+
+
+def test_interval_of_quantiles_covers_for_a_skew_load():
+    load, n, seeds = lognorm(0.5), 6000, 500
+    limit = float(load.ppf(0.9999))
+    truth = (limit - load.ppf(0.5)) / (load.ppf(capability.REFERENCE) - load.ppf(0.5))
+    samples = np.random.default_rng(6).lognormal(0.0, 0.5, (seeds, n))
+    found = [capability.at(row, np.ones(n), limit) for row in samples]
+    lower, upper = (np.array([getattr(c, f"cpk_{end}") for c in found]) for end in ("lower", "upper"))
+    assert within(lower, upper, truth) >= 0.95 - slack(seeds)
+    assert np.all(lower > 0)
+    normal = (np.array([getattr(c, f"cpk_normal_{end}") for c in found]) for end in ("lower", "upper"))
+    assert within(*normal, truth) < 0.95 - slack(seeds)
+    assert max(c.normal_p for c in found) < 1e-6
+
+
+def test_both_indices_agree_for_a_normal_load():
+    loads = np.random.default_rng(3).normal(500.0, 20.0, 200_000)
+    found = capability.at(loads, np.ones(loads.size), 580.0)
+    assert found.cpk_normal == pytest.approx(80 / 60, rel=5e-3)
+    assert found.cpk == pytest.approx(80 / 60, rel=2e-2)
+    assert found.normal_p > 0.01
+
+
+def test_too_few_joints_have_no_lower_end_and_are_told_the_number_needed():
+    loads = np.random.default_rng(4).gamma(3.0, 1.0, 5000)
+    few, enough = (capability.at(loads[:n], np.ones(n), 20.0) for n in (3000, 4000))
+    assert few.cpk_lower == 0.0
+    assert 0.0 < enough.cpk_lower < enough.cpk < enough.cpk_upper
+    assert few.needed == 3244  # 1 - 0.99865^n >= 1 - 0.05 / 4
+
+
+def test_unresolved_joints_lower_the_yield():
+    loads, status = np.arange(100.0), np.full(100, Status.OK)
+    status[:4] = Status.NOT_SETTLED
+    found = capability.at(loads, status, 89.5)
+    assert found.good[0] == pytest.approx(1 - 10 / 96)
+    assert found.good[1] == 1 - exceedance.clopper_pearson(14, 100)[1]
+    assert found.ppm[1] == pytest.approx(1e6 * exceedance.clopper_pearson(10, 100)[0])
+
+
+def test_dependent_samples_have_no_interval():
+    found = capability.at(np.arange(50.0), np.ones(50), 60.0, iid=False)
+    assert np.isfinite([found.cpk, found.cpk_normal]).all()
+    ends = (*found.good[1:], found.cpk_lower, found.cpk_upper, found.cpk_normal_lower, found.cpk_normal_upper)
+    assert np.isnan(ends).all()
+
+
+@pytest.mark.parametrize("loads", [[], [3.0], [3.0, 3.0, 3.0]])
+def test_joints_without_scatter_have_no_index(loads):
+    found = capability.at(loads, np.ones(len(loads)), 4.0)
+    assert np.isnan([found.cpk, found.cpk_normal, found.cpk_lower]).all()
+
+
+def test_limit_below_the_median_is_a_negative_index():
+    found = capability.at(np.random.default_rng(1).normal(size=6000), np.ones(6000), -1.0)
+    assert found.cpk_lower < found.cpk < found.cpk_upper < 0
+    assert found.cpk == pytest.approx(-1 / 3, abs=0.05)
+
+
+def test_a_joint_is_good_when_no_load_is_above_its_limit():
+    part = capability.utilization([[600.0, 10.0], [400.0, 21.0], [np.nan, 1.0]], [700.0, 20.0])
+    assert part[:2] == pytest.approx([600 / 700, 21 / 20])
+    assert np.isnan(part[2])

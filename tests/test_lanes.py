@@ -1,0 +1,159 @@
+"""Lanes: operations against NumPy, and joints in lock-step against the same joints one after the other, bit by bit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tolstat import joint as joints
+from tolstat import simulation
+from tolstat.kernel import lockstep
+from tolstat.kernel._jit import closure
+from tolstat.kernel.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
+from tolstat.kernel.lane_memory import aligned_zeros, as_lanes, lane_dtype
+from tolstat.tables import PARAM, Law, Options, Start, Status
+
+FAST = Options(steps_per_rev=45, max_revs=6)
+
+
+@closure
+def operations(a, b, out):
+    a, b, out = as_lanes(a)[0], as_lanes(b)[0], as_lanes(out)
+    out[0], out[1], out[2], out[3] = a + b, a - b, a * b, a / b
+    out[4], out[5], out[6], out[7] = -a, math.sqrt(abs(a)), max(a, b), min(a, b)
+    out[8], out[9], out[10], out[11] = math.sin(a), math.cos(a), math.tan(a), math.atan2(a, b)
+    out[12], out[13] = where(a < b, a, b), where((a >= b) | ~(b > 0), 2.0, a)
+    out[14], out[15] = where((a <= b) & (a != b), 1, 0), where(a == b, 1.0, 0.0)
+    out[16], out[17] = 2 - a, (1 + a) * 3
+    total = 0.0
+    for k in range(3):
+        total += k * a
+    out[18] = total
+    return any_of(a > b), all_of(a > b), count_of(a > b), bits_of(a > b), pick(a, WIDTH - 1)
+
+
+def test_operations_are_those_of_numpy():
+    rng = np.random.default_rng(3)
+    special = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1.0, -1.5, 3.0])
+    for k in range(40):
+        a, b, out = (
+            aligned_zeros((1, WIDTH), float),
+            aligned_zeros((1, WIDTH), float),
+            aligned_zeros((19, WIDTH), float),
+        )
+        a[0], b[0] = (rng.choice(special, WIDTH) if k % 2 else rng.normal(size=WIDTH) for _ in range(2))
+        reduced = operations(a, b, out)
+        x, y = a[0], b[0]
+        with np.errstate(all="ignore"):
+            expected = [x + y, x - y, x * y, x / y, -x, np.sqrt(abs(x)), np.where(y > x, y, x), np.where(y < x, y, x)]
+            expected += [libm(math.sin, x), libm(math.cos, x), libm(math.tan, x), libm(math.atan2, x, y)]
+            expected += [np.where(x < y, x, y), np.where((x >= y) | ~(y > 0), 2.0, x), (x <= y) & (x != y), x == y]
+            expected += [2 - x, (1 + x) * 3, 0.0 + 0 * x + 1 * x + 2 * x]
+        np.testing.assert_array_equal(out, np.array(expected, float))
+        more = x > y
+        assert reduced[:4] == (more.any(), more.all(), more.sum(), sum(int(m) << i for i, m in enumerate(more)))
+        np.testing.assert_equal(reduced[4], x[-1])
+
+
+def libm(function, *arguments):
+    """`function` of each element; NaN where it raises."""
+    out = []
+    for values in zip(*arguments, strict=True):
+        try:
+            out.append(function(*values))
+        except ValueError:
+            out.append(math.nan)
+    return np.array(out)
+
+
+@closure
+def halve_all(record):
+    lanes = as_lanes(record)
+    lanes.R = 0.5 * lanes.R
+    for pin in range(4):
+        for k in range(3):
+            lanes.pin_axis[pin, k] = where(lanes.R > 1, lanes.R, lanes.pin_axis[pin, k])
+    return lanes.law
+
+
+def test_records_are_read_and_written_lane_by_lane():
+    record = aligned_zeros(1, lane_dtype(PARAM)).view(np.recarray)[0]
+    record.R[:], record.law, record.pin_axis[...] = np.arange(WIDTH), 2, -1.0
+    assert halve_all(record) == 2
+    np.testing.assert_array_equal(record.R, 0.5 * np.arange(WIDTH))
+    np.testing.assert_array_equal(record.pin_axis[3, 2], np.where(record.R > 1, record.R, -1.0))
+
+
+@pytest.fixture(scope="module")
+def mixed(cirelli):
+    """Joints of all laws, tight and wide, some that halve their steps, some that fail, some outside the model."""
+    rng = np.random.default_rng(11)
+    rows = []
+    for law in Law:
+        joint = joints.load("cirelli2021", {"contact": {"law": law.name.lower()}}, "test", None)
+        n = 7
+        operation = joints.Operation.model_construct(alpha=0.3, speed=52.0, torque=100.0)
+        errors = joints.nominal_errors(n, operation)
+        for name in errors.dtype.names:
+            if "offset" in name or "diameter" in name:
+                errors[name] = rng.normal(0, 2e-5, n)
+            elif "tilt" in name:
+                errors[name] = rng.normal(0, 2e-3, n)
+        errors["operation.torque"][3], errors["operation.speed"][4] = 5.0, 300.0
+        errors["operation.alpha"][5] = 0.9
+        rows.append(joints.perturb(joint, errors))
+    params = np.concatenate(rows)
+    params["clearance"][6] = -1e-5
+    params["clearance"][9], params["c_t"][16] = 0.0, 0.0
+    return params[rng.permutation(len(params))]
+
+
+def assert_same(a, b):
+    for name in a.dtype.names:
+        np.testing.assert_array_equal(a[name], b[name], err_msg=name)
+
+
+def alone(params, options):
+    results = np.zeros(len(params), simulation.RESULT).view(np.recarray)
+    samples = [own.copy() for _, own in simulation._alone(params, options, True, results)]
+    return results, samples
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        FAST,
+        FAST._replace(start=int(Start.RAMP), settle_tol=1e-3),
+        FAST._replace(newton_max_iter=6, max_halvings=8),
+        FAST._replace(max_halvings=0, newton_max_iter=4, max_revs=2),
+    ],
+)
+def test_a_joint_has_the_same_bits_in_lanes_and_alone(mixed, options):
+    results, samples = alone(mixed, options)
+    together = simulation.simulate_rows(mixed, options, "full")
+    assert_same(together.results, results)
+    for i in np.flatnonzero(np.isin(results.status, simulation.SIMULATED)):
+        np.testing.assert_array_equal(together.histories["loads"][i], samples[i]["loads"].astype("f4"))
+        np.testing.assert_array_equal(together.histories["tau"][i], samples[i]["tau"])
+    if options.newton_max_iter == 6:
+        assert ((results.status == Status.OK) & (results.halvings > 0)).any()
+
+
+def test_the_mixed_joints_are_mixed(mixed):
+    results = simulation.simulate_rows(mixed, FAST).results
+    assert {Status.OK, Status.OUTSIDE_MODEL} < set(results["status"])
+    assert len(np.unique(mixed["n_stations"])) > 1
+    assert (results["halvings"] > 0).any()
+
+
+def test_no_result_depends_on_lane_neighbours_order_or_patience(mixed, monkeypatch):
+    results = simulation.simulate_rows(mixed, FAST).results
+    order = np.random.default_rng(5).permutation(len(mixed))
+    assert_same(simulation.simulate_rows(mixed[order], FAST).results, results[order])
+    parts = [simulation.simulate_rows(part, FAST).results for part in np.split(mixed, [1, 4, 15])]
+    assert_same(np.concatenate(parts), results)
+    for patience in (1, WIDTH):
+        monkeypatch.setattr(lockstep, "PATIENCE", patience)
+        assert_same(simulation.simulate_rows(mixed, FAST).results, results)

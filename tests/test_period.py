@@ -1,0 +1,125 @@
+"""Class of the motion of joints that do not settle: what is told of them, and what their results cover."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tolstat.kernel.trail import closure_trend, combine, lag_closure, make_trail, note_closure
+from tolstat.simulation import simulate_rows
+from tolstat.tables import RESULT, Method, Motion, Options, Status
+
+RPM = np.pi / 30
+RATTLE = {"alpha": np.radians(30), "speed": 1000 * RPM, "torque": 5.0}
+CLEARANCE_20_UM = {f"pin{i}__diameter": 1.6e-4 for i in (1, 2, 3, 4)}
+UNDAMPED = ("c_cross", "c_fork", "c_d", "c_t")
+NO_LOSS = {"method": int(Method.GENERALIZED_ALPHA), "rho_inf": 1.0}
+
+
+def one(par, **options):
+    return simulate_rows(par, Options(**options)).results[0]
+
+
+def undamped(params):
+    par = params(alpha=np.radians(15))
+    for name in UNDAMPED:
+        par[name] = 0.0
+    return par
+
+
+def test_a_joint_that_settles_is_periodic(params):
+    row = one(params(alpha=0.2))
+    assert (row["status"], row["motion"], row["period"]) == (Status.OK, Motion.PERIODIC, 1)
+    assert row["closure_trend"] < -1
+    assert np.isnan(row["lyapunov"])
+    assert row["failed_step"] == -1
+
+
+def test_slow_decay_is_told_from_motion_that_goes_on(params):
+    """E x 1e-3: little damping. The trend says when it will settle."""
+    par = params(alpha=np.radians(15), material__E_factor=1e-3)
+    row = one(par, max_revs=12)
+    assert (row["status"], row["motion"], row["period"]) == (Status.NOT_SETTLED, Motion.SLOW, 0)
+    revs = row["revolutions"] + np.log10(row["closure"] / 1e-4) / -row["closure_trend"]
+    longer = one(par, max_revs=60)
+    assert longer["status"] == Status.OK
+    assert longer["revolutions"] == pytest.approx(revs, rel=0.15)
+
+
+@pytest.mark.parametrize("steps", [180, 360])
+def test_rattle_at_low_torque_is_chaotic_at_any_step(params, steps):
+    row = one(params(**RATTLE), steps_per_rev=steps)
+    assert (row["status"], row["motion"], row["period"]) == (Status.NOT_PERIODIC, Motion.CHAOTIC, 0)
+    assert 5 < row["lyapunov"] < 10
+
+
+@pytest.mark.parametrize("steps", [180, 360])
+def test_ringing_that_nothing_damps_is_quasi_periodic(params, steps):
+    row = one(undamped(params), steps_per_rev=steps, **NO_LOSS)
+    assert (row["status"], row["motion"], row["period"]) == (Status.NOT_PERIODIC, Motion.QUASI_PERIODIC, 0)
+    assert abs(row["lyapunov"]) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("joint", "options", "far"),
+    [(RATTLE, {}, True), (None, NO_LOSS, False)],
+    ids=["chaotic", "quasi-periodic"],
+)
+def test_two_joints_that_differ_by_nothing_to_speak_of(params, joint, options, far):
+    """What the class means, seen without it: a torque changed by 1e-9 of itself moves chaotic loads alone."""
+    par = undamped(params) if joint is None else params(**joint)
+    other = par.copy()
+    other["torque"] *= 1 + 1e-9
+    first, second = (
+        simulate_rows(p, Options(max_revs=9, settle_tol=1e-12, **options), "full").histories["loads"][0]
+        for p in (par, other)
+    )
+    force = np.linalg.norm(first[..., :3], axis=-1).max()
+    apart = np.abs(first - second)[..., :3].max() / force
+    assert apart > 0.1 if far else apart < 1e-3
+
+
+def test_trend_is_the_line_through_the_logarithms():
+    trail = make_trail(180, 20)
+    rng = np.random.default_rng(1)
+    revs = np.arange(24, 241) / 12
+    logs = -0.3 * revs + rng.normal(0, 0.02, revs.size)
+    for x, y in zip(revs, logs, strict=True):
+        note_closure(x, 10**y, trail.notes)
+    late = revs >= 10
+    slope, offset = np.polyfit(revs[late], logs[late], 1)
+    scatter = np.sqrt(np.mean((logs[late] - slope * revs[late] - offset) ** 2))
+    assert closure_trend(10.0, trail.notes) == pytest.approx((slope, scatter), rel=1e-9)
+    assert np.isnan(closure_trend(20.0, trail.notes)).all()
+
+
+def test_closure_over_several_revolutions_finds_the_period():
+    trail = make_trail(36, 20)
+    rng = np.random.default_rng(2)
+    three = rng.uniform(1, 2, (3, 36, 8, 2))
+    for r in range(20):
+        trail.modulus[r % 10] = three[r % 3]
+    closures = [lag_closure(19, lag, trail) for lag in range(1, 9)]
+    assert [c == 0 for c in closures] == [False, False, True, False, False, True, False, False]
+    change = [np.abs(three[1] - three[0])[..., k].max() / three[1][..., k].max() for k in (0, 1)]
+    assert closures[0] == pytest.approx(max(change))
+    trail.modulus[19 % 10, 5, 3, 1] = np.nan
+    assert np.isnan(lag_closure(19, 3, trail))
+
+
+def test_combined_statistics_are_those_of_all_revolutions():
+    trail = make_trail(36, 20)
+    rng = np.random.default_rng(3)
+    samples = rng.uniform(1, 2, (5, 36, 8))
+    for r, values in zip(range(15, 20), samples, strict=True):
+        row = trail.revolution[r % 10]
+        row.F_max[:], row.F_mean[:], row.F_range[:] = values.max(0), values.mean(0), np.ptp(values, axis=0)
+        row.psi_max, row.mode_share[:] = r, 0.25
+    out = np.zeros(1, RESULT).view(np.recarray)[0]
+    combine(19, 5, trail, out)
+    whole = samples.reshape(-1, 8)
+    np.testing.assert_allclose(out.F_max, whole.max(0))
+    np.testing.assert_allclose(out.F_mean, whole.mean(0))
+    np.testing.assert_allclose(out.F_range, np.ptp(whole, axis=0))
+    assert out.psi_max == 19
+    np.testing.assert_allclose(out.mode_share, 0.25)

@@ -1,0 +1,193 @@
+"""Causes: Sobol' indices, rank regression and the tail, on functions with known answers; coverage over seeds."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from tolstat.analysis import overrepresentation, regression, sensitivity
+
+SEEDS = 500
+LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+ISHIGAMI_FIRST = np.array([0.313905, 0.442411, 0.0])
+ISHIGAMI_TOTAL = np.array([0.557589, 0.442411, 0.243684])
+"""Closed form for a = 7, b = 0.1 (Homma and Saltelli 1996)."""
+SLOPES = np.array([0.7, 0.5, -0.3, 0.0])
+
+
+def ishigami(n, rng):
+    x = rng.uniform(-np.pi, np.pi, (n, 3))
+    return x, np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+
+
+def linear(n, rng):
+    x = rng.standard_normal((n, len(SLOPES)))
+    return x, x @ SLOPES
+
+
+def share_explained(x, y):
+    """Share that steps of eight equal parts explain, not corrected for chance: what the test must catch."""
+    part = np.argsort(np.argsort(x, axis=0), axis=0) * 8 // len(x)
+    means = np.array([[y[column == k].mean() for k in range(8)] for column in part.T])
+    return means.var(axis=1) / y.var()
+
+
+@pytest.fixture(scope="module")
+def found():
+    rng = np.random.default_rng(1991)
+    first, bounds, naive = [], [], []
+    for _ in range(SEEDS):
+        x, y = ishigami(1000, rng)
+        first.append(sensitivity.first_order(x, y))
+        bounds.append(sensitivity.total(x, y))
+        naive.append(share_explained(x, y))
+    return first, bounds, np.array(naive)
+
+
+def test_first_order_indices_cover_and_are_not_biased(found):
+    first, _, naive = found
+    lower, upper, estimate = (np.array([getattr(f, e) for f in first]) for e in ("lower", "upper", "estimate"))
+    covered = ((lower <= ISHIGAMI_FIRST) & (upper >= ISHIGAMI_FIRST)).mean(axis=0)
+    assert np.all(covered >= LEAST)
+    assert covered[0] < 0.98  # not by being wide
+    assert np.abs(estimate.mean(axis=0) - ISHIGAMI_FIRST).max() < 0.005
+    # an estimator that takes chance for an effect, with the same widths
+    half = 0.5 * (upper - lower)[:, 2]
+    assert np.mean(np.abs(naive[:, 2] - ISHIGAMI_FIRST[2]) <= half) < LEAST
+
+
+def test_total_indices_lie_between_their_bounds_and_first_order_indices_do_not(found):
+    first, bounds, _ = found
+    lower, upper = (np.array([getattr(b, end) for b in bounds]) for end in ("lower", "upper"))
+    assert np.all(((lower <= ISHIGAMI_TOTAL) & (upper >= ISHIGAMI_TOTAL)).mean(axis=0) >= LEAST)
+    assert np.mean(upper - lower) < 0.2
+    wrong = np.array([f.upper[2] for f in first])
+    assert np.mean(wrong >= ISHIGAMI_TOTAL[2]) < LEAST
+    pairs = np.mean([b.pairs for b in bounds], axis=0)
+    assert pairs[0, 2] == pytest.approx(0.2437, abs=0.04)
+    assert abs(pairs[0, 1]) < 0.005
+    assert np.mean([b.rest for b in bounds]) < 0.05
+
+
+def test_an_effect_of_three_errors_is_in_the_bounds():
+    """x1 x2 x3 has no effect of one or two: every total index is 1, all of it rest."""
+    x = np.random.default_rng(2).standard_normal((2000, 4))
+    bounds = sensitivity.total(x, x[:, 0] * x[:, 1] * x[:, 2])
+    assert bounds.rest == pytest.approx(1.0, abs=0.15)
+    assert np.all(bounds.upper[:3] > 0.9)
+    assert np.all(bounds.estimate < 0.15)
+
+
+def test_linear_model_has_the_shares_of_its_slopes():
+    x, y = linear(20_000, np.random.default_rng(5))
+    shares = SLOPES**2 / (SLOPES @ SLOPES)
+    assert sensitivity.first_order(x, y).estimate == pytest.approx(shares, abs=0.012)
+    assert sensitivity.total(x, y).rest == pytest.approx(0.0, abs=0.01)
+
+
+def test_errors_of_few_values_and_of_one_value():
+    rng = np.random.default_rng(8)
+    x = np.column_stack([rng.integers(0, 2, 1000), rng.standard_normal(1000), np.full(1000, 3.0)])
+    found = sensitivity.first_order(x, 2.0 * x[:, 0] + x[:, 1])
+    assert found.estimate[:2] == pytest.approx([0.5, 0.5], abs=0.05)
+    assert np.isnan(found.estimate[2])
+    with pytest.raises(ValueError, match="scatter"):
+        sensitivity.total(x, x[:, 1])
+
+
+def test_contributions_against_shaft_angle_are_those_of_each_angle():
+    rng = np.random.default_rng(9)
+    x, angles = rng.standard_normal((800, 3)), np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    loads = 10.0 + np.outer(x[:, 0], np.cos(angles)) + np.outer(x[:, 1], np.sin(angles))
+    whole = sensitivity.first_order(x, loads)
+    assert whole.estimate.shape == (3, 24)
+    one = sensitivity.first_order(x, loads[:, 5])
+    assert whole.upper[:, 5] == pytest.approx(one.upper)
+    assert whole.variance[5] == pytest.approx(one.variance)
+    truth = np.stack([np.cos(angles) ** 2, np.sin(angles) ** 2, 0 * angles])
+    assert np.abs(whole.estimate * whole.variance - truth).max() < 0.2
+    assert whole.estimate[0].argmax() in (0, 12)
+    assert np.isnan(sensitivity.first_order(x, np.zeros((800, 2))).estimate).all()
+
+
+def test_rank_coefficients_cover_over_seeds_and_without_the_groups_number_they_do_not():
+    rng, covered, narrow = np.random.default_rng(77), [], []
+    rho = SLOPES / np.sqrt(SLOPES @ SLOPES)
+    truth = 6.0 / np.pi * np.arcsin(0.5 * rho)  # Spearman's of a normal pair; the errors are independent
+    for _ in range(SEEDS):
+        found = regression.ranks(*linear(200, rng))
+        half = 0.5 * (found.upper - found.lower)
+        covered.append(np.abs(found.estimate - truth) <= half)
+        narrow.append(np.abs(found.estimate - truth) <= half / np.sqrt(regression.GROUPS))
+    assert np.all(np.mean(covered, axis=0) >= LEAST)
+    assert np.all(np.mean(narrow, axis=0) < LEAST)
+
+
+def test_rank_coefficients_do_not_see_how_a_monotone_load_is_bent():
+    x, y = linear(500, np.random.default_rng(1))
+    straight, bent = regression.ranks(x, y), regression.ranks(x, np.exp(5.0 * y))
+    assert bent.estimate == pytest.approx(straight.estimate)
+    assert np.sign(bent.estimate[:3]).tolist() == [1, 1, -1]
+    assert straight.r2 > 0.9
+    assert regression.ranks(x, y**2).r2 < 0.1
+
+
+def test_probability_of_the_larger_error_covers_and_a_binomial_interval_does_not():
+    rng, shift, covered, narrow = np.random.default_rng(4), 0.8, [], []
+    above = np.arange(300) < 25
+    truth = norm.cdf(shift / np.sqrt(2.0))
+    for _ in range(2 * SEEDS):
+        z = rng.standard_normal((300, 2))
+        z[above, 0] += shift
+        part = overrepresentation.tail(z, above).direction
+        covered.append([part.lower[0] <= truth <= part.upper[0], part.lower[1] <= 0.5 <= part.upper[1]])
+        half = 1.96 * np.sqrt(part.estimate[0] * (1.0 - part.estimate[0]) / 300)
+        narrow.append(abs(part.estimate[0] - truth) <= half)
+    least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / (2 * SEEDS))
+    assert np.all(np.mean(covered, axis=0) >= least)
+    assert np.mean(narrow) < least
+
+
+def test_errors_that_play_no_part_are_rarely_blamed_and_without_holm_often():
+    rng = np.random.default_rng(12)
+    above = np.arange(200) < 30
+    least = []
+    for _ in range(SEEDS):
+        found = overrepresentation.tail(rng.standard_normal((200, 20)), above)
+        least.append(min(found.direction.p.min(), found.size.p.min()))
+    most = 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / SEEDS)
+    assert np.mean(np.array(least) < 0.05) <= most
+    assert np.mean(np.array(least) / 40 < 0.05) > most
+
+
+def test_direction_and_size_are_told_apart():
+    rng = np.random.default_rng(3)
+    z = rng.standard_normal((2000, 3))
+    found = overrepresentation.tail(z, z[:, 0] + z[:, 1] ** 2 > 3.0)
+    assert found.direction.estimate[0] > 0.6
+    assert found.direction.p[1] > 0.05
+    assert found.size.estimate[1] > 0.8
+    assert min(found.direction.p[2], found.size.p[2]) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: sensitivity.first_order(np.zeros((10, 2)), np.zeros(10)), "too few"),
+        (lambda: sensitivity.first_order(np.zeros((60, 2)), np.zeros(50)), "one length"),
+        (lambda: sensitivity.first_order(np.zeros((60, 2)), np.full(60, np.nan)), "valid load"),
+        (lambda: sensitivity.first_order(np.eye(60), np.arange(60.0), 1.0), "confidence"),
+        (lambda: regression.ranks(np.zeros((30, 2)), np.arange(30)), "too few"),
+        (lambda: regression.ranks(np.zeros((80, 2)), np.arange(80)), "scatter"),
+        (lambda: overrepresentation.tail(np.eye(60), np.arange(60) < 3), "3 of 60 joints"),
+    ],
+)
+def test_misuse_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_dependent_samples_have_no_interval():
+    x, y = linear(300, np.random.default_rng(6))
+    ends = [sensitivity.first_order(x, y, iid=False).lower, sensitivity.total(x, y, iid=False).upper]
+    ends += [regression.ranks(x, y, iid=False).lower, overrepresentation.tail(x, y > 0.8, iid=False).size.upper]
+    assert np.isnan(ends).all()

@@ -1,0 +1,183 @@
+"""How capable is the production of staying below a limit? Yield, ppm and Cpk with intervals.
+
+A load has an upper limit only. So there is no Cp, which compares a band with the scatter, and Cpk is its upper half,
+Cpu = (limit - mean) / (3 sigma). It speaks of the joints' share above the limit only where the load is normal, which
+loads under clearance are not; the index of quantiles, (limit - median) / (q(99.865 %) - median) (ISO 22514-2), asks
+the same of any distribution. Yield and ppm assume nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.analysis import exceedance, quantile
+from tolstat.analysis.exceedance import Exceedance, FloatArray
+from tolstat.tables import Status
+
+REFERENCE = 0.9986501019683699
+"""Share of a normal distribution below mean + 3 sigma."""
+
+
+@dataclass(frozen=True)
+class Capability:
+    """How a load stands against its upper limit.
+
+    Attributes
+    ----------
+    above : Exceedance
+        Share of the joints above the limit; yield and ppm are read from it.
+    cpk_normal, cpk_normal_lower, cpk_normal_upper : float
+        (limit - mean) / (3 sigma) of the valid joints and its exact interval for a normal load.
+    normal_p : float
+        p-value of skewness and kurtosis together (D'Agostino and Pearson 1973); where it is small, `cpk_normal` is not
+        to be used. NaN for fewer than 20 joints.
+    cpk, cpk_lower, cpk_upper : float
+        Index of quantiles of the valid joints. Its interval covers at least with the confidence asked for; the lower
+        end is 0 at best where the joints are fewer than `needed`.
+    needed : int
+        Joints from which the interval of the 99.865 % quantile has an upper end.
+
+    The intervals are NaN when the samples are not independent, the indices when there are fewer than two valid joints
+    or no scatter.
+    """
+
+    above: Exceedance
+    cpk_normal: float
+    cpk_normal_lower: float
+    cpk_normal_upper: float
+    normal_p: float
+    cpk: float
+    cpk_lower: float
+    cpk_upper: float
+    needed: int
+
+    @property
+    def good(self) -> tuple[float, float, float]:
+        """Yield: estimate, lower and upper end, unresolved joints counted both ways (NaN for dependent samples)."""
+        return 1 - self.above.estimate, 1 - self.above.outer_upper, 1 - self.above.outer_lower
+
+    @property
+    def ppm(self) -> tuple[float, float, float]:
+        """Joints above the limit in a million: estimate, lower and upper end as in `good`."""
+        return 1e6 * self.above.estimate, 1e6 * self.above.outer_lower, 1e6 * self.above.outer_upper
+
+
+def at(values: ArrayLike, status: ArrayLike, limit: float, confidence: float = 0.95, iid: bool = True) -> Capability:
+    """Capability of one load.
+
+    Parameters
+    ----------
+    values, status : array_like, shape (n,)
+        Load and `tables.Status` of each joint; leave the nominal joint out.
+    limit : float
+        Upper limit, in the unit of the values.
+    confidence : float
+        Of the intervals.
+    iid : bool
+        Whether the joints are independent samples; the intervals are NaN when they are not.
+
+    Returns
+    -------
+    Capability
+        Estimates and intervals.
+
+    Raises
+    ------
+    ValueError
+        As `exceedance.at`.
+    """
+    above = exceedance.at(values, status, limit, confidence, iid)
+    valid = exceedance.sort_out(values, status).valid
+    blank = (np.nan, np.nan, np.nan)
+    scatters = valid.size > 1 and np.ptp(valid) > 0
+    normal = _normal(valid, limit, confidence, iid) if scatters else blank
+    general = _of_quantiles(valid, limit, confidence, iid) if scatters else blank
+    # each of the two quantiles may miss on either side: a quarter of the error for the upper end
+    needed = quantile.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
+    return Capability(above, *normal, _normality(valid) if scatters else np.nan, *general, needed)
+
+
+def utilization(values: ArrayLike, limits: ArrayLike) -> FloatArray:
+    """Largest of a joint's loads, each over its limit: the joint is good when it is at most 1.
+
+    Parameters
+    ----------
+    values : array_like, shape (n, m)
+        m loads of each joint.
+    limits : array_like, shape (m,)
+        Limit of each load, in its unit.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        NaN where a load is not finite.
+    """
+    part: NDArray[np.float64] = (np.asarray(values, dtype=float) / np.asarray(limits, dtype=float)).max(axis=1)
+    return part
+
+
+def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
+    """Exact interval of a one-sided capability index of a normal load.
+
+    3 sqrt(n) times the estimate has a noncentral t distribution with n - 1 degrees of freedom, whose noncentrality is
+    3 sqrt(n) times the true index (Kushler and Hurley 1992).
+
+    Parameters
+    ----------
+    cpk : array_like
+        Estimates, from mean and standard deviation (divisor n - 1) of `n` joints.
+    n : int
+        Joints, at least 2.
+    confidence : float
+        Of the interval.
+
+    Returns
+    -------
+    lower, upper : ndarray
+        Of the shape of `cpk`.
+    """
+    from scipy.special import nctdtrinc
+
+    scale, tail = 3.0 * np.sqrt(n), 0.5 * (1.0 - confidence)
+    t = scale * np.asarray(cpk, dtype=float)
+    return nctdtrinc(n - 1, 1.0 - tail, t) / scale, nctdtrinc(n - 1, tail, t) / scale
+
+
+def _normal(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
+    index = (limit - valid.mean()) / (3.0 * valid.std(ddof=1))
+    if not iid:
+        return float(index), np.nan, np.nan
+    lower, upper = cpk_interval(index, valid.size, confidence)
+    return float(index), float(lower), float(upper)
+
+
+def _normality(valid: FloatArray) -> float:
+    from scipy.stats import normaltest
+
+    return float(normaltest(valid).pvalue) if valid.size >= 20 else np.nan
+
+
+def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
+    """Index of quantiles; its interval from those of median and 99.865 % quantile, half the error each (Bonferroni)."""
+    fine = np.full(valid.size, Status.OK)
+    each = 0.5 * (1.0 + confidence)
+    middle, high = (quantile.at(valid, fine, share, each, iid) for share in (0.5, REFERENCE))
+    index = float(_index(limit, middle.estimate, high.estimate))
+    if not iid:
+        return index, np.nan, np.nan
+    if not middle.upper < high.lower:
+        return index, -np.inf, np.inf
+    # monotone in each quantile while the other is kept: the ends are at the corners
+    corners = [_index(limit, m, h) for m in (middle.lower, middle.upper) for h in (high.lower, high.upper)]
+    return index, min(corners), max(corners)
+
+
+def _index(limit: float, middle: float, high: float) -> float:
+    if np.isinf(high):
+        return 0.0
+    if np.isinf(middle):  # the limit of the index for a median that falls without end
+        return 1.0
+    return (limit - middle) / (high - middle) if high > middle else np.nan

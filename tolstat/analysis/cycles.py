@@ -1,0 +1,185 @@
+"""Which cycles does a load go through in a revolution? Spectra, level crossings and range–mean matrices of joints.
+
+Cycles are those of one revolution that repeats: everything is counted per revolution. What a share of the *joints*
+exceeds is asked of these values by `exceedance` and `quantile`; for which share of a *revolution* a load is above a
+level, by `share_of_revolution_above`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class Cycles(NamedTuple):
+    """Rainflow cycles of joints, one revolution or a mixture of revolutions under several operating points.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Names of the loads, keys of `tables.CHANNELS`.
+    ranges, means : ndarray, shape (n, channels, k)
+        Range and mean of each cycle, N or N m; a range of 0 where there is none, NaN for joints without results.
+    number : ndarray, shape (n, channels)
+        Cycles per revolution, those without a place among the k included; NaN for joints without results.
+    weights : ndarray, shape (k,)
+        How often per revolution a cycle in this place happens: 1, or the share of its operating point.
+    """
+
+    channels: tuple[str, ...]
+    ranges: NDArray[Any]
+    means: NDArray[Any]
+    number: FloatArray
+    weights: FloatArray
+
+    def of(self, channel: str) -> Cycles:
+        """Cycles of one channel, the axis of channels kept."""
+        c = self.channels.index(channel)
+        part = slice(c, c + 1)
+        return Cycles((channel,), self.ranges[:, part], self.means[:, part], self.number[:, part], self.weights)
+
+
+def mix(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
+    """Duty cycle: the same joints under several operating points, each for a share of the revolutions.
+
+    Parameters
+    ----------
+    parts : sequence of Cycles
+        Row i is the same joint in each. Cycles that the change of operating point itself would close are not there.
+    shares : sequence of float
+        Shares of the revolutions, positive, with the sum 1.
+
+    Returns
+    -------
+    Cycles
+        A joint without results at one operating point has none.
+
+    Raises
+    ------
+    ValueError
+        When the joints or channels differ, or the shares are not shares.
+    """
+    if len(shares) != len(parts) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-9:
+        raise ValueError(f"{list(shares)} are not the shares of {len(parts)} operating points")
+    if len({(part.channels, len(part.ranges)) for part in parts}) > 1:
+        raise ValueError("the operating points have not the same joints and channels")
+    return Cycles(
+        parts[0].channels,
+        np.concatenate([part.ranges for part in parts], axis=2),
+        np.concatenate([part.means for part in parts], axis=2),
+        np.sum([share * part.number for part, share in zip(parts, shares, strict=True)], axis=0),
+        np.concatenate([share * part.weights for part, share in zip(parts, shares, strict=True)]),
+    )
+
+
+def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
+    """Cumulative spectrum, read at numbers of cycles: the range that so many cycles of a revolution reach.
+
+    Parameters
+    ----------
+    cycles : Cycles
+        Of one revolution, or a mixture.
+    numbers : array_like, shape (q,)
+        Cycles per revolution, positive.
+
+    Returns
+    -------
+    ndarray, shape (n, channels, q)
+        Largest range that at least `numbers` cycles per revolution reach or exceed, 0 where there are fewer; N or
+        N m, NaN for joints without results.
+    """
+    wanted = np.atleast_1d(np.asarray(numbers, dtype=float)) * (1.0 - 1e-6)  # sums of shares are rounded
+    order = np.argsort(-cycles.ranges, axis=2)
+    ranges = np.take_along_axis(cycles.ranges, order, axis=2).astype(float)
+    reached = np.cumsum(cycles.weights[order], axis=2)
+    values = np.empty((*cycles.number.shape, wanted.size))
+    for q, number in enumerate(wanted):
+        place = np.minimum((reached < number).sum(axis=2, keepdims=True), reached.shape[2] - 1)
+        here = np.take_along_axis(ranges, place, axis=2)[..., 0]
+        values[..., q] = np.where(reached[..., -1] >= number, here, 0.0)
+    values[np.isnan(cycles.number)] = np.nan
+    return values
+
+
+def upcrossings(cycles: Cycles, levels: ArrayLike) -> FloatArray:
+    """Level crossings: how often in a revolution a load rises through a level.
+
+    Rainflow counting keeps them: a signal rises through as many levels as its cycles do.
+
+    Parameters
+    ----------
+    cycles : Cycles
+        Of one revolution, or a mixture.
+    levels : array_like, shape (q,)
+        Loads, N or N m.
+
+    Returns
+    -------
+    ndarray, shape (n, channels, q)
+        Crossings from below a level to it or above, per revolution; NaN for joints without results.
+    """
+    wanted = np.atleast_1d(np.asarray(levels, dtype=float))
+    ranges, means = cycles.ranges.astype(float), cycles.means.astype(float)
+    crossings = np.empty((*cycles.number.shape, wanted.size))
+    for q, level in enumerate(wanted):
+        within = (means - 0.5 * ranges < level) & (level <= means + 0.5 * ranges) & (ranges > 0)
+        crossings[..., q] = within @ cycles.weights
+    crossings[np.isnan(cycles.number)] = np.nan
+    return crossings
+
+
+def matrix(cycles: Cycles, channel: str, range_edges: ArrayLike, mean_edges: ArrayLike) -> FloatArray:
+    """Range–mean matrix of a channel: cycles per revolution and joint in each class.
+
+    Parameters
+    ----------
+    cycles : Cycles
+        Of one revolution, or a mixture.
+    channel : str
+        One of ``cycles.channels``.
+    range_edges, mean_edges : array_like, shape (a + 1,) and (b + 1,)
+        Edges of the classes, ascending; a class has its lower edge, the last one both.
+
+    Returns
+    -------
+    ndarray, shape (a, b)
+        Mean over the joints that have results.
+    """
+    part = cycles.of(channel)
+    valid = np.isfinite(part.number[:, 0])
+    ranges, means = part.ranges[valid, 0], part.means[valid, 0]
+    weights = np.broadcast_to(part.weights, ranges.shape)[ranges > 0]
+    edges = (np.asarray(range_edges, dtype=float), np.asarray(mean_edges, dtype=float))
+    classes = np.histogram2d(ranges[ranges > 0], means[ranges > 0], bins=edges, weights=weights)[0]
+    per_joint: FloatArray = classes / max(int(valid.sum()), 1)
+    return per_joint
+
+
+def share_of_revolution_above(loads: ArrayLike, level: float) -> FloatArray:
+    """Share of a revolution during which a load is above a level; not a probability.
+
+    Parameters
+    ----------
+    loads : array_like, shape (n, samples)
+        One load of each joint over a revolution, joined by straight lines, the last sample to the first.
+    level : float
+        Level in the unit of the loads.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Between 0 and 1; NaN for joints without results.
+    """
+    x = np.asarray(loads, dtype=float)
+    following = np.roll(x, -1, axis=1)
+    high, low = np.maximum(x, following), np.minimum(x, following)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        part = np.where(high > low, (high - level) / (high - low), high > level)
+    share: FloatArray = np.clip(part, 0.0, 1.0).mean(axis=1)
+    share[np.isnan(x).any(axis=1)] = np.nan
+    return share

@@ -1,0 +1,245 @@
+"""Loads rarer than any joint simulated: a generalised Pareto tail above a threshold, and what it says.
+
+Excesses over a high threshold are, for nearly every distribution, nearly generalised Pareto (Pickands 1975). *Nearly*
+is what can go wrong: the goodness of the fit is tested, and `stability` shows whether the shape stays at other
+thresholds. A tail too thin to tell is refused with the number of joints needed. Intervals are of profile likelihood,
+the share above the threshold included (Coles 2001, 4.3.3): one extrapolates with them, not with the estimate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tolstat.analysis import exceedance, pareto
+from tolstat.analysis.exceedance import FloatArray
+
+FEWEST = 50
+"""Excesses that a fit is made of."""
+REPLICATES = 400
+"""Samples of the fitted distribution that the goodness of a fit is judged by."""
+GRID, SHARES = 81, 13
+"""Points of shape and scale each, and of the share above the threshold, at which the likelihood is read."""
+
+
+class TooThinError(ValueError):
+    """The tail has too few joints; `needed` is the number of joints that has enough above the threshold."""
+
+    def __init__(self, found: int, needed: int) -> None:
+        self.needed = needed
+        super().__init__(f"{found} joints above the threshold, {FEWEST} are needed: simulate some {needed} joints")
+
+
+class Estimate(NamedTuple):
+    """A number and its interval; NaN ends for dependent samples."""
+
+    estimate: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Tail:
+    """Generalised Pareto tail of a load.
+
+    Attributes
+    ----------
+    threshold : float
+        Load above which the tail is, in the unit of the values.
+    n, n_unresolved, n_above : int
+        Joints simulated, those without a valid load, and valid ones above the threshold.
+    shape, scale : Estimate
+        k, and sigma in the unit of the values. A negative k is a tail that ends.
+    excesses : ndarray, shape (n_above,)
+        What those are above the threshold.
+    region : ndarray, shape (r, 3)
+        Share above the threshold, k and sigma wherever the likelihood is in reach of its maximum: what intervals are
+        read from.
+    iid : bool
+        Whether the joints are independent samples.
+    """
+
+    threshold: float
+    n: int
+    n_unresolved: int
+    n_above: int
+    shape: Estimate
+    scale: Estimate
+    excesses: FloatArray
+    region: FloatArray
+    iid: bool
+
+    @cached_property
+    def p(self) -> float:
+        """Goodness of the fit; below 0.05 do not extrapolate.
+
+        p-value of the Anderson–Darling distance, by samples of the fitted distribution that are fitted again.
+        """
+        k, sigma = pareto.fit(self.excesses)
+        distance = pareto.anderson_darling(self.excesses, k, sigma)
+        rng = np.random.default_rng(1975)
+        drawn = pareto.quantile(rng.random((REPLICATES, self.n_above)), k, sigma)
+        distances = pareto.anderson_darling(drawn, *pareto.fit(drawn))
+        return float((1 + np.count_nonzero(distances >= distance)) / (1 + REPLICATES))
+
+    @property
+    def share(self) -> float:
+        """Share of the valid joints above the threshold."""
+        return self.n_above / (self.n - self.n_unresolved)
+
+    def probability(self, level: float) -> Estimate:
+        """Share of the joints above a level beyond the threshold.
+
+        Raises
+        ------
+        ValueError
+            When the level is below the threshold.
+        """
+        if level < self.threshold:
+            raise ValueError(f"{level:g} is below the threshold {self.threshold:g}: count the joints above it")
+        excess = level - self.threshold
+        share, k, sigma = self.region.T
+        values = share * pareto.upper_share(excess, k, sigma)
+        best = self.share * float(pareto.upper_share(excess, self.shape.estimate, self.scale.estimate))
+        return self._between(best, values)
+
+    def level(self, share: float) -> Estimate:
+        """Load that a share of the joints exceed: the return load of "1 in N joints" is ``level(1 / N)``.
+
+        Raises
+        ------
+        ValueError
+            When more joints than that are above the threshold.
+        """
+        if not 0.0 < share <= self.share:
+            remedy = "ask for its quantile"
+            raise ValueError(f"share {share:g} is not in the tail, which begins at {self.share:g}: {remedy}")
+        above, k, sigma = self.region.T
+        excess = pareto.quantile(np.minimum(share / above, 1.0), k, sigma)
+        best = float(pareto.quantile(share / self.share, self.shape.estimate, self.scale.estimate))
+        return self._between(self.threshold + best, self.threshold + excess)
+
+    def bounds(self, share: float) -> tuple[float, float]:
+        """``level(share)`` with every unresolved joint below it, and above it; infinite where they alone decide."""
+        lost = self.n_unresolved / self.n
+        ends = [share / (1.0 - lost), (share - lost) / (1.0 - lost)]
+        low = self.level(min(ends[0], self.share)).estimate
+        return low, self.level(ends[1]).estimate if ends[1] > 0 else np.inf
+
+    def largest(self, fleet: int, probability: float = 0.5) -> Estimate:
+        """Load that the largest of a fleet of independent joints stays below with a probability; its median by default.
+
+        Raises
+        ------
+        ValueError
+            As `level`: when the fleet is so small that its largest is not in the tail.
+        """
+        return self.level(-np.expm1(np.log(probability) / fleet))
+
+    def _between(self, best: float, values: FloatArray) -> Estimate:
+        if not self.iid:
+            return Estimate(best, np.nan, np.nan)
+        return Estimate(best, min(best, float(values.min())), max(best, float(values.max())))
+
+
+def fit(
+    values: ArrayLike, status: ArrayLike, share: float | None = None, confidence: float = 0.95, iid: bool = True
+) -> Tail:
+    """Fit the tail that the largest loads make.
+
+    Parameters
+    ----------
+    values, status : array_like, shape (n,)
+        Load and `tables.Status` of each joint; leave the nominal joint out.
+    share : float, optional
+        Share of the valid joints in the tail; by default the smaller of 0.1 and 3 / sqrt(n), since with more joints the
+        intervals shrink and the tail must be truer.
+    confidence : float
+        Of all intervals.
+    iid : bool
+        Whether the joints are independent samples; there are no intervals when they are not.
+
+    Returns
+    -------
+    Tail
+        Its estimates are those of maximum likelihood, k > -1/2 (below it there is no such theory).
+
+    Raises
+    ------
+    TooThinError
+        When fewer than `FEWEST` joints are above the threshold.
+    """
+    from scipy.special import xlog1py, xlogy
+    from scipy.stats import chi2
+
+    sample = exceedance.sort_out(values, status)
+    valid = sample.valid
+    share = min(0.1, 3.0 / np.sqrt(max(valid.size, 1))) if share is None else share
+    count = int(share * valid.size * (1 + 1e-12))
+    if count < FEWEST:
+        raise TooThinError(count, int(np.ceil(FEWEST / share * max(1.0, sample.n / max(valid.size, 1)))))
+    threshold = float(valid[-min(count + 1, valid.size)])
+    excesses = valid[valid > threshold] - threshold
+    if excesses.size < FEWEST:
+        raise TooThinError(excesses.size, int(np.ceil(sample.n * FEWEST / max(excesses.size, 1))))
+    m, n = excesses.size, valid.size
+    reach = 0.5 * float(chi2.ppf(confidence, 1))
+    k, sigma, deficit = _likelihood(excesses, reach)
+    best = np.unravel_index(np.argmin(deficit), deficit.shape)
+    half = 5.0 * np.sqrt(m * (1.0 - m / n)) / n
+    shares = np.clip(np.linspace(m / n - half, m / n + half, SHARES), 0.5 / n, 1.0 - 0.5 / n)
+    binomial = xlogy(m, m / n / shares) + xlog1py(n - m, -m / n) - xlog1py(n - m, -shares)
+    inside = np.argwhere(deficit[None] + binomial[:, None, None] <= reach)
+    region = np.column_stack([shares[inside[:, 0]], k[inside[:, 1], inside[:, 2]], sigma[inside[:, 1], inside[:, 2]]])
+    ends = [(float(v.min()), float(v.max())) if iid else (np.nan, np.nan) for v in region.T[1:]]
+    shape, scale = Estimate(float(k[best]), *ends[0]), Estimate(float(sigma[best]), *ends[1])
+    return Tail(threshold, sample.n, sample.n_unresolved, m, shape, scale, excesses, region, iid)
+
+
+def stability(
+    values: ArrayLike, status: ArrayLike, shares: ArrayLike | None = None, confidence: float = 0.95, iid: bool = True
+) -> list[Tail]:
+    """Fit tails of several thresholds, ascending: k, and sigma - k threshold, should not drift beyond their intervals.
+
+    Parameters
+    ----------
+    values, status, confidence, iid
+        As in `fit`.
+    shares : array_like, optional
+        Shares of the joints in the tail; by default eight from 0.3 to the least that has `FEWEST` joints.
+
+    Raises
+    ------
+    TooThinError
+        When even the largest share has too few.
+    """
+    n = exceedance.sort_out(values, status).valid.size
+    least = min(0.3, (FEWEST + 1) / max(n, 1))
+    asked = np.geomspace(0.3, least, 8) if shares is None else np.sort(np.atleast_1d(shares))[::-1]
+    return [fit(values, status, float(share), confidence, iid) for share in asked]
+
+
+def _likelihood(excesses: FloatArray, reach: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Grid of k and sigma, and how far the log-likelihood is below its maximum, each (GRID, GRID).
+
+    The grid is of k and log(sigma (1 + k)), whose estimates are independent of each other (Chavez-Demoulin and Davison
+    2005), and just holds where the likelihood is in reach.
+    """
+    first = [float(v) for v in pareto.fit(excesses)]
+    k0, nu0 = max(first[0], -0.45), np.log(first[1] * (1.0 + max(first[0], -0.45)))
+    width = 6.0 / np.sqrt(excesses.size)
+    low, high = np.array([k0 - 2 * width, nu0 - width]), np.array([k0 + 3 * width, nu0 + 2 * width])
+    for points in (41, GRID):
+        low[0] = max(low[0], -0.5)
+        k, nu = np.meshgrid(np.linspace(low[0], high[0], points), np.linspace(low[1], high[1], points), indexing="ij")
+        sigma = np.exp(nu) / (1.0 + k)
+        likelihood = pareto.log_likelihood(excesses, k, sigma)
+        deficit = likelihood.max() - likelihood
+        inside = np.argwhere(deficit <= reach + 0.3)
+        step = (high - low) / (points - 1)
+        low, high = low + (inside.min(axis=0) - 1) * step, low + (inside.max(axis=0) + 1) * step
+    return k, sigma, deficit

@@ -1,0 +1,113 @@
+"""Errors that are over-represented among the joints above a limit.
+
+Variance speaks of all joints; the few above the limit may have causes of their own. For each error two questions are
+asked of a joint above the limit and one not above it: which has the larger error (*direction*), and which has the error
+farther from the middle (*size*)? The answer is a probability: 1/2 when the error plays no part in the tail.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.analysis.exceedance import FloatArray
+
+BoolArray = NDArray[np.bool_]
+
+FEWEST = 10
+"""Joints needed on either side of the limit."""
+
+
+class Part(NamedTuple):
+    """What errors play a part in the tail; each array has the shape (d,).
+
+    Attributes
+    ----------
+    estimate, lower, upper : ndarray
+        Probability that a joint above the limit has the larger value, and its interval, for each error by itself (NaN
+        for dependent samples).
+    p : ndarray
+        p-value of the Wilcoxon–Mann–Whitney test, adjusted by Holm's method (1979) for both questions and all errors:
+        when none plays a part, the probability that any is below 0.05 is at most 0.05.
+    """
+
+    estimate: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    p: FloatArray
+
+
+class Overrepresentation(NamedTuple):
+    """Answers of `tail`: the errors' direction, and their size."""
+
+    direction: Part
+    size: Part
+
+
+def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: bool = True) -> Overrepresentation:
+    """Compare the errors of the joints above a limit with those of the others.
+
+    Parameters
+    ----------
+    scores : array_like, shape (n, d)
+        Errors of the valid joints, in standard scores: 0 is the middle of each distribution.
+    above : array_like of bool, shape (n,)
+        Which joints are above the limit.
+    confidence : float
+        Of the intervals.
+    iid : bool
+        Whether the joints are independent samples.
+
+    Returns
+    -------
+    Overrepresentation
+        Probabilities, intervals and p-values.
+
+    Raises
+    ------
+    ValueError
+        When fewer than `FEWEST` joints are on one side of the limit, or an error does not scatter.
+    """
+    z, over = np.asarray(scores, dtype=float), np.asarray(above, dtype=bool)
+    n = int(over.sum())
+    if min(n, over.size - n) < FEWEST:
+        raise ValueError(f"{n} of {over.size} joints are above the limit: {FEWEST} are needed on either side")
+    if (np.ptp(z, axis=0) == 0).any():
+        raise ValueError("give errors that scatter")
+    both = np.concatenate([z, np.abs(z)], axis=1)
+    found = Part(*_larger(both, over, confidence), _holm(_p_values(both, over)))
+    if not iid:
+        found = found._replace(lower=np.full(both.shape[1], np.nan), upper=np.full(both.shape[1], np.nan))
+    d = z.shape[1]
+    return Overrepresentation(Part(*(part[:d] for part in found)), Part(*(part[d:] for part in found)))
+
+
+def _larger(values: FloatArray, over: BoolArray, confidence: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """P(value of one above > of one not above), ties half, with DeLong's (1988) interval on the logit scale."""
+    from scipy.special import expit, logit, ndtri
+    from scipy.stats import rankdata
+
+    m, k = int(over.sum()), int((~over).sum())
+    joint = rankdata(values, axis=0)
+    of_above = (joint[over] - rankdata(values[over], axis=0)) / k  # share of the others that each one surpasses
+    of_others = 1.0 - (joint[~over] - rankdata(values[~over], axis=0)) / m
+    estimate = of_above.mean(axis=0)
+    error = np.sqrt(of_above.var(axis=0, ddof=1) / m + of_others.var(axis=0, ddof=1) / k)
+    inside = np.clip(estimate, 0.5 / (m * k), 1.0 - 0.5 / (m * k))
+    half = ndtri(0.5 * (1.0 + confidence)) * np.maximum(error, 0.5 / (m * k)) / (inside * (1.0 - inside))
+    return estimate, expit(logit(inside) - half), expit(logit(inside) + half)
+
+
+def _p_values(values: FloatArray, over: BoolArray) -> FloatArray:
+    from scipy.stats import mannwhitneyu
+
+    return np.asarray(mannwhitneyu(values[over], values[~over], axis=0, method="asymptotic").pvalue)
+
+
+def _holm(p: FloatArray) -> FloatArray:
+    order = np.argsort(p)
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1))
+    return np.minimum(adjusted, 1.0)

@@ -1,0 +1,85 @@
+"""Rank regression: how a load moves with each error, whatever its units and however bent the relation, if monotone."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tolstat.analysis.exceedance import FloatArray
+
+GROUPS = 20
+"""Groups of joints that are left out in turn."""
+
+
+class RankRegression(NamedTuple):
+    """Standardised rank regression coefficients (SRRC).
+
+    Attributes
+    ----------
+    estimate, lower, upper : ndarray, shape (d,)
+        Change of the load's rank with an error's, the others kept, both in standard deviations; the sign is the
+        direction. The interval is NaN for dependent samples.
+    r2 : float
+        Share of the ranks' variance that all errors together explain; where it is small the load is not monotone in
+        the errors, and the coefficients say little.
+    """
+
+    estimate: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    r2: float
+
+
+def ranks(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> RankRegression:
+    """Regress the ranks of a load on those of the errors (Iman and Conover 1979).
+
+    The intervals are those of the delete-a-group jackknife with Student's t (Kott 2001): each group of joints is left
+    out in turn, and the others are ranked anew.
+
+    Parameters
+    ----------
+    x : array_like, shape (n, d)
+        Errors of the joints, any units; each must scatter.
+    y : array_like, shape (n,)
+        Load of each joint, valid joints only.
+    confidence : float
+        Of the intervals.
+    iid : bool
+        Whether the joints are independent samples.
+
+    Returns
+    -------
+    RankRegression
+        Coefficients and intervals.
+
+    Raises
+    ------
+    ValueError
+        When there are fewer than d + 2 `GROUPS` joints, or an error does not scatter.
+    """
+    from scipy.special import stdtrit
+
+    errors, load = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if len(load) < errors.shape[1] + 2 * GROUPS:
+        found = f"{len(load)} joints are too few for {errors.shape[1]} errors"
+        raise ValueError(f"{found}: give {errors.shape[1] + 2 * GROUPS} or more")
+    if (np.ptp(errors, axis=0) == 0).any() or np.ptp(load) == 0:
+        raise ValueError("give a load and errors that scatter")
+    estimate, r2 = _coefficients(errors, load)
+    if not iid:
+        return RankRegression(estimate, np.full_like(estimate, np.nan), np.full_like(estimate, np.nan), r2)
+    group = np.arange(len(load)) % GROUPS
+    without = np.array([_coefficients(errors[group != g], load[group != g])[0] for g in range(GROUPS)])
+    spread = np.sqrt((GROUPS - 1) / GROUPS * ((without - estimate) ** 2).sum(axis=0))
+    half = stdtrit(GROUPS - 1, 0.5 * (1.0 + confidence)) * spread
+    return RankRegression(estimate, estimate - half, estimate + half, r2)
+
+
+def _coefficients(errors: FloatArray, load: FloatArray) -> tuple[FloatArray, float]:
+    from scipy.stats import rankdata
+
+    correlation = np.corrcoef(np.column_stack([rankdata(errors, axis=0), rankdata(load)]), rowvar=False)
+    found = np.linalg.lstsq(correlation[:-1, :-1], correlation[:-1, -1], rcond=None)[0]
+    return found, float(found @ correlation[:-1, -1])

@@ -1,0 +1,174 @@
+"""Other tolerances from the same joints: each joint counts as often as the others would have made it.
+
+The weight of a joint is the ratio of the densities of its errors under the new tolerances and under those it was drawn
+from. Where a few joints have most of the weight the estimates are a matter of luck, and nothing in them tells; the
+shape k of the weights' own tail does (Vehtari, Simpson, Gelman, Yao and Gabry 2024, Pareto-smoothed importance
+sampling), and whatever lies where no joint was drawn has no weight at all.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.analysis import pareto
+from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+
+LEAST_ESS = 50
+"""Effective number of joints below which a verdict is against."""
+
+
+class Weights(NamedTuple):
+    """Weights of joints, smoothed.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n,)
+        Sum 1.
+    ess : float
+        Effective number of joints, 1 / sum of squares (Kish 1965).
+    k : float
+        Shape of the weights' tail; -inf where they are all equal, inf where too few are left to tell.
+    allowed : float
+        min(1 - 1 / log10(n), 0.7): with a larger k the estimates have not settled with n joints.
+    """
+
+    values: FloatArray
+    ess: float
+    k: float
+    allowed: float
+
+    @property
+    def usable(self) -> bool:
+        """The verdict: whether estimates from these weights can be trusted. Otherwise new runs are needed."""
+        return self.k < self.allowed and self.ess >= LEAST_ESS
+
+
+class Share(NamedTuple):
+    """Share of the joints above a level, under the new tolerances.
+
+    Attributes
+    ----------
+    estimate, lower, upper : float
+        Share and interval; NaN ends for dependent samples.
+    ess : float
+        Joints that would be as sure of it if each had the same weight.
+    """
+
+    estimate: float
+    lower: float
+    upper: float
+    ess: float
+
+
+def smooth(log_ratios: ArrayLike) -> Weights:
+    """Weights from the ratios of densities, their largest ones replaced by what a generalised Pareto tail expects.
+
+    Parameters
+    ----------
+    log_ratios : array_like, shape (n,)
+        Logarithm of new density over old, up to a constant; -inf for a joint that the new tolerances do not make.
+
+    Returns
+    -------
+    Weights
+        Of all joints.
+
+    Raises
+    ------
+    ValueError
+        When no joint has any weight, or a ratio is NaN or +inf.
+    """
+    logs = np.asarray(log_ratios, dtype=float)
+    if np.isnan(logs).any() or (logs == np.inf).any():
+        raise ValueError("a ratio is not a number: the joints were not drawn from the old tolerances")
+    if not np.isfinite(logs).any():
+        raise ValueError("the new tolerances make none of the joints")
+    n = logs.size
+    raw = np.exp(logs - logs.max())
+    k = -np.inf
+    m = min(n // 5, int(np.ceil(3.0 * np.sqrt(n))))
+    if np.ptp(raw) > 0:
+        order = np.argsort(raw, kind="stable")
+        tail = order[n - m :]
+        cut = raw[order[n - m - 1]] if m else 0.0
+        k = np.inf
+        if m >= 5 and raw[tail[0]] > cut > 0:
+            shape, scale = (float(v) for v in pareto.fit(raw[tail] - cut))
+            k = (shape * m + 0.5 * 10.0) / (m + 10.0)  # drawn to 1/2 as by ten observations
+            raw[tail] = np.minimum(cut + pareto.quantile(1.0 - (np.arange(1, m + 1) - 0.5) / m, k, scale), 1.0)
+    weights = raw / raw.sum()
+    allowed = min(1.0 - 1.0 / np.log10(max(n, 11)), 0.7)
+    return Weights(weights, float(1.0 / (weights**2).sum()), float(k), float(allowed))
+
+
+def share_above(values: ArrayLike, weights: Weights, level: float, confidence: float = 0.95, iid: bool = True) -> Share:
+    """Share of the joints above a level.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Load of each joint that has a weight.
+    weights : Weights
+        Of the same joints.
+    level : float
+        Level, in the unit of the values.
+    confidence : float
+        Of the interval: Clopper and Pearson's for as many joints as would be as sure (Korn and Graubard 1998).
+    iid : bool
+        Whether the joints are independent samples.
+
+    Returns
+    -------
+    Share
+        Estimate and interval; it does not cover what `Weights.usable` warns of.
+
+    Raises
+    ------
+    ValueError
+        When the lengths differ.
+    """
+    loads, w = np.asarray(values, dtype=float), weights.values
+    if loads.shape != w.shape:
+        raise ValueError(f"loads {loads.shape} and weights {w.shape} must be of one length")
+    above = loads > level
+    estimate = float(np.clip((w * above).sum(), 0.0, 1.0))
+    # variance of a ratio of sums; without a joint on one side that of the weights alone
+    variance = float(((w * (above - estimate)) ** 2).sum())
+    ess = estimate * (1.0 - estimate) / variance if 0.0 < estimate < 1.0 else weights.ess
+    ess = min(ess, float(loads.size))
+    lower, upper = clopper_pearson(estimate * ess, ess, confidence) if iid else (np.nan, np.nan)
+    return Share(estimate, float(lower), float(upper), float(ess))
+
+
+def quantile(
+    values: ArrayLike, weights: Weights, share: float, confidence: float = 0.95, iid: bool = True
+) -> tuple[float, float, float]:
+    """Load that a share of the joints stays at or below, and its interval (Woodruff 1952).
+
+    Parameters
+    ----------
+    values, weights, confidence, iid
+        As in `share_above`.
+    share : float
+        Between 0 and 1.
+
+    Returns
+    -------
+    estimate, lower, upper : float
+        In the unit of the values; an end that the joints cannot support is infinite, NaN for dependent samples.
+    """
+    loads = np.asarray(values, dtype=float)
+    order = np.argsort(loads, kind="stable")
+    below = np.cumsum(weights.values[order])
+    estimate = loads[order][min(int(np.searchsorted(below, share * (1 - 1e-12))), loads.size - 1)]
+    if not iid:
+        return float(estimate), np.nan, np.nan
+    found = share_above(loads, weights, float(estimate), confidence)
+    low, high = clopper_pearson(share * found.ess, found.ess, confidence)
+    ends: list[NDArray[np.intp]] = [np.searchsorted(below, 0.0 if s <= 0 else s) for s in (low, high)]
+    lower = loads[order][ends[0]] if ends[0] < loads.size else np.inf
+    upper = loads[order][ends[1]] if ends[1] < loads.size - 1 else np.inf
+    return float(estimate), float(lower), float(upper)

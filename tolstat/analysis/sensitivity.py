@@ -1,0 +1,247 @@
+"""Which errors make the loads scatter? Sobol' indices from the joints of a campaign, without further runs.
+
+The errors must be independent of each other for shares of variance to add up. *First order*: the part of the variance
+that goes when an error is made perfect on the average over the others. *Total*: the part that stays when all others
+are. Total indices of fifty errors cannot be read from a thousand joints without an assumption; they are bounded here:
+from below by effects of one and two errors, from above by also counting all that these do not explain.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.analysis.exceedance import FloatArray
+
+FEWEST = 50
+"""Joints below which no index is given."""
+DEGREE = 3
+"""Of the polynomials in each of two errors that an interaction is made of."""
+MOST = 20_000
+"""Joints that interactions are read from; memory is some 3 kB a joint and error, and more joints tell little more."""
+
+
+class FirstOrder(NamedTuple):
+    """Shares of a load's variance that each error explains on its own.
+
+    Attributes
+    ----------
+    estimate, lower, upper : ndarray, shape (d,) or (d, m)
+        Corrected for chance, so that an error without effect has the mean 0 and may come out below it; the interval is
+        NaN for dependent samples, an index is NaN where error or load does not scatter.
+    variance : ndarray, shape () or (m,)
+        Of the load, in its unit squared: times this, an index is a contribution.
+    """
+
+    estimate: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    variance: FloatArray
+
+
+class Total(NamedTuple):
+    """Shares of a load's variance in which each error has a part.
+
+    Attributes
+    ----------
+    estimate : ndarray, shape (d,)
+        Effects of the error and of its pairs with the others: what is seen of the total index.
+    lower, upper : ndarray, shape (d,)
+        Interval of the total index: from the lower end of `estimate` to the upper end of `estimate` with `rest`.
+    pairs : ndarray, shape (d, d)
+        Share of each interaction of two errors, corrected for chance; NaN on the diagonal.
+    rest : float
+        Share that no error and no pair explains: effects of three and more, and what the fits are too coarse for.
+    """
+
+    estimate: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    pairs: FloatArray
+    rest: float
+
+
+def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> FirstOrder:
+    """First-order Sobol' indices from given data.
+
+    The mean of the load over one error is fitted by a line of cbrt(n) pieces (8 to 32) of as many joints each
+    (Plischke, Borgonovo and Smith 2013 have steps; pieces of lines are exact for a load that is linear in the error),
+    its share of the variance corrected for the degrees of freedom. The interval is from the index's influence function.
+
+    Parameters
+    ----------
+    x : array_like, shape (n, d)
+        Errors of the joints, any units; joints with a valid load only.
+    y : array_like, shape (n,) or (n, m)
+        Load of each joint, or m of them, such as the load at m shaft angles.
+    confidence : float
+        Of the interval.
+    iid : bool
+        Whether the joints are independent samples.
+
+    Returns
+    -------
+    FirstOrder
+        Indices of each error, and of each load where there are several.
+
+    Raises
+    ------
+    ValueError
+        When the lengths differ, a value is not finite, or there are fewer than `FEWEST` joints.
+    """
+    errors, loads = _checked(x, y)
+    centred = (loads - loads.mean(axis=0)).reshape(len(loads), -1)
+    variance = centred.var(axis=0)
+    found = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
+    for i, column in enumerate(errors.T):
+        if np.ptp(column) > 0:
+            _, share, influence, degrees = _fit(column, centred)
+            found[0, i] = share
+            found[1, i] = _error(influence, _chance(share, degrees, len(loads)))
+    estimate, error = found.reshape(2, errors.shape[1], *loads.shape[1:])
+    half = _normal_half(confidence) * error if iid else np.full(estimate.shape, np.nan)
+    return FirstOrder(
+        estimate, np.clip(estimate - half, 0, 1), np.clip(estimate + half, 0, 1), variance.reshape(loads.shape[1:])
+    )
+
+
+def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> Total:
+    """Bounds of the total Sobol' indices from given data.
+
+    Interactions of two errors are products of Legendre polynomials of their ranks (high-dimensional model
+    representation, Li, Wang and Rabitz 2002), their shares corrected for chance by leaving the squares out of the
+    double sums (U-statistics), read from what the errors alone leave. Interactions of more errors are not resolved:
+    they are between none and all of the rest, which is why the interval is one of bounds. A fit too coarse widens it,
+    and makes it no less true.
+
+    Parameters
+    ----------
+    x : array_like, shape (n, d)
+        Errors of the joints, independent of each other; of more than `MOST` joints the first are taken.
+    y : array_like, shape (n,)
+        Load of each joint.
+    confidence, iid
+        As in `first_order`.
+
+    Returns
+    -------
+    Total
+        Indices of each error.
+
+    Raises
+    ------
+    ValueError
+        As `first_order`, or when an error or the load does not scatter.
+    """
+    errors, loads = _checked(np.asarray(x)[:MOST], np.asarray(y)[:MOST])
+    if loads.ndim != 1 or np.ptp(loads) == 0 or (np.ptp(errors, axis=0) == 0).any():
+        raise ValueError("give one load and errors that scatter")
+    n = len(loads)
+    e = loads - loads.mean()
+    fits = [_fit(column, e[:, None]) for column in errors.T]
+    first = np.array([share[0] for _, share, _, _ in fits])
+    influence = np.column_stack([own[:, 0] for _, _, own, _ in fits])
+    chance = np.array([_chance(share, degrees, n)[0] for _, share, _, degrees in fits])
+    # what is plainly explained by single errors is no noise to the pairs
+    main = sum((m[:, 0] for (m, _, _, _), s, c in zip(fits, first, chance, strict=True) if s > 2 * c**0.5), 0.0 * e)
+    pairs, of_pairs, chance_of_pairs = _interactions(errors, e - main, e.var())
+    influence_of_pairs = of_pairs - pairs.sum(axis=1) * (e**2 / e.var())[:, None]
+    estimate = first + pairs.sum(axis=1)
+    own = influence + influence_of_pairs
+    everything = influence.sum(axis=1) + 0.5 * influence_of_pairs.sum(axis=1)
+    rest = 1.0 - first.sum() - 0.5 * pairs.sum()
+    errors_lower = _error(own, chance + chance_of_pairs.sum(axis=1))
+    without = chance.sum() - chance + 0.5 * chance_of_pairs.sum() - chance_of_pairs.sum(axis=1)
+    errors_upper = _error(own - everything[:, None], without)
+    z = _normal_half(confidence) if iid else np.nan
+    np.fill_diagonal(pairs, np.nan)
+    lower = np.clip(estimate - z * errors_lower, 0, 1)
+    upper = np.clip(np.maximum(estimate + rest + z * errors_upper, estimate + z * errors_lower), 0, 1)
+    return Total(estimate, lower, upper, pairs, float(rest))
+
+
+def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    errors, loads = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if errors.ndim != 2 or loads.ndim not in (1, 2) or len(errors) != len(loads):
+        raise ValueError(f"errors {errors.shape} and loads {loads.shape} must be tables of one length")
+    if not (np.isfinite(errors).all() and np.isfinite(loads).all()):
+        raise ValueError("leave out joints without a valid load")
+    if len(loads) < FEWEST:
+        raise ValueError(f"{len(loads)} joints are too few: give {FEWEST} or more")
+    return errors, loads
+
+
+def _fit(column: FloatArray, centred: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    """Mean of loads over one error, (n, m), its shares of the variance, (m,), their influence functions, and degrees.
+
+    With mean m(x) and deviation e the influence function of Var m / Var e is (m² + 2 m (e - m) - S e²) / Var e.
+    """
+    n = len(column)
+    basis = _pieces(column)
+    mean = basis @ (basis.T @ centred)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        variance = (centred**2).mean(axis=0)
+        inside = ((centred - mean) ** 2).sum(axis=0) / (n - 1 - basis.shape[1])
+        share = 1.0 - inside / (variance * n / (n - 1))
+        influence = (mean * (2.0 * centred - mean) - share * centred**2) / variance
+    return mean, share, influence, basis.shape[1]
+
+
+def _pieces(column: FloatArray) -> FloatArray:
+    """Orthonormal basis, (n, degrees), of continuous lines of pieces with equally many joints, without the constant."""
+    n = len(column)
+    knots = np.unique(np.quantile(column, np.linspace(0, 1, min(max(8, round(np.cbrt(n))), 32) + 1)))
+    hats = np.column_stack([np.interp(column, knots, unit) for unit in np.eye(len(knots))[1:]])
+    orthogonal, triangle = np.linalg.qr(hats - hats.mean(axis=0))
+    return orthogonal[:, np.abs(np.diag(triangle)) > 1e-9 * np.sqrt(n)]
+
+
+def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Shares of the pairs, (d, d), influence functions of the errors' sums but for Var e, (n, d), and chance, (d, d).
+
+    A share is a sum of squared coefficients c = E[left p_a(x_i) p_b(x_j)] over the variance.
+    """
+    n, d = errors.shape
+    p = _polynomials(errors).reshape(n, d * DEGREE)
+    c = (p * left[:, None]).T @ p / n
+    spread = (p**2 * (left**2)[:, None]).T @ p**2 / n
+    same = np.kron(np.eye(d, dtype=bool), np.ones((DEGREE, DEGREE), dtype=bool))
+    c[same] = spread[same] = 0.0
+    blocks = (d, DEGREE, d, DEGREE)
+    pairs = ((n * c**2 - spread) / (n - 1)).reshape(blocks).sum(axis=(1, 3)) / variance
+    weighted = ((p @ c) * p).reshape(n, d, DEGREE).sum(axis=2)
+    of_pairs = 2.0 * left[:, None] * weighted / variance
+    chance: FloatArray = 2.0 * (spread**2).reshape(blocks).sum(axis=(1, 3)) / (n * variance) ** 2
+    return pairs, of_pairs, chance
+
+
+def _polynomials(errors: FloatArray) -> FloatArray:
+    """Legendre polynomials of the degrees 1 to `DEGREE` of the errors' ranks, orthonormal; shape (n, d, DEGREE)."""
+    from scipy.stats import rankdata
+
+    u = 2.0 * (rankdata(errors, axis=0) - 0.5) / len(errors) - 1.0
+    degrees = range(1, DEGREE + 1)
+    basis = [np.sqrt(2 * k + 1) * np.polynomial.Legendre.basis(k)(u) for k in degrees]
+    return np.stack(basis, axis=2)
+
+
+def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:
+    """Variance of a share that is there without any effect, where the influence function vanishes."""
+    found: FloatArray = 2.0 * degrees * ((1.0 - share) / n) ** 2
+    return found
+
+
+def _error(influence: FloatArray, chance: FloatArray) -> NDArray[np.float64]:
+    """Standard errors. The influence function of noisy coefficients holds the variance of chance twice already."""
+    plain = influence.var(axis=0) / len(influence)
+    return np.asarray(np.sqrt(np.maximum(plain - chance, chance)))
+
+
+def _normal_half(confidence: float) -> float:
+    from scipy.special import ndtri
+
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence {confidence} must lie between 0 and 1")
+    return float(ndtri(0.5 * (1.0 + confidence)))

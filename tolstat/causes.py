@@ -1,0 +1,139 @@
+"""The errors that make a load of a campaign scatter, and those that make its tail."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from tolstat import sampling
+from tolstat.analysis import exceedance, overrepresentation, quantile, regression, sensitivity
+from tolstat.errors import Fault, InputError, StoreError
+from tolstat.recall import recall
+from tolstat.report import source
+from tolstat.schema import did_you_mean
+from tolstat.store import ResultStore
+from tolstat.study.selection import LIMIT_UNITS
+from tolstat.tables import Status
+from tolstat.tolerance import score
+
+TAIL = 0.9
+"""Share of the joints below the tail of a load that has no limit."""
+JOINTS = 200
+"""Valid joints that causes are asked of at least."""
+
+
+class Causes(NamedTuple):
+    """Causes of one load.
+
+    Attributes
+    ----------
+    load : str
+        Its name.
+    joints, lost : int
+        Valid joints, and those without a valid load, of which the causes are not known.
+    level, above : float, int
+        Level that the tail begins at, SI, and joints above it: the study's limit, or the 90 % quantile where there is
+        none.
+    unit : str
+        SI unit of the load.
+    std : float
+        Standard deviation of the load, or of its logarithm.
+    additive, r2 : float
+        Sum of the first-order indices; share that rank regression explains.
+    table : DataFrame
+        One row an error that scatters, the largest first-order index first: ``error``, then each with ``_lower`` and
+        ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``; ``direction`` and ``size``, with ``_p``
+        (NaN where too few joints are above the level).
+    """
+
+    load: str
+    joints: int
+    lost: int
+    level: float
+    above: int
+    unit: str
+    std: float
+    additive: float
+    r2: float
+    table: pd.DataFrame
+
+
+def of_store(
+    store: ResultStore, by: str, study_path: Path | None = None, confidence: float = 0.95, log: bool = False
+) -> Causes:
+    """Find the causes of a load.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The result file.
+    by : str
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
+    study_path : Path, optional
+        The study file, where the text in the result file does not do any more.
+    confidence : float
+        Of all intervals.
+    log : bool
+        Give shares of the variance of the load's logarithm: for a load of which a few joints make the variance.
+
+    Returns
+    -------
+    Causes
+        Indices of every error that scatters.
+
+    Raises
+    ------
+    InputError
+        When there is no such load.
+    StoreError
+        When the file has too few valid joints, or joints that are not drawn from tolerances.
+    """
+    if by not in LIMIT_UNITS:
+        raise InputError([Fault("--by", f"{by!r} is not a load", did_you_mean(by, list(LIMIT_UNITS)))])
+    study = recall(store, path=study_path)
+    if not study.tolerances:
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
+    campaign = source.read(store)
+    values, unit = source.load(campaign.results, by)
+    status = campaign.results["status"]
+    valid = (status == Status.OK) & np.isfinite(values)
+    needed = max(JOINTS, len(study.tolerances) + 2 * regression.GROUPS)
+    if valid.sum() < needed or np.ptp(values[valid]) == 0:
+        found = f"has {valid.sum()} joints with a valid load that scatters"
+        raise StoreError(str(Fault(str(store.path), found, f"run {needed} joints or more")))
+    if log and values[valid].min() <= 0:
+        raise InputError([Fault("--log", f"{by} is not positive in all joints", "leave it out")])
+    load, errors, iid = values[valid], campaign.errors[valid], campaign.iid
+    names = [name for name in study.tolerances if np.ptp(sampling.values(errors, name)) > 0]
+    x = np.column_stack([sampling.values(errors, name) for name in names])
+    y = np.log(load) if log else load
+    first = sensitivity.first_order(x, y, confidence, iid)
+    ranks = regression.ranks(x, load, confidence, iid)
+    parts: dict[str, NamedTuple] = {"first": first, "srrc": ranks}
+    if not study.copula.names:
+        parts["total"] = sensitivity.total(x, y, confidence, iid)
+    level = campaign.limits.get(by, quantile.at(load, status[valid], TAIL).estimate)
+    above = load > level
+    if overrepresentation.FEWEST <= above.sum() <= above.size - overrepresentation.FEWEST:
+        z = np.column_stack([score(study.tolerances[n], x[:, i]) for i, n in enumerate(names)])
+        parts |= overrepresentation.tail(z, above, confidence, iid)._asdict()
+    table = _table(names, parts).sort_values("first", ascending=False, ignore_index=True)
+    lost = exceedance.sort_out(values, status).n_unresolved
+    std = float(np.sqrt(first.variance))
+    counts = (level, int(above.sum()), unit, std, float(first.estimate.sum()), ranks.r2)
+    return Causes(by, int(valid.sum()), lost, *counts, table)
+
+
+def _table(names: list[str], parts: dict[str, NamedTuple]) -> pd.DataFrame:
+    table = pd.DataFrame({"error": names})
+    for kind in ("first", "total", "srrc", "direction", "size"):
+        found = parts[kind]._asdict() if kind in parts else {}
+        for end in ("estimate", "lower", "upper"):
+            table[kind if end == "estimate" else f"{kind}_{end}"] = found.get(end, np.nan)
+        if kind in ("direction", "size"):
+            table[f"{kind}_p"] = found.get("p", np.nan)
+    return table

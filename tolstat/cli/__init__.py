@@ -1,0 +1,31 @@
+"""The command line: a file a command; what commands share is in `_app`. Help lists them in the order given here."""
+
+from tolstat.cli import (
+    capability,
+    causes,
+    export,
+    extend,
+    fatigue,
+    merge,
+    plan,
+    replay,
+    report,
+    reweight,
+    run,
+    simulate,
+    status,
+    verify,
+    work_precision,
+    worst,
+)
+from tolstat.cli._app import app, main
+
+__all__ = ["app", "main"]
+
+COMMANDS = (
+    *(simulate.simulate, plan.plan, run.run, extend.extend, merge.merge, status.status, verify.verify),
+    *(worst.worst, replay.replay, export.export, fatigue.fatigue, report.report),
+    *(capability.capability, causes.causes, reweight.reweight, work_precision.work_precision),
+)
+for command in COMMANDS:
+    app.command()(command)

@@ -1,0 +1,72 @@
+"""``tolstat plan``: what a campaign will take and give."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tolstat.cli._app import Workers, announce_compilation, as_text
+
+if TYPE_CHECKING:
+    from tolstat.plan import Plan
+
+
+def plan(
+    study_file: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).")],
+    n: Annotated[
+        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints instead of the study's.")
+    ] = None,
+    workers: Workers = None,
+    pilot: Annotated[int, typer.Option("--pilot", metavar="K", min=1, help="Joints to simulate for the plan.")] = 128,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+) -> None:
+    """Say what a campaign will take and give.
+
+    A few joints are simulated, nothing is written: time, memory and file size of all joints, how wide the interval of
+    each limit's exceedance will be, and how many joints a bound of a quantile needs.
+    """
+    from dataclasses import asdict
+
+    from tolstat import plan as plans
+    from tolstat import study
+
+    loaded = study.load(study_file, n=n)
+    announce_compilation()
+    made = plans.plan(loaded, workers, pilot)
+    typer.echo(as_text(asdict(made)) if as_json else _lines(made))
+
+
+def _lines(made: Plan) -> str:
+    lines = [
+        f"joints: {made.rows}",
+        f"dimensions: {made.dimensions}",
+        f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
+        *([made.fidelity] if made.fidelity else []),
+        f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
+        f"time: {_duration(made.seconds)} on {made.workers} cores",
+        f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
+        f"file: {_size(made.file_bytes)}",
+    ]
+    lines += [f"width of the 95 % interval at P = {share:g}: {width:.2g}" for share, width in made.widths.items()]
+    lines += [
+        f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; interval at most {limit.width:.2g} wide"
+        for limit in made.limits
+    ]
+    lines += [f"joints for a 95 % bound of the {100 * q:g} % quantile: {n}" for q, n in made.wilks.items()]
+    return "\n".join(lines)
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"
+
+
+def _size(size: int) -> str:
+    for unit, factor in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
+        if size >= factor:
+            return f"{size / factor:.3g} {unit}"
+    return f"{size / 1e3:.3g} kB"

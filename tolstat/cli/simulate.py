@@ -1,0 +1,68 @@
+"""``tolstat simulate``: one joint."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tolstat.cli._app import announce_compilation, as_text, say, writing
+
+if TYPE_CHECKING:
+    from tolstat.trace import CaseResult
+
+
+def simulate(
+    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML): one joint with its errors.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="CSV", help="Write the trace of the last revolution.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+) -> None:
+    """Simulate one joint and print its largest loads.
+
+    The loads are those of the last revolution, cross bushings 1 to 4 and fork bushings 1 to 4.
+    """
+    from tolstat import study, trace
+    from tolstat.files import check_target
+
+    if out is not None:
+        check_target(out, case)
+    loaded = study.load_case(case)
+    announce_compilation()
+    result = trace.simulate_case(loaded)
+    summary = result.summary()
+    typer.echo(as_text(summary) if as_json else case_text(summary))
+    judge(summary, result.remedy())
+    if out is not None:
+        write_trace(result, out)
+
+
+def case_text(summary: dict[str, Any]) -> str:
+    """Text of `CaseResult.summary`."""
+    from tolstat.report.text import align
+
+    def value(load: float | None) -> str:
+        return "-" if load is None else f"{load:.6g}"
+
+    rows = [["bushing", "max |F| [N]", "max |T| [N m]"]]
+    rows += [[name, value(load["F"]), value(load["T"])] for name, load in summary["max"].items()]
+    facts = "\n".join(f"{name}: {value}" for name, value in summary.items() if name != "max")
+    return f"{facts}\n{align(rows)}"
+
+
+def judge(summary: dict[str, Any], remedy: str) -> None:
+    """Warn of a joint without valid results."""
+    from tolstat.tables import STATUS_TEXT, Status
+
+    state = Status[str(summary["status"]).upper()]
+    if state != Status.OK:
+        say(f"warning: {state.label}: {STATUS_TEXT[state]}\n  hint: {remedy}")
+
+
+def write_trace(result: CaseResult, out: Path) -> None:
+    """Write the trace of the last revolution as CSV."""
+    with writing(out) as temporary:
+        result.to_pandas().to_csv(temporary, index=False, lineterminator="\n")
+    say(f"wrote {out}")

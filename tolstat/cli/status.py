@@ -1,0 +1,90 @@
+"""``tolstat status``: what became of the joints."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tolstat.cli._app import ResultFile, as_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from tolstat.store import ResultStore
+
+
+def status(
+    file: ResultFile,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+) -> None:
+    """Print what became of the joints of a campaign.
+
+    One line for each status with the number of joints, and the share above each limit so far, with its 95 %
+    interval. A campaign under way can be looked at: it is not disturbed, and its rate and time to go are printed, too.
+    """
+    from tolstat.store import ResultStore
+
+    with ResultStore.open(file) as store:
+        summary = _summary(store)
+    lines = [f"{name}: {value}" for name, value in summary.items() if name != "exceedance"]
+    lines += [
+        "P({load} > {limit:g} {unit}): {estimate} ({lower} to {upper})".format(**e) for e in summary["exceedance"]
+    ]
+    typer.echo(as_text(summary) if as_json else "\n".join(lines))
+
+
+def _summary(store: ResultStore) -> dict[str, Any]:
+    """What there is to say, read some rows at a time; blocks of pending ones are not read."""
+    import numpy as np
+
+    from tolstat.report import source
+    from tolstat.store.reader import BLOCK
+    from tolstat.tables import Status
+
+    states = np.full(store.n, Status.PENDING, np.uint8)
+    loads, units, damaged = {name: np.zeros(store.n) for name in store.limits}, {}, 0
+    for first in range(0, store.n, BLOCK):
+        rows = slice(first, first + BLOCK)
+        written = store.column("results", "status", rows)
+        if (written != Status.PENDING).any():
+            results = store.results(rows)
+            states[rows] = results["status"]
+            damaged += int(((written != Status.PENDING) & (states[rows] == Status.PENDING)).sum())
+            for name, values in loads.items():
+                values[rows], units[name] = source.load(results, name)
+    found = np.bincount(states, minlength=len(Status))
+    summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
+    summary |= {state.label: int(found[state]) for state in Status}
+    condition = {"damaged": damaged, "simulated_again": int((store.attempt() > 0).sum())}
+    summary |= {name: count for name, count in condition.items() if count} | _pace(store, summary["pending"])
+    summary["exceedance"] = [_exceedance(store, states, name, loads[name], unit) for name, unit in units.items()]
+    return summary
+
+
+def _pace(store: ResultStore, pending: int) -> dict[str, Any]:
+    """Joints a second and seconds to go of a run under way, as soon as there are any."""
+    session = store.session()
+    if session is None:
+        return {"running": False}
+    done = store.n - pending - session.done
+    if done <= 0:
+        return {"running": True}
+    rate = done / max(time.time() - session.started, 1e-3)
+    return {"running": True, "joints_per_s": float(f"{rate:.3g}"), "s_to_go": round(pending / rate)}
+
+
+def _exceedance(
+    store: ResultStore, states: NDArray[np.uint8], name: str, values: NDArray[np.float64], unit: str
+) -> dict[str, Any]:
+    """Share of the joints above a limit so far; None for what cannot be said."""
+    from tolstat.analysis import exceedance
+
+    counting = slice(int(store.sampling["nominal_first"] and store.rows.start == 0), None)
+    level, iid = store.limits[name], store.sampling["method"] == "random"
+    share = exceedance.at(values[counting], states[counting], level, 0.95, iid)
+    numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
+    rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}
+    return {"load": name, "limit": level, "unit": unit, **rounded}

@@ -1,0 +1,43 @@
+"""The joint of a variant, from the values that a result file keeps of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tolstat.joint.model import Joint
+from tolstat.joint.sections import BeamAxes
+
+
+def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
+    """The joint of a variant.
+
+    Parameters
+    ----------
+    joint : Joint
+        The joint of the study.
+    values : mapping
+        `Variant.values`: dotted key of the joint to SI value or word; keys of other sections are passed over.
+    """
+    sections: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        section, _, name = key.partition(".")
+        if section not in Joint.model_fields:
+            continue
+        sections.setdefault(section, {})[name] = tuple(value) if isinstance(value, list) else value
+    update = {name: _section(getattr(joint, name), own) for name, own in sections.items()}
+    return joint.model_copy(update=update)
+
+
+def _section(section: Any, values: Mapping[str, Any]) -> Any:
+    """A section with new values; keys of a table in it (the stiffness of a bushing) have a dot."""
+    flat = {key: value for key, value in values.items() if "." not in key}
+    tables: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        table, dot, name = key.partition(".")
+        if dot:
+            tables.setdefault(table, {})[name] = value
+    for table, own in tables.items():
+        before = getattr(section, table)
+        flat[table] = before.model_copy(update=own) if before is not None else BeamAxes.model_construct(**own)
+    return section.model_copy(update=flat)

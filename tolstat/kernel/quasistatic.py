@@ -1,0 +1,111 @@
+"""Equilibrium at each input angle under the inertial loads of the ideal motion: one revolution without transients.
+
+The joint's own residual with the deviations' velocities and accelerations zero; the frames' angular velocities and
+accelerations stay, and with them centrifugal loads, the output shaft's inertia and the drag of pins that turn in their
+holes. Continuation in the angle: the solution is extrapolated through the last three angles and corrected by Newton's
+iteration, with a tangent kept from angle to angle. Where that fails, pseudo-transient continuation finds the
+equilibrium at that angle from the one before.
+"""
+
+import math
+
+from tolstat.kernel._jit import closure, njit
+from tolstat.kernel.motion import speed_ratio
+from tolstat.kernel.state import HALVINGS, STEPS
+from tolstat.kernel.topology import PSI
+from tolstat.kernel.vector import larger
+
+
+@njit
+def extrapolate(state):
+    """Trial point: the parabola through the last three angles, equally spaced; ``state.aux`` is the third last."""
+    for i in range(state.q.size):
+        state.q[i] = 3 * (state.q0[i] - state.q1[i]) + state.aux[i]
+
+
+@njit
+def stay(state):
+    """Trial point: that of the angle before."""
+    for i in range(state.q.size):
+        state.q[i] = state.q0[i]
+
+
+@njit
+def keep(state):
+    """Make the trial point the last angle's solution."""
+    for i in range(state.q.size):
+        state.aux[i], state.q1[i], state.q0[i] = state.q1[i], state.q0[i], state.q[i]
+    state.counters[STEPS] += 1
+
+
+@njit
+def end_closure(ring):
+    """Change of the loads' moduli at theta = 0 over the revolution, relative to the largest of their kind."""
+    worst = 0.0
+    for kind in (0, 1):
+        largest = 0.0
+        for s in range(ring.samples.size):
+            for b in range(8):
+                largest = max(largest, ring.samples[s].modulus[b, kind])
+        change = ring.samples[0].change[kind]
+        worst = larger(worst, change / largest if largest > 0 else change)
+    return worst
+
+
+@njit
+def speed_ratios(par, ring):
+    """Write ``tau`` and ``psi`` of the samples from the deviation of the output shaft's angle, which ``tau`` holds.
+
+    Its slope over the input angle is taken by central differences around the revolution.
+    """
+    n = ring.samples.size
+    by_sample = n / (4 * math.pi) if par.omega > 0 else -n / (4 * math.pi)
+    samples = ring.samples
+    first, before = samples[0].tau, samples[n - 1].tau
+    for s in range(n):
+        here, ahead = samples[s].tau, samples[s + 1].tau if s + 1 < n else first
+        slope = (ahead - before) * by_sample
+        before = here
+        samples[s].tau = speed_ratio(2 * math.pi * s / n, par.alpha) + slope
+        samples[s].psi = slope / samples[s].tau
+
+
+def build_quasistatic(hold, relax, record):
+    """Bind the equilibria of a system to a revolution.
+
+    Parameters
+    ----------
+    hold, relax : jitted functions
+        As `equilibrium.build_equilibrium` makes them.
+    record : jitted function (k, lane, par, work, state, samples) -> None
+        Keeps an angle.
+
+    Returns
+    -------
+    jitted function (first, par, options, work, state, ring) -> bool
+        Goes once around from the equilibrium ``state.q0`` at theta = 0; False when an angle has none in reach.
+        ``first``: whether there is no revolution before, whose last angles the extrapolation could use.
+    """
+
+    @closure
+    def revolution(first, par, options, work, state, ring):
+        n = ring.samples.size
+        for k in range(0 if first else 1, n + 1):
+            # from the second revolution on: a torque that rises at the start (Start.RAMP) has risen
+            t = 2 * math.pi * (n + k) / (n * abs(par.omega))
+            if first and k < 3:
+                stay(state)
+            else:
+                extrapolate(state)
+            if not hold(t, par, options, work, state):
+                state.counters[HALVINGS] += 1
+                relax(t, par, options, work, state)
+                stay(state)
+                if not hold(t, par, options, work, state):
+                    return False
+            keep(state)
+            record(k, 0, par, work, state, ring.samples)
+            ring.samples[k % n].tau = state.q0[PSI]
+        return True
+
+    return revolution

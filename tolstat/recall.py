@@ -1,0 +1,46 @@
+"""The study of a campaign, from its result file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from tolstat.campaign import differing_keys
+from tolstat.errors import Fault, StoreError
+from tolstat.store import ResultStore
+from tolstat.study import Study, load
+
+
+def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -> Study:
+    """Read the study that a result file was made from.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The file. It keeps the text of its study; a joint file or measured data that the text names by a path are
+        looked for from the result file's folder.
+    n : int, optional
+        Number of joints instead of the campaign's.
+    path : Path, optional
+        The study file to take instead of the text.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        When the study cannot be read any more.
+    StoreError
+        When it gives another campaign than the one in the file.
+    """
+    held = store.sampling["n"]
+    source = path if path is not None else store.path.parent / f"{store.study_name}.toml"
+    text = None if path is not None else store.study_text
+    study = load(source, n=held, text=text)
+    differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
+    if differing:
+        found = "\n    ".join(["its study is not as it was when the file was made", *differing])
+        raise StoreError(str(Fault(str(store.path), found, "give the study file as it was then with --study")))
+    return study if n is None else load(source, n=n, text=text)

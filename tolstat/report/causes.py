@@ -1,0 +1,68 @@
+"""Causes of a load as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from tolstat.report.text import UNITS, align
+
+if TYPE_CHECKING:
+    from tolstat.causes import Causes
+
+SIGNIFICANT = 0.05
+
+
+def text(causes: Causes, shown: int = 12) -> str:
+    """Table of the `shown` errors with the largest first-order indices, and those that play a part in the tail.
+
+    Returns
+    -------
+    str
+        Shares of the variance in per cent, rank coefficients, and the probability that a joint of the tail has the
+        larger error (``direction``) and the error farther from the middle (``size``), each with its interval; ``*``
+        marks what chance does not explain.
+    """
+    table = causes.table
+    marked = (table["direction_p"] < SIGNIFICANT) | (table["size_p"] < SIGNIFICANT)
+    rows = [["error", "alone, %", "in all, %", "rank coefficient", "tail: larger", "tail: farther out"]]
+    for row in table[(table.index < shown) | marked].to_dict("records"):
+        line = [row["error"], _interval(row, "first", 100), _ends(row, "total", 100), _interval(row, "srrc")]
+        rows.append([*line, _tail(row, "direction"), _tail(row, "size")])
+    return align(rows)
+
+
+def note(causes: Causes, log: bool = False) -> str:
+    """Sentences on what the table stands on."""
+    unit = UNITS.get(causes.unit, causes.unit)
+    std = f"{causes.std:.4g}, of the logarithm" if log else f"{causes.std:.4g} {unit}".rstrip()
+    tail = f"tail: {causes.above} joints above {causes.level:.5g} {unit}".rstrip()
+    lines = [
+        f"{causes.load}: {causes.joints} joints, {causes.lost} without a valid load left out; standard deviation {std}",
+        f"errors alone explain {100 * causes.additive:.0f} % of the variance, ranks {100 * causes.r2:.0f} %; {tail}",
+    ]
+    if causes.table["total"].isna().all():
+        lines.append("errors are correlated: shares overlap, and there is no share in all")
+    if causes.table["first_lower"].isna().all():
+        lines.append("no intervals: they hold for independent samples only")
+    return "\n".join(lines)
+
+
+def _interval(row: Mapping[Any, Any], name: str, factor: float = 1.0) -> str:
+    value = row[name]
+    if math.isnan(value):
+        return "-"
+    own = f"{factor * value:.1f}" if factor > 1 else f"{value:+.2f}"
+    return own if math.isnan(row[f"{name}_lower"]) else f"{own} ({_ends(row, name, factor)})"
+
+
+def _ends(row: Mapping[Any, Any], name: str, factor: float = 1.0) -> str:
+    low, high = factor * row[f"{name}_lower"], factor * row[f"{name}_upper"]
+    form = ".1f" if factor > 1 else "+.2f"
+    return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
+
+
+def _tail(row: Mapping[Any, Any], name: str) -> str:
+    star = "*" if row[f"{name}_p"] < SIGNIFICANT else " "
+    return "-" if math.isnan(row[name]) else f"{row[name]:.2f}{star}"

@@ -1,0 +1,162 @@
+"""A result file made of others: the files of slices put together, or a file with room for further rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.files import writing
+from tolstat.store.histories import HISTORY_BYTES, HistoryParts, attach_scales, create_dataset, rows_per_chunk
+from tolstat.store.reader import BLOCK, Reader, parts_folder
+from tolstat.store.result_file import campaign_digest, fault, fill
+from tolstat.tables import Status
+
+
+class Differing(Exception):
+    """Two files hold different results of one joint.
+
+    Attributes
+    ----------
+    row : int
+        Row of the campaign.
+    column : str
+        The first column that differs.
+    """
+
+    def __init__(self, row: int, column: str) -> None:
+        self.row, self.column = row, column
+        super().__init__(f"row {row}: {column} differs")
+
+
+def assemble(
+    path: Path,
+    attrs: Mapping[str, str | int],
+    n: int,
+    sources: Sequence[Reader],
+    errors: Iterable[NDArray[np.void]],
+    design: NDArray[np.void] | None = None,
+    overwrite: bool = False,
+) -> None:
+    """Make the file of a whole campaign from files of its rows.
+
+    Parameters
+    ----------
+    path : Path
+        The file to make. It gets its name when it is complete.
+    attrs : mapping
+        Its attributes.
+    n : int
+        Its rows.
+    sources : sequence of Reader
+        Files with rows of it; where two hold the same row, what is done goes before what is pending.
+    errors : iterable of table ERROR
+        Errors of all rows, block after block.
+    design : (n,) table DESIGN, optional
+        What each row is, for a study that lists its joints.
+    overwrite : bool
+        Whether a file at `path` is replaced. Histories then go beside it, since rows are still pending; otherwise
+        into it, and every row must be done.
+
+    Raises
+    ------
+    Differing
+        When two sources hold different results of one row.
+    StoreError
+        When `path` exists and must not be replaced, or cannot be written.
+    """
+    try:
+        with writing(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
+            fill(file, attrs, range(n), errors, design)
+            for source in sources:
+                _copy_results(file, source)
+            if overwrite:
+                _histories_beside(path, file, n, sources)
+            else:
+                _histories_inside(file, n, sources)
+    except FileExistsError as error:
+        raise fault(path, "exists already", "delete it, or use another --out") from error
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise fault(path, f"cannot be written: {reason}", "check the folder, its permissions and space") from error
+
+
+def _copy_results(file: h5py.File, source: Reader) -> None:
+    """Copy the rows that are done, and compare those that are done in the file already."""
+    for first in range(0, source.n, BLOCK):
+        own = slice(first, min(first + BLOCK, source.n))
+        there = slice(own.start + source.rows.start, own.stop + source.rows.start)
+        done = source.status(own) != Status.PENDING
+        held = file["results/status"][there] != Status.PENDING
+        both, new = done & held, done & ~held
+        for name, dataset in file["results"].items():
+            values, before = source.column("results", name, own), dataset[there]
+            same = _bytes(values[both]) == _bytes(before[both])
+            if not same.all():
+                row = np.flatnonzero(both)[np.argmin(same.all(axis=1))]
+                raise Differing(int(there.start + row), name)
+            before[new] = values[new]
+            dataset[there] = before
+        for name, dataset in file["ledger"].items():
+            if name != "errors_check":
+                dataset[there] = np.where(new, source.column("ledger", name, own), dataset[there])
+
+
+def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    """Bytes of each value, (m, size): a NaN equals itself."""
+    return values.view(np.uint8).reshape(len(values), values.itemsize)
+
+
+def _history_blocks(source: Reader) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    """Name of a history and rows of `source`, some `HISTORY_BYTES` of them at a time."""
+    for name, spec in source.history_specs.items():
+        chunk = rows_per_chunk(spec, source.n)
+        size = chunk * max(1, HISTORY_BYTES // (chunk * spec.blank(1).nbytes))
+        for first in range(0, source.n, size):
+            yield name, np.arange(first, min(first + size, source.n))
+
+
+def _histories_inside(file: h5py.File, n: int, sources: Sequence[Reader]) -> None:
+    specs = sources[0].history_specs
+    if not specs:
+        return
+    group = file.create_group("histories")
+    for name, spec in specs.items():
+        attach_scales(create_dataset(group, name, n, spec), file["row"], spec)
+    for source in sources:
+        for name, rows in _history_blocks(source):
+            begin = source.rows.start + rows[0]
+            group[name][begin : begin + len(rows)] = source.histories(name, rows)
+
+
+def _histories_beside(path: Path, file: h5py.File, n: int, sources: Sequence[Reader]) -> None:
+    specs = sources[0].history_specs
+    if not specs:
+        return
+    parts = HistoryParts(parts_folder(path), n, specs, campaign_digest(file))
+    parts.remove()  # of an attempt that was killed: the file at `path` has its histories inside
+    for source in sources:
+        size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in specs.values()))
+        for first in range(0, source.n, size):
+            rows = np.arange(first, min(first + size, source.n))
+            parts.add(source.rows.start + rows, {name: source.histories(name, rows) for name in specs})
+
+
+def check_free(path: Path) -> None:
+    """Check that a new result file can be made.
+
+    Raises
+    ------
+    StoreError
+        When there is one, or histories of one, or no folder for it.
+    """
+    if path.exists():
+        raise fault(path, "exists already", "delete it, or use another --out")
+    if parts_folder(path).exists():
+        raise fault(parts_folder(path), "holds histories of another campaign", "delete it or use another --out")
+    if not path.parent.is_dir():
+        raise fault(path, "cannot be written: no such folder", "make the folder first")

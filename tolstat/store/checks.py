@@ -1,0 +1,185 @@
+"""Whether a file is a result file, before anything in it is believed: damaged and hostile files end here.
+
+No length that a file states is used to allocate memory before the file is known to hold that many bytes. Only hard
+links to contiguous datasets inside the file are followed: neither to other files nor through filters.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from tolstat import kept, tables
+from tolstat.store import integrity
+from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, fault, text
+from tolstat.tables import HistorySpec
+
+DAMAGED = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
+"""What reading a damaged file raises, in h5py or in the code that trusts a file's attributes."""
+CHECKED_SINCE = 2
+"""First schema version with checksums."""
+MOST_COMPRESSED = 1100
+"""Beyond this ratio no gzip stream goes (deflate ends at 1032): a dataset that claims more is not whole."""
+MOST_SAMPLES = 50_000_000
+"""Numbers of a history for one joint: more than the finest solution of all loads has."""
+MOST_TEXT = 64_000_000
+"""Bytes of the longest attribute that is read."""
+
+
+def check_schema(path: Path, file: h5py.File) -> int:
+    """Check that an HDF5 file is a result file that this version can read.
+
+    Returns
+    -------
+    int
+        Its schema version.
+
+    Raises
+    ------
+    StoreError
+        When it is not.
+    """
+    filetype = text(file.attrs, "filetype") if "filetype" in file.attrs else None
+    if filetype != FILETYPE:
+        found = f"is HDF5, but of type {filetype!r} instead of {FILETYPE!r}"
+        raise fault(path, found, "give a file that tolstat run has made")
+    version = integer(file, "schema_version")
+    if version > SCHEMA_VERSION:
+        found = f"has schema version {version}, this tolstat reads up to {SCHEMA_VERSION}"
+        raise fault(path, found, "use a newer tolstat")
+    if (version >= CHECKED_SINCE or integrity.DIGEST in file.attrs) and not integrity.is_sealed(file):
+        raise ValueError("its attributes are not as they were written")
+    return version
+
+
+def integer(file: h5py.File, name: str, default: int | None = None) -> int:
+    """Attribute that is a whole number of zero or more.
+
+    Raises
+    ------
+    KeyError
+        When it is not there and there is no default.
+    ValueError
+        When it is something else.
+    """
+    if default is not None and name not in file.attrs:
+        return default
+    value = file.attrs[name]
+    if not isinstance(value, (int, np.integer)) or value < 0:
+        raise ValueError(f"attribute {name} is {value!r}, not a whole number of zero or more")
+    return int(value)
+
+
+def mapping(file: h5py.File, name: str) -> dict[str, Any]:
+    """Attribute that is a JSON object.
+
+    Raises
+    ------
+    KeyError
+        When it is not there.
+    ValueError
+        When it is no JSON object.
+    """
+    held = file.attrs.get_id(name)
+    if held.get_storage_size() > MOST_TEXT:
+        raise ValueError(f"attribute {name} is too long")
+    value = json.loads(text(file.attrs, name))
+    if not isinstance(value, dict):
+        raise ValueError(f"attribute {name} is no JSON object")
+    return value
+
+
+def history_specs(file: h5py.File) -> dict[str, HistorySpec]:
+    """Read the attribute ``histories``.
+
+    Raises
+    ------
+    KeyError, ValueError, TypeError
+        When it says anything that no campaign keeps.
+    """
+    specs = {}
+    for name, (shape, dtype, unit, description, *axes) in mapping(file, "histories").items():
+        spec = HistorySpec(tuple(shape), dtype, unit, description, *(tuple(names) for names in axes))
+        if not all(isinstance(size, int) and size > 0 for size in spec.shape) or math.prod(spec.shape) > MOST_SAMPLES:
+            raise ValueError(f"history {name} has the shape {shape}")
+        if spec.dtype not in ("f4", "f8", "u1", "u2"):
+            raise ValueError(f"history {name} has the type {spec.dtype}")
+        specs[name] = spec
+    return specs
+
+
+def check_tables(file: h5py.File, version: int) -> int:
+    """Check that every column kept is there as the tables have it, and lies in the file as a whole.
+
+    Returns
+    -------
+    int
+        Number of rows.
+
+    Raises
+    ------
+    KeyError, ValueError
+        With the dataset that is missing or is something else.
+    """
+    status = _dataset(file, "results", "status")
+    n = int(status.shape[0]) if status.ndim == 1 else 0
+    if n < 1:
+        raise ValueError(f"/results/status has the shape {status.shape}")
+    groups = {"errors": tables.ERROR_COLUMNS, "results": kept.columns(mapping(file, "identity"))}
+    if version >= CHECKED_SINCE:
+        histories = tuple(check_column(name) for name in mapping(file, "histories"))
+        groups["ledger"] = (*tables.LEDGER_COLUMNS, *histories)
+    if "design" in file:
+        groups["design"] = tables.DESIGN_COLUMNS
+    for group, columns in groups.items():
+        for c in columns:
+            if version < SCHEMA_VERSION and c.name not in file[group]:
+                continue  # a column that files of that version did not have yet
+            _check_column(_dataset(file, group, c.name), n, c.dtype)
+    return n
+
+
+def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> None:
+    """Check that the datasets of histories, once they are in the file, are what its attributes say.
+
+    Raises
+    ------
+    KeyError, ValueError
+        With the dataset that is missing or is something else.
+    """
+    if "histories" not in file:
+        return
+    for name, spec in specs.items():
+        dataset = _dataset(file, "histories", name)
+        if dataset.shape != (n, *spec.shape) or dataset.dtype != np.dtype(spec.dtype):
+            raise ValueError(f"{dataset.name} has the shape {dataset.shape} and type {dataset.dtype}")
+        if dataset.nbytes > MOST_COMPRESSED * dataset.id.get_storage_size():
+            raise ValueError(f"{dataset.name} is not whole")
+
+
+def _dataset(file: h5py.File, group: str, name: str) -> h5py.Dataset:
+    """Dataset in a group of the file, reached by hard links only, without data in other files."""
+    for holder, key in ((file, group), (file[group], name)):
+        if not isinstance(holder, h5py.Group) or not isinstance(holder.get(key, getlink=True), h5py.HardLink):
+            raise ValueError(f"/{group}/{name} is not in the file itself")
+    dataset = file[group][name]
+    if not isinstance(dataset, h5py.Dataset):
+        raise ValueError(f"/{group}/{name} is no dataset")
+    if dataset.is_virtual or dataset.external:
+        raise ValueError(f"{dataset.name} has its data in another file")
+    return dataset
+
+
+def _check_column(dataset: h5py.Dataset, n: int, dtype: str) -> None:
+    if dataset.dtype != np.dtype(dtype) or dataset.shape != (n,):
+        raise ValueError(f"{dataset.name} is {dataset.shape} of {dataset.dtype}, not {(n,)} of {np.dtype(dtype)}")
+    offset, size = dataset.id.get_offset(), dataset.id.get_storage_size()
+    if dataset.chunks is not None or offset is None or size != dataset.nbytes:
+        raise ValueError(f"{dataset.name} is not stored in one piece")
+    if offset + size > dataset.file.id.get_filesize():
+        raise ValueError(f"{dataset.name} reaches beyond the end of the file")

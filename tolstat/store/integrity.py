@@ -1,0 +1,113 @@
+"""Checksums: a row or an attribute that is not as it was written is not believed.
+
+Each row has two, one of its errors and one of its results, in the group ``ledger``; each history has one a row, and the
+attributes have one together. The row number is in it, and that of the errors goes into that of the results, so that
+rows can neither be swapped nor mixed.
+
+The rows' hash goes column by column over whole arrays: state = (state xor word) * odd number, then xor with its upper
+half. Each step can be undone (for a given word), so a change of a single number never goes unseen, and any other with a
+probability of 2^-64. CRC-32 as of zlib would need the bytes of each row together, which lie columns apart.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zlib
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import tables
+
+Hash = NDArray[np.uint64]
+
+FACTOR = np.uint64(0x9E3779B97F4A7C15)
+"""2^64 over the golden ratio, odd (Knuth 1998, The Art of Computer Programming 3, 6.4)."""
+HALF = np.uint64(32)
+DIGEST = "digest"
+"""Name of the attribute that holds the checksum of the others."""
+
+
+def errors_hash(first_row: int, errors: NDArray[np.void], design: NDArray[np.void] | None) -> Hash:
+    """Checksum of the errors of each row, and of what joint it is, (m,).
+
+    Parameters
+    ----------
+    first_row : int
+        Row of the campaign that the first one is.
+    errors : (m,) table ERROR
+        Errors.
+    design : (m,) table DESIGN, optional
+        For a study that lists its joints.
+    """
+    state = np.arange(first_row + 1, first_row + 1 + len(errors), dtype=np.uint64)
+    if design is not None:
+        _fold(state, tables.DESIGN_COLUMNS, design)
+    _fold(state, tables.ERROR_COLUMNS, errors)
+    return state
+
+
+def results_hash(
+    errors_check: Hash, attempt: NDArray[np.int32], results: NDArray[np.void], columns: tuple[tables.Column, ...]
+) -> Hash:
+    """Checksum of the results of each row, (m,).
+
+    Parameters
+    ----------
+    errors_check : (m,) array
+        That of its errors.
+    attempt : (m,) array
+        Which attempt gave the results.
+    results : (m,) table RESULT
+        Results, status included.
+    columns : tuple of Column
+        Those of them that are kept.
+    """
+    state = errors_check ^ attempt.astype(np.uint64)
+    _mix(state)
+    _fold(state, columns, results)
+    return state
+
+
+def history_checks(history: NDArray[Any], rows: NDArray[np.intp]) -> NDArray[np.uint32]:
+    """CRC-32 of each joint's history of one kind, (m,); `rows` are those of the campaign."""
+    joints = np.ascontiguousarray(history)
+    checks = (zlib.crc32(joints[i], int(row) & 0xFFFFFFFF) for i, row in enumerate(rows))
+    return np.fromiter(checks, np.uint32, len(rows))
+
+
+def seal(file: h5py.File) -> None:
+    """Write the checksum of the attributes of a file; to be done after any change of them."""
+    file.attrs[DIGEST] = np.bytes_(_digest(file))
+
+
+def is_sealed(file: h5py.File) -> bool:
+    """Whether the attributes of a file are as they were written."""
+    return _plain(file.attrs.get(DIGEST)) == _digest(file)
+
+
+def _digest(file: h5py.File) -> str:
+    held = {name: _plain(value) for name, value in file.attrs.items() if name != DIGEST}
+    return hashlib.sha256(json.dumps(held, sort_keys=True).encode()).hexdigest()
+
+
+def _plain(value: object) -> str:
+    """Text of an attribute, however it is stored."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8")
+    return value if isinstance(value, str) else repr(np.asarray(value).tolist())
+
+
+def _fold(state: Hash, columns: tuple[tables.Column, ...], table: NDArray[np.void]) -> None:
+    for column in columns:
+        values = np.ascontiguousarray(column.of(table))
+        state ^= values.view(np.uint64) if values.dtype == np.float64 else values.astype(np.uint64)
+        _mix(state)
+
+
+def _mix(state: Hash) -> None:
+    state *= FACTOR
+    state ^= state >> HALF

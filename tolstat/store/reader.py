@@ -1,0 +1,357 @@
+"""Reading a result file: what of it is data, and which rows of a campaign it holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import kept, tables
+from tolstat.errors import StoreError
+from tolstat.store import checks, integrity
+from tolstat.store.counts import Counts
+from tolstat.store.frame import to_pandas
+from tolstat.store.histories import HistoryParts
+from tolstat.store.result_file import campaign_digest, fault, is_locked, open_hdf5, text
+from tolstat.tables import Status, Variant
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BLOCK = 1 << 16
+"""Rows that are looked at together: no table of a large campaign is needed whole to go on with it."""
+
+
+class Session(NamedTuple):
+    """A run under way: when it started (Unix time, s), and how many joints were done by then."""
+
+    started: float
+    done: int
+
+
+class Reader:
+    """What can be asked of an open result file; see `ResultStore`."""
+
+    def __init__(self, path: Path, file: h5py.File) -> None:
+        self.path = path
+        self._file = file
+        attrs = file.attrs
+        version = checks.check_schema(path, file)
+        self._checked = version >= checks.CHECKED_SINCE
+        self._read_judgement()
+        self.created = text(attrs, "created")
+        self.git_commit = text(attrs, "git_commit")
+        self.identity = checks.mapping(file, "identity")
+        self.columns = kept.columns(self.identity)
+        self.joint = checks.mapping(file, "joint")
+        self.options = checks.mapping(file, "options")
+        self.sampling = checks.mapping(file, "sampling")
+        self.fidelity = checks.mapping(file, "fidelity") if "fidelity" in attrs else {}
+        self.versions: dict[str, str] = checks.mapping(file, "versions")
+        self.retries: list[dict[str, Any]] = json.loads(text(attrs, "retries")) if self._checked else []
+        self.stop: dict[str, Any] = checks.mapping(file, "stop") if "stop" in attrs else {}
+        design = checks.mapping(file, "design")
+        self.case_names: tuple[str, ...] = tuple(design["cases"])
+        self.variants = tuple(Variant(**variant) for variant in design["variants"])
+        self.history_specs = checks.history_specs(file)
+        self.n = checks.check_tables(file, version)
+        first = checks.integer(file, "first_row", 0)
+        self.rows = range(first, first + self.n)
+        self.campaign_rows = checks.integer(file, "campaign_rows", self.n)
+        if self.rows.stop > self.campaign_rows:
+            raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
+        checks.check_histories(file, self.history_specs, self.n)
+        self._parts = HistoryParts(parts_folder(path), self.n, self.history_specs, campaign_digest(file))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    @property
+    def complete(self) -> bool:
+        """Whether no row is pending."""
+        return next(self.pending_blocks(), None) is None
+
+    @property
+    def whole(self) -> bool:
+        """Whether the file holds all rows of its campaign, and not a slice of them."""
+        return self.rows == range(self.campaign_rows)
+
+    def status(self, rows: slice = slice(None)) -> NDArray[np.uint8]:
+        """Status of the joints, (n,), or of a slice of them: that of damaged rows is PENDING.
+
+        Raises
+        ------
+        StoreError
+            When it is none that this version knows.
+        """
+        if self._file.mode != "r":
+            return self._status(rows)  # who writes has looked at all rows when he opened the file
+        first, last, _ = rows.indices(self.n)
+        blocks = (slice(begin, min(begin + BLOCK, last)) for begin in range(first, last, BLOCK))
+        return np.concatenate([np.empty(0, np.uint8), *map(self._status_if_intact, blocks)])
+
+    def damaged(self) -> NDArray[np.intp]:
+        """Rows of this file whose results are not as they were written, as after a torn write or a bad disk."""
+        found = [np.empty(0, np.intp)]
+        for first in range(0, self.n if self._checked else 0, BLOCK):
+            rows = slice(first, first + BLOCK)
+            done = self._status(rows) != Status.PENDING
+            if done.any():
+                found.append(first + np.flatnonzero(done & ~self._intact(rows, self._results(rows))))
+        return np.concatenate(found)
+
+    def counts(self) -> Counts:
+        """How far the campaign is."""
+        counts = Counts(self.n, 0, 0, 0)
+        for first in range(0, self.n, BLOCK):
+            counts = counts.after(self.status(slice(first, first + BLOCK)))
+        return counts
+
+    def session(self) -> Session | None:
+        """Tell of the run under way; None where there is none."""
+        if "session" not in self._file or not is_locked(self.path):
+            return None
+        started, done = np.asarray(self._file["session"][:])
+        return Session(float(started), int(done)) if started > 0 else None
+
+    def pending(self) -> NDArray[np.intp]:
+        """Rows of this file still to be simulated, ascending."""
+        return np.concatenate([np.empty(0, np.intp), *self.pending_blocks()])
+
+    def pending_blocks(self) -> Iterator[NDArray[np.intp]]:
+        """Rows of this file still to be simulated, ascending, in arrays of at most `BLOCK`; none is empty."""
+        for first in range(0, self.n, BLOCK):
+            found = np.flatnonzero(self.status(slice(first, first + BLOCK)) == Status.PENDING)
+            if found.size:
+                yield found + first
+
+    def design(self) -> NDArray[np.void]:
+        """Variant, case and group of every joint, (n,) table DESIGN.
+
+        Raises
+        ------
+        StoreError
+            When the study does not list its joints, or they are damaged.
+        """
+        if "design" not in self._file:
+            remedy = 'give the file of a study with sampling.method = "cases"'
+            raise fault(self.path, "has no list of cases and variants", remedy)
+        table = self._design(slice(None))
+        for name, end in (("variant", len(self.variants)), ("case", len(self.case_names))):
+            if table[name].min() < 0 or table[name].max() >= end:
+                remedy = "run the campaign again with another --out"
+                raise fault(self.path, f"is damaged: there are {end} of design/{name}", remedy)
+        self._check_errors(slice(None), self._errors(slice(None)), table)
+        return table
+
+    def errors(self, rows: slice = slice(None)) -> NDArray[np.void]:
+        """Errors of every joint, (n,) table ERROR, or of a slice of the rows of this file.
+
+        Raises
+        ------
+        StoreError
+            When they are damaged.
+        """
+        table = self._errors(rows)
+        self._check_errors(rows, table, self._design(rows) if "design" in self._file else None)
+        return table
+
+    def results(self, rows: slice = slice(None)) -> NDArray[np.void]:
+        """Results of every joint, (n,) table RESULT, or of a slice.
+
+        Those of a joint that is PENDING mean nothing; a joint whose row is damaged is PENDING. Columns that the
+        campaign does not keep are NaN.
+
+        Raises
+        ------
+        StoreError
+            When a status is none that this version knows.
+        """
+        table = self._results(rows)
+        if self._checked:
+            broken = (table["status"] == Status.PENDING) | ~self._intact(rows, table)
+            for field in tables.RESULT_FIELDS:
+                table[field.name][broken] = np.nan if np.dtype(field.dtype).kind == "f" else 0
+        self._check_status(table["status"])
+        return table
+
+    def attempt(self, rows: slice = slice(None)) -> NDArray[np.int32]:
+        """Which attempt gives the results of each joint, (n,): 0 is the study's, k is ``retries[k - 1]``."""
+        if not self._checked:
+            return np.zeros(self.n, np.int32)[rows]
+        return np.asarray(self.column("ledger", "attempt", rows))
+
+    def histories(self, name: str, rows: NDArray[np.intp] | None = None) -> NDArray[Any]:
+        """Load histories of one kind.
+
+        Parameters
+        ----------
+        name : str
+            One of `history_specs`.
+        rows : (m,) array of int, optional
+            Rows of this file to read; all without it.
+
+        Returns
+        -------
+        (m, ...) array
+            NaN for joints that are pending or have no results.
+
+        Raises
+        ------
+        StoreError
+            When the file holds no such histories, or those of joints that are done are gone.
+        """
+        if name not in self.history_specs:
+            held = ", ".join(self.history_specs) or "none"
+            remedy = 'set histories = "full" or "harmonics" in [output] of the study and run it anew'
+            raise fault(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
+        rows = np.arange(self.n) if rows is None else np.asarray(rows, dtype=np.intp)
+        if "histories" not in self._file:
+            done = self.status()[rows] != Status.PENDING  # asked first: histories are there before the status
+            try:
+                values = self._parts.read(name, rows, done)
+                self._check_history(name, rows, values, done)
+                return values
+            except StoreError:
+                if not self._reopen():
+                    raise
+        unique, back = np.unique(rows, return_inverse=True)
+        values = np.asarray(self.column("histories", name, unique))
+        self._check_history(name, unique, values, np.ones(len(unique), bool))
+        return values[back]
+
+    def to_pandas(self, units: bool = False) -> pd.DataFrame:
+        """Errors and results as one frame, a row per joint, none dropped.
+
+        Parameters
+        ----------
+        units : bool
+            Give the columns a second level with the SI unit.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``row``, that of the campaign; the errors' columns, then the results' kept; ``status`` as text. Before
+            them, where the study lists its joints, name of the case, index and family of the variant, and group.
+        """
+        return to_pandas(self, units)
+
+    def _read_judgement(self) -> None:
+        attrs = self._file.attrs
+        self.study_name = text(attrs, "study_name")
+        self.study_text = text(attrs, "study")
+        self.limits: dict[str, float] = json.loads(text(attrs, "limits"))
+
+    def _reopen(self) -> bool:
+        """Go over to the file that has taken this one's place with the histories in it; whether there is one."""
+        if self._file.mode != "r":
+            return False
+        file = open_hdf5(self.path, "r")
+        if "histories" not in file or campaign_digest(file) != self._parts.campaign:
+            file.close()
+            return False
+        self._file.close()
+        self._file = file
+        return True
+
+    def _status(self, rows: slice) -> NDArray[np.uint8]:
+        found = np.asarray(self.column("results", "status", rows))
+        self._check_status(found)
+        return found
+
+    def _status_if_intact(self, rows: slice) -> NDArray[np.uint8]:
+        found = self._status(rows)
+        return np.asarray(self.results(rows)["status"]) if found.any() else found  # PENDING is 0
+
+    def _check_status(self, found: NDArray[np.uint8]) -> None:
+        if found.size and found.max() > max(Status):
+            remedy = "run the campaign again with another --out"
+            raise fault(self.path, f"is damaged: a joint has the status {found.max()}", remedy)
+
+    def _design(self, rows: slice) -> NDArray[np.void]:
+        return self._read("design", tables.DESIGN_COLUMNS, tables.DESIGN, rows)
+
+    def _errors(self, rows: slice) -> NDArray[np.void]:
+        return self._read("errors", tables.ERROR_COLUMNS, tables.ERROR, rows)
+
+    def _results(self, rows: slice) -> NDArray[np.void]:
+        table = self._read("results", self.columns, tables.RESULT, rows)
+        kept.blank_others(table, self.columns)
+        return table
+
+    def _intact(self, rows: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:
+        """Whether rows are as they were written, (m,). Checksums are read last, as they are written last."""
+        attempt, errors, held = (self.column("ledger", c.name, rows) for c in tables.LEDGER_COLUMNS)
+        return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
+
+    def _check_errors(self, rows: slice, errors: NDArray[np.void], design: NDArray[np.void] | None) -> None:
+        if not self._checked:
+            return
+        first = self.rows.start + rows.indices(self.n)[0]
+        right = integrity.errors_hash(first, errors, design) == self.column("ledger", "errors_check", rows)
+        if not right.all():
+            found = f"is damaged: the errors of row {first + int(np.argmin(right))} are not as they were written"
+            remedy = "take a copy of it, or run the campaign again with another --out"
+            raise fault(self.path, found, remedy)
+
+    def _check_history(self, name: str, rows: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
+        if not self._checked:
+            return
+        held = self.column("ledger", f"{name}_check", slice(None))[rows[done]]
+        wrong = integrity.history_checks(values[done], rows[done] + self.rows.start) != held
+        if wrong.any():
+            found = f"is damaged: the history {name} of row {self.rows[rows[done][np.argmax(wrong)]]} is not as written"
+            raise fault(self.path, found, "take a copy of it, or run the campaign again with another --out")
+
+    def _read(self, group: str, columns: tuple[tables.Column, ...], dtype: Any, rows: slice) -> NDArray[np.void]:
+        first, last, _ = rows.indices(self.n)
+        table = np.zeros(max(0, last - first), dtype)
+        # The status comes first among the results: what it declares valid was written before it was.
+        for c in columns:
+            if c.name in self._file[group]:
+                c.of(table)[:] = self.column(group, c.name, slice(first, last))
+        return table
+
+    def attributes(self) -> dict[str, str | int]:
+        """All attributes of the file: texts, those with JSON unread, and whole numbers."""
+        attrs = self._file.attrs
+        return {
+            name: int(value) if isinstance(value, (int, np.integer)) else text(attrs, name)
+            for name, value in attrs.items()
+        }
+
+    def column(self, group: str, name: str, rows: Any) -> NDArray[Any]:
+        """Values of one dataset, at an index into its rows.
+
+        Raises
+        ------
+        StoreError
+            When it cannot be read.
+        """
+        try:
+            return np.asarray(self._file[group][name][rows])
+        except checks.DAMAGED as error:
+            if not self._file:
+                raise
+            remedy = "run the campaign again with another --out"
+            raise fault(self.path, f"is damaged: {group}/{name} cannot be read", remedy) from error
+
+
+def parts_folder(path: Path) -> Path:
+    """Folder of the histories of a campaign that is not complete yet."""
+    return path.with_name(path.name + ".parts")

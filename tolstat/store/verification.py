@@ -1,0 +1,102 @@
+"""The group ``verify`` of a result file: joints of the campaign, simulated again in other ways."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import kept, tables
+from tolstat.store.result_file import create_table, put_attributes, text
+
+if TYPE_CHECKING:
+    from tolstat.store.result_store import ResultStore
+
+GROUP = "verify"
+
+
+class Check(NamedTuple):
+    """One other way of simulating the joints.
+
+    Attributes
+    ----------
+    description : str
+        What is different, for the reader.
+    options : dict
+        Settings of the solver that were used.
+    results : ndarray of RESULT, shape (m,)
+        What came of it.
+    """
+
+    description: str
+    options: dict[str, Any]
+    results: NDArray[np.void]
+
+
+class Verification(NamedTuple):
+    """Some joints of a campaign, as they are in it and as other ways of simulating have them.
+
+    Attributes
+    ----------
+    seed : int
+        Seed by which they were chosen.
+    rows : ndarray, shape (m,)
+        Their rows in the campaign, ascending.
+    base : ndarray of RESULT, shape (m,)
+        Their results in the campaign.
+    checks : dict of str to Check
+        By name: ``half_step``, ``newton``, ``settling``, ``method``, ``reference``.
+    """
+
+    seed: int
+    rows: NDArray[np.intp]
+    base: NDArray[np.void]
+    checks: dict[str, Check]
+
+
+def read(store: ResultStore) -> Verification | None:
+    """Take the verification out of a result file; None where it holds none."""
+    file = store._file
+    if GROUP not in file:
+        return None
+    group = file[GROUP]
+    rows = np.asarray(group["rows"][:], np.intp)
+    checks = {}
+    for name in text(group.attrs, "checks").split():
+        table = np.empty(len(rows), tables.RESULT)
+        kept.blank_others(table, store.columns)
+        for c in store.columns:
+            c.of(table)[:] = group[name][c.name][:]
+        attrs = group[name].attrs
+        checks[name] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
+    base = np.concatenate([store.results(slice(row, row + 1)) for row in rows.tolist()])
+    return Verification(int(group.attrs["seed"]), rows, base, checks)
+
+
+def write(store: ResultStore, verification: Verification) -> None:
+    """Put a verification into a result file, in place of the one that it holds.
+
+    Raises
+    ------
+    StoreError
+        When there is no room for a second copy of the file.
+    """
+    store._replace(lambda file: _write(file, verification, store.columns))
+
+
+def _write(file: h5py.File, verification: Verification, columns: tuple[tables.Column, ...]) -> None:
+    if GROUP in file:
+        del file[GROUP]
+    group = file.create_group(GROUP)
+    put_attributes(group, {"seed": verification.seed, "checks": " ".join(verification.checks)})
+    rows = group.create_dataset("rows", data=verification.rows.astype("i8"))
+    rows.make_scale("rows")
+    put_attributes(rows, {"units": "1", "description": "rows of the joints in the campaign, counted from 0"})
+    for name, check in verification.checks.items():
+        create_table(group, name, columns, len(rows), [check.results], scale=rows)
+        put_attributes(
+            group[name], {"description": check.description, "options": json.dumps(check.options, allow_nan=False)}
+        )

@@ -1,0 +1,111 @@
+"""Other tolerances for the joints of a study: what ``--set`` on the command line means."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from tolstat.errors import Fault, InputError, gather
+from tolstat.schema import did_you_mean
+from tolstat.study import selection
+from tolstat.study.file import nominal_value
+from tolstat.study.study import Study
+from tolstat.study.tolerance_entry import Site
+from tolstat.study.tolerance_kinds import distribution
+from tolstat.tolerance import Distribution
+
+INSTEAD = {
+    **dict.fromkeys(("plus_minus",), ("lower", "upper", "iso2768", "nominal")),
+    **dict.fromkeys(("lower", "upper"), ("plus_minus", "iso2768", "nominal")),
+    **dict.fromkeys(("iso2768", "nominal"), ("plus_minus", "lower", "upper")),
+    "cpk": ("std", "sigma"),
+    "std": ("cpk",),
+    "sigma": ("cpk",),
+}
+"""Keys of a tolerance that a key takes the place of."""
+EXAMPLE = 'write --set "pin*.offset_t.plus_minus=0.05 mm"'
+
+
+class _Setting(NamedTuple):
+    pattern: str
+    key: str
+    value: Any
+    text: str
+
+
+def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
+    """Tolerances of a study with some keys set anew.
+
+    Parameters
+    ----------
+    study : Study
+        The study, whose tolerances stay as they are.
+    settings : sequence of str
+        ``"pin*.offset_t.plus_minus=0.05 mm"``: name or pattern of errors that the study scatters, key of their
+        tolerances, value as in TOML; quotes may be left out. Later ones win. A band given one way takes the place of
+        one given another way, and ``cpk`` that of ``std``.
+
+    Returns
+    -------
+    dict
+        Error name to distribution, of all errors that the study scatters.
+
+    Raises
+    ------
+    InputError
+        With every fault of the settings.
+    """
+    faults: list[Fault] = []
+    entries = _entries(study)
+    touched: dict[str, str] = {}
+    for text in settings:
+        with gather(faults):
+            setting = _parse(text)
+            names = selection.select(setting.pattern, study.tolerances)
+            if not names:
+                remedy = did_you_mean(setting.pattern, list(study.tolerances))
+                raise InputError([Fault(f"--set {text!r}", "selects no error that the study scatters", remedy)])
+            for name in names:
+                kept = {k: v for k, v in entries[name].items() if k not in INSTEAD.get(setting.key, ())}
+                entries[name] = kept | {setting.key: setting.value}
+                touched[name] = text
+    found = dict(study.tolerances)
+    units = selection.UNITS | selection.RADIAL_UNITS
+    told: set[tuple[str, ...]] = set()
+    for name, text in touched.items():
+        center = nominal_value(name, study.operation)
+        assert center is not None
+        site = Site(name, units[name], center, study.path.parent)
+        try:
+            found[name] = distribution(entries[name], site, f"--set {text!r}", ("tolerances", name))
+        except InputError as error:
+            key = (text, *(fault.found for fault in error.faults))
+            if key not in told:  # once for all errors of a pattern
+                faults.extend(error.faults)
+            told.add(key)
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _entries(study: Study) -> dict[str, dict[str, Any]]:
+    """Entry of each error that scatters, as the study's text has it."""
+    table = tomllib.loads(study.text).get("tolerances", {})
+    found: dict[str, dict[str, Any]] = {}
+    for entry in selection.entries(table, "tolerances"):
+        if isinstance(entry.value, Mapping):
+            found |= {name: dict(entry.value) for name in selection.select(entry.pattern, study.tolerances)}
+    return found
+
+
+def _parse(text: str) -> _Setting:
+    path, equals, value = text.partition("=")
+    pattern, dot, key = path.strip().rpartition(".")
+    if not (equals and dot and pattern and key and value.strip()):
+        raise InputError([Fault(f"--set {text!r}", "is no setting", EXAMPLE)])
+    try:
+        read = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        read = value.strip()
+    return _Setting(pattern, key, read, text)

@@ -1,0 +1,122 @@
+"""``[fatigue]``: what the cycles of the loads are judged by. It decides no number of a campaign, as limits do not."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from tolstat import schema, units
+from tolstat.errors import Fault, InputError, gather
+from tolstat.schema import Strict
+from tolstat.study.selection import Claims, Entry, entries, quantity, resolve
+from tolstat.tables import CHANNELS
+
+Positive = Annotated[units.Number, AfterValidator(units.positive)]
+Exponent = Annotated[units.Number, Field(ge=1, le=30)]
+
+
+class Settings(Strict):
+    """``[fatigue]`` without its lines.
+
+    Attributes
+    ----------
+    exponents : list of float
+        Wöhler exponents of the damage-equivalent loads.
+    revolutions : float
+        Service life, in revolutions of the input shaft.
+    reference_cycles : float
+        Cycles that the damage-equivalent loads are for.
+    line : dict
+        S–N lines by channel or pattern.
+    """
+
+    exponents: list[Exponent] = Field(default_factory=lambda: [3.0, 5.0, 10.0], min_length=1)
+    revolutions: Positive = 1e6
+    reference_cycles: Positive = 1e6
+    line: dict[str, Any] = Field(default_factory=dict)
+
+
+class LineEntry(Strict):
+    """One entry of ``[fatigue.line]``: N = N0 (S/S0)^-m, S a range."""
+
+    m: Exponent
+    S0: Any
+    N0: Positive
+
+
+@dataclass(frozen=True)
+class Fatigue:
+    """What cycles are judged by.
+
+    Attributes
+    ----------
+    exponents : tuple of float
+        Wöhler exponents of the damage-equivalent loads.
+    revolutions : float
+        Service life.
+    reference_cycles : float
+        Cycles that the damage-equivalent loads are for.
+    lines : dict
+        Name of a channel to (m, S0, N0) of its S–N line; S0 a range, N or N m.
+    """
+
+    exponents: tuple[float, ...] = (3.0, 5.0, 10.0)
+    revolutions: float = 1e6
+    reference_cycles: float = 1e6
+    lines: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+
+
+def read(table: object, place: str) -> Fatigue:
+    """Read ``[fatigue]``.
+
+    Parameters
+    ----------
+    table : object
+        The section as parsed.
+    place : str
+        File that faults name.
+
+    Raises
+    ------
+    InputError
+        With every fault.
+    """
+    settings = Settings()
+    lines: dict[str, tuple[float, float, float]] = {}
+    claims, faults = Claims(place), list[Fault]()
+    with gather(faults):
+        settings = schema.validate(Settings, table, place, prefix=("fatigue",))
+    written = table.get("line", {}) if isinstance(table, Mapping) else {}
+    for entry in entries(written if isinstance(written, Mapping) else {}, "fatigue", "line"):
+        with gather(faults):
+            names = resolve(entry, CHANNELS, place)
+            claims.claim(entry, names)
+            lines |= dict.fromkeys(names, _line(entry, CHANNELS[names[0]], place))
+    if faults:
+        raise InputError(faults)
+    return Fatigue(tuple(settings.exponents), settings.revolutions, settings.reference_cycles, lines)
+
+
+def of_text(text: str, place: str) -> Fatigue:
+    """Read ``[fatigue]`` of the text of a study; the defaults where it has none.
+
+    Raises
+    ------
+    InputError
+        With every fault.
+    """
+    return read(tomllib.loads(text).get("fatigue", {}), place)
+
+
+def _line(entry: Entry, unit: str, place: str) -> tuple[float, float, float]:
+    read = schema.validate(LineEntry, entry.value, place, prefix=entry.path)
+    where = (*entry.path, "S0")
+    size = quantity(Entry(entry.pattern, where, read.S0), unit, place)
+    if size <= 0:
+        found = f"{read.S0!r} is not positive"
+        raise InputError([Fault(f"{place}: {schema.dotted(where)}", found, "give a range above zero")])
+    return read.m, size, read.N0

@@ -65,12 +65,13 @@ def locate(pin, par, work):
         d = sub(point, centre)
         gap = axpy(-dot(d, axis), axis, d)
         rho = math.sqrt(dot(gap, gap))
-        n = scale(1 / rho, gap)
         displaced = rho > SMALLEST_RHO
+        n = scale(1 / where(displaced, rho, 1.0), gap)
         if not all_of(displaced):  # else any direction across the hole: no force acts
             across = cross(axis, direction)
             length = math.sqrt(dot(across, across))
-            across = choose(length > 0, scale(1 / length, across), cross(axis, (0.0, 0.0, 1.0)))
+            oblique = length > 0
+            across = choose(oblique, scale(1 / where(oblique, length, 1.0), across), cross(axis, (0.0, 0.0, 1.0)))
             n = choose(displaced, n, across)
         m = cross(axis, n)
         station = work.station[pin, j]

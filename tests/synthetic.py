@@ -43,16 +43,19 @@ def results(n, seed=8, failed=0, unsettled=0):
     return table
 
 
-STUDY = """
+HEAD = """
 [joint]
 base = "cirelli2021"
-
 [operation]
 alpha = "15 deg"
 speed = "500 rpm"
 torque = "100 N*m"
+"""
+"""The paper's joint at one operating point: how most studies of the tests begin."""
 
-[tolerances]
+STUDY = (
+    HEAD
+    + """[tolerances]
 "pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }
 
 [sampling]
@@ -65,17 +68,11 @@ seed = 2021
 "pin1.contact" = "800 N"
 "psi" = 0.01
 """
+)
 
-SWEEP = """
-[joint]
-base = "cirelli2021"
-
-[operation]
-alpha = "15 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-
-[errors]
+SWEEP = (
+    HEAD
+    + """[errors]
 pin1.tilt_z = "0.5 deg"
 
 [sampling]
@@ -84,6 +81,7 @@ method = "sweep"
 [sweep]
 "pin*.diameter" = { from = "-0.1 mm", to = "0.1 mm", points = 11 }
 """
+)
 
 
 def store(folder, text=STUDY, name="small", simulated=None, **kwargs):

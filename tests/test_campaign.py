@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from tests import fakes
+from tests.synthetic import HEAD
 from tolstat import campaign, execution, joint, progress, signals, simulation, tables
 from tolstat import study as studies
 from tolstat.errors import InputError, StoreError
@@ -322,14 +323,9 @@ def test_default_block(n: int, workers: int) -> None:
     assert size == 1 or n // size >= execution.BLOCKS_PER_WORKER * workers
 
 
-REAL_STUDY = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "15 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[solver]
+REAL_STUDY = (
+    HEAD
+    + """[solver]
 steps_per_rev = 60
 [tolerances]
 "pin*.offset_t" = { plus_minus = "0.05 mm", distribution = "normal", cpk = 1.0 }
@@ -340,6 +336,7 @@ seed = 3
 [output]
 histories = "KIND"
 """
+)
 
 
 @pytest.mark.parametrize("kind", ["full", "harmonics", "harmonics+cycles"])

@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests import fakes, synthetic
+from tests.synthetic import HEAD
 from tests.test_campaign import datasets
 from tolstat import campaign, cli, plan, precision, report, study
 from tolstat.analysis import exceedance, quantile
@@ -202,14 +203,9 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
     assert large.widths[0.1] == pytest.approx(2 * 1.96 * np.sqrt(0.09 / 1e6), rel=0.01)
 
 
-VARIANTS = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "15 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[solver]
+VARIANTS = (
+    HEAD
+    + """[solver]
 steps_per_rev = 45
 [sampling]
 method = "cases"
@@ -225,6 +221,7 @@ solver = { steps_per_rev = 90 }
 name = "larger clearance"
 joint.contact.D_P = "75.9 mm"
 """
+)
 
 
 def test_a_plan_simulates_variants_as_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,21 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from tests.synthetic import HEAD
 from tolstat import sampling, study
 from tolstat.errors import InputError
 from tolstat.study import Study
 from tolstat.tables import ERROR, ERROR_FIELDS
 
-HEAD = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "15 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[errors]
+BASE = (
+    HEAD
+    + """[errors]
 hole2.tilt_t = "0.2 deg"
 """
+)
 OFFSET = '"pin1.offset_t" = { plus_minus = "0.1 mm", distribution = "normal" }\n'
 DIAMETER = '"pin*.diameter" = { lower = "-0.02 mm", upper = "0 mm", distribution = "uniform" }\n'
 TORQUE = '"operation.torque" = { plus_minus = "30 N*m", distribution = "triangular" }\n'
@@ -43,7 +40,7 @@ def make(tmp_path_factory: pytest.TempPathFactory) -> Make:
 
     def made(*entries: str, method: str = "random", n: int = 64, seed: int = 1, more: str = "") -> Study:
         table = "[tolerances]\n" + "".join(entries)
-        text = f'{HEAD}{table}[sampling]\nmethod = "{method}"\nn = {n}\nseed = {seed}\n{more}'
+        text = f'{BASE}{table}[sampling]\nmethod = "{method}"\nn = {n}\nseed = {seed}\n{more}'
         path.write_text(text, encoding="utf-8")
         return study.load(path)
 
@@ -159,7 +156,7 @@ def test_radial_offset_has_rayleigh_radius_and_uniform_direction(make: Make) -> 
 
 def test_sweep_is_a_grid(make: Make, tmp_path: Path) -> None:
     text = (
-        HEAD + '[sampling]\nmethod = "sweep"\n[sweep]\n'
+        BASE + '[sampling]\nmethod = "sweep"\n[sweep]\n'
         '"pin*.diameter" = { from = "0.1 mm", to = "-0.1 mm", points = 3 }\n'
         '"operation.alpha" = { from = "0 deg", to = "10 deg", points = 2 }\n'
     )
@@ -210,10 +207,9 @@ def test_any_rows_of_a_sweep_and_of_a_list(tmp_path: Path) -> None:
         "cases": '[grid]\n"operation.alpha" = ["0 deg", "9 deg"]\n[[case]]\nname = "a"\nerrors = { "pin1.offset_e" = '
         '"0.1 mm" }\n[[case]]\nname = "b"\nerrors = { "pin2.tilt_t" = "1 deg" }\n',
     }
-    head = HEAD.partition("[errors]")[0]
     for method, body in bodies.items():
         path = tmp_path / f"{method}.toml"
-        path.write_text(f'{head}[sampling]\nmethod = "{method}"\n{body}', encoding="utf-8")
+        path.write_text(f'{HEAD}[sampling]\nmethod = "{method}"\n{body}', encoding="utf-8")
         s = study.load(path)
         whole = sampling.draw(s)
         assert len(np.unique(whole)) == s.rows

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from pydantic_core import PydanticCustomError
 
+from tests.synthetic import HEAD
 from tolstat import study, tables
 from tolstat.errors import InputError
 from tolstat.study import Study, load_case
@@ -61,17 +62,13 @@ histories = "harmonics"
 harmonics = 12
 """
 
-CASE = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "15 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[errors]
+CASE = (
+    HEAD
+    + """[errors]
 pin1.tilt_z = "0.5 deg"
 "pin2.diameter" = "-0.01 mm"
 """
+)
 
 
 def write(folder: Path, *changes: tuple[str, str], text: str = GOOD) -> Path:

@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests import fakes
+from tests.synthetic import HEAD
 from tolstat import campaign, cli, study
 from tolstat.errors import InputError
 from tolstat.execution import Execution
@@ -18,14 +19,9 @@ from tolstat.retry import parse
 from tolstat.store import ResultStore
 from tolstat.tables import FAILED, Status
 
-STUDY = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "15 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[solver]
+STUDY = (
+    HEAD
+    + """[solver]
 steps_per_rev = 60
 [sampling]
 method = "cases"
@@ -73,6 +69,7 @@ solver = { fidelity = "ideal" }
 name = "invalid_input"
 cases = ["beyond the largest number"]
 """
+)
 
 
 HERE = (Status.TIMEOUT, Status.CRASHED)

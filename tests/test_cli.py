@@ -24,7 +24,8 @@ from tolstat.tables import BUSHINGS, ERROR_COLUMNS, RESULT_COLUMNS, Simulation, 
 COMMANDS = (
     *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
     *("worst", "replay", "export", "fatigue", "report"),
-    *("capability", "causes", "reweight", "work-precision"),
+    *("capability", "causes", "reweight", "compare"),
+    "work-precision",
 )
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
 

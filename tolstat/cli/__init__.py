@@ -3,6 +3,7 @@
 from tolstat.cli import (
     capability,
     causes,
+    compare,
     export,
     extend,
     fatigue,
@@ -25,7 +26,8 @@ __all__ = ["app", "main"]
 COMMANDS = (
     *(simulate.simulate, plan.plan, run.run, extend.extend, merge.merge, status.status, verify.verify),
     *(worst.worst, replay.replay, export.export, fatigue.fatigue, report.report),
-    *(capability.capability, causes.causes, reweight.reweight, work_precision.work_precision),
+    *(capability.capability, causes.causes, reweight.reweight, compare.compare),
+    work_precision.work_precision,
 )
 for command in COMMANDS:
     app.command()(command)

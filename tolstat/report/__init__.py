@@ -7,7 +7,7 @@ gets its table, or the page of the paper's study when its cases are the paper's.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from tolstat import fidelity
 from tolstat.errors import Fault, InputError
@@ -15,9 +15,6 @@ from tolstat.files import writing
 from tolstat.report import text
 from tolstat.report.source import Campaign, read
 from tolstat.store import ResultStore
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 class Report(NamedTuple):
@@ -107,13 +104,13 @@ def _exceedance(campaign: Campaign, stem: Path) -> Report:
     if campaign.drawn:
         files = style.save(exceedance.figure(campaign), stem.with_name(f"{stem.name}_exceedance"))
     if campaign.listed:
-        files.append(_csv(exceedance.curves(campaign), stem, "exceedance"))
+        files.append(text.csv(exceedance.curves(campaign), stem, "exceedance"))
         quantiles = exceedance.quantiles(campaign)
-        files.append(_csv(quantiles, stem, "quantiles"))
+        files.append(text.csv(quantiles, stem, "quantiles"))
         table = text.quantiles(quantiles)
     if campaign.limits:
         limits = exceedance.limits(campaign)
-        files.append(_csv(limits, stem, "limits"))
+        files.append(text.csv(limits, stem, "limits"))
         table = text.limits(limits)
     return Report(table, f"{campaign.head()}\n{exceedance.note(campaign)}{_accuracy(campaign)}", files)
 
@@ -122,7 +119,7 @@ def _sweep(campaign: Campaign, stem: Path) -> Report:
     from tolstat.report import style, sweep
 
     files = style.save(sweep.figure(campaign), stem.with_name(f"{stem.name}_sweep")) if campaign.drawn else []
-    files.append(_csv(sweep.table(campaign), stem, "sweep"))
+    files.append(text.csv(sweep.table(campaign), stem, "sweep"))
     return Report(text.plain(sweep.worst(campaign)), f"{campaign.head()}{_accuracy(campaign)}", files)
 
 
@@ -136,7 +133,7 @@ def _cases(store: ResultStore, stem: Path) -> Report:
     from tolstat.report import cases, paper, paper_source
 
     full = cases.table(store)
-    files = [_csv(full, stem, "cases")]
+    files = [text.csv(full, stem, "cases")]
     counts = store.counts()
     notes = f"{counts.done} of {counts.total} joints, {counts.failed} failed, {counts.not_settled} not settled"
     if not paper_source.matching(store):
@@ -147,7 +144,7 @@ def _cases(store: ResultStore, stem: Path) -> Report:
     study = paper_source.read(store)
     page = stem.with_name(f"{stem.name}_paper.html")
     paper.write(study, page)
-    files = [page, _csv(paper.entries(study), stem, "tables"), *files]
+    files = [page, text.csv(paper.entries(study), stem, "tables"), *files]
     return Report(paper.summary(study), notes, files)
 
 
@@ -164,10 +161,3 @@ def _stopped(stop: dict[str, Any]) -> str:
         f"stopped by {stop['rule']} at {stop['joints']} joints; {stop['confidence']:.0%} interval corrected for "
         f"{len(stop['looks'])} looks: {stop['lower']:.5f} to {stop['upper']:.5f}. Intervals above are not corrected."
     )
-
-
-def _csv(frame: pd.DataFrame, stem: Path, what: str) -> Path:
-    path = stem.with_name(f"{stem.name}_{what}.csv")
-    with writing(path) as temporary:
-        frame.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
-    return path

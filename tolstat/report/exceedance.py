@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, quantile
@@ -192,7 +191,7 @@ def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: fl
     ax.set_xlim(low, high)
     n = max(int(table["n"][0]) for table in tables if table.size)
     floor = 0.5 / n
-    _share_axis(ax, floor)
+    style.share_axis(ax, floor)
     for i, table in enumerate(tables):
         if table.size:
             _steps(ax, table, i, low, floor)
@@ -203,14 +202,6 @@ def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: fl
         ends = [table["outer_upper"][-1] for table in tables if table.size]
         ax.axhline(max(ends), color=style.FAINT, lw=1.1, ls=ZERO_DASH, zorder=1.5)
     _limit_lines(ax, marked, unit)
-
-
-def _share_axis(ax: Axes, floor: float) -> None:
-    """Logarithmic axis in per cent, a little above 100 % so that a curve there can be seen."""
-    ax.set_yscale("log")
-    ax.set_ylim(floor, floor**-0.04)
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100.0 * y:g} %"))
-    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,6 +25,8 @@ FloatArray = NDArray[np.float64]
 METHODS = {"random": "random sampling", "sobol": "Sobol' points", "lhs": "Latin hypercube", "sweep": "sweep"}
 LOADS = tuple(f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT")
 """The loads that every report shows, where they are kept: force and torque of each bushing."""
+LOAD_FIELDS = ("status", "F_max", "T_max", "contact_max", "psi_max")
+"""Fields of the results that every load with a limit is read from, and the joints' status."""
 _ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 _DISPLAY = {
     "m": ("mm", 1e3),
@@ -120,9 +122,25 @@ class Campaign:
         return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
 
 
-def read(store: ResultStore) -> Campaign:
-    """Take from a result file what a report needs; row 0 goes apart where it is the nominal joint."""
-    errors, results = store.errors(), store.results()
+def read(store: ResultStore, fields: Sequence[str] | None = None, errors_of: Sequence[str] | None = None) -> Campaign:
+    """Take from a result file what a report needs; row 0 goes apart where it is the nominal joint.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The file.
+    fields : sequence of str, optional
+        Fields of the results to hold, ``status`` among them, such as `LOAD_FIELDS`; all without it. The tables of a
+        million joints take 1.2 GB when whole.
+    errors_of : sequence of str, optional
+        Columns of the errors to hold; all without it.
+
+    Returns
+    -------
+    Campaign
+        With tables of these fields.
+    """
+    errors, results = store.errors(fields=errors_of), store.results(fields=fields)
     nominal = results[:0]
     if store.sampling["nominal_first"] and store.rows.start == 0:
         nominal = results[:1][results["status"][:1] == Status.OK]

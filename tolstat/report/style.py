@@ -11,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from tolstat.files import writing
 
@@ -102,6 +103,14 @@ def note(ax: Axes, text: str, y: float) -> None:
         ha="right",
         fontsize=9,
     )
+
+
+def share_axis(ax: Axes, floor: float) -> None:
+    """Logarithmic axis in per cent from `floor` on, a little above 100 % so that a curve there can be seen."""
+    ax.set_yscale("log")
+    ax.set_ylim(floor, floor**-0.04)
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100.0 * y:g} %"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def legend(figure: Figure, handles: list[Artist], labels: list[str]) -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from tolstat.files import writing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,6 +99,14 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
         return None if isinstance(x, float) and not math.isfinite(x) else x
 
     return [{str(k): plain_number(v) for k, v in row.items()} for row in table.to_dict("records")]
+
+
+def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
+    """Write a frame as ``STEM_what.csv``; returns its path."""
+    path = stem.with_name(f"{stem.name}_{what}.csv")
+    with writing(path) as temporary:
+        table.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+    return path
 
 
 def align(rows: list[list[str]], text_last: bool = False) -> str:

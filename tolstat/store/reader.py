@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -159,29 +159,35 @@ class Reader:
         self._check_errors(slice(None), self._errors(slice(None)), table)
         return table
 
-    def errors(self, rows: slice = slice(None)) -> NDArray[np.void]:
+    def errors(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Errors of every joint, (n,) table ERROR, or of a slice of the rows of this file.
+
+        With `fields` the table has these only: all are read and checked, in blocks, and the others not held.
 
         Raises
         ------
         StoreError
             When they are damaged.
         """
+        if fields is not None:
+            return self._in_blocks(self.errors, rows, tables.ERROR, fields)
         table = self._errors(rows)
         self._check_errors(rows, table, self._design(rows) if "design" in self._file else None)
         return table
 
-    def results(self, rows: slice = slice(None)) -> NDArray[np.void]:
+    def results(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Results of every joint, (n,) table RESULT, or of a slice.
 
         Those of a joint that is PENDING mean nothing; a joint whose row is damaged is PENDING. Columns that the
-        campaign does not keep are NaN.
+        campaign does not keep are NaN. With `fields` the table has these only, as that of `errors`.
 
         Raises
         ------
         StoreError
             When a status is none that this version knows.
         """
+        if fields is not None:
+            return self._in_blocks(self.results, rows, tables.RESULT, fields)
         table = self._results(rows)
         if self._checked:
             broken = (table["status"] == Status.PENDING) | ~self._intact(rows, table)
@@ -317,6 +323,18 @@ class Reader:
         if wrong.any():
             found = f"is damaged: the history {name} of row {self.rows[rows[done][np.argmax(wrong)]]} is not as written"
             raise fault(self.path, found, "take a copy of it, or run the campaign again with another --out")
+
+    def _in_blocks(
+        self, read: Callable[[slice], NDArray[np.void]], rows: slice, dtype: np.dtype[np.void], fields: Sequence[str]
+    ) -> NDArray[np.void]:
+        """Some fields of a table that is read and checked whole, `BLOCK` rows at a time."""
+        first, last, _ = rows.indices(self.n)
+        table = np.empty(max(0, last - first), [(name, dtype[name]) for name in fields])
+        for begin in range(first, last, BLOCK) if fields else ():
+            block = read(slice(begin, min(begin + BLOCK, last)))
+            for name in fields:
+                table[name][begin - first : begin - first + len(block)] = block[name]
+        return table
 
     def _read(self, group: str, columns: tuple[tables.Column, ...], dtype: Any, rows: slice) -> NDArray[np.void]:
         first, last, _ = rows.indices(self.n)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tests import naive
+from tolstat.bench.dense import dense
 from tolstat.kernel import dynamics, linsolve, tangent
 from tolstat.kernel.motion import ideal_motion
-from tolstat.kernel.topology import ARM, ARM_OF_PIN, N_DOF, PIN, PSI
+from tolstat.kernel.topology import N_DOF, PSI
 from tolstat.kernel.work import make_work
 from tolstat.tables import Law, Mode, Options
 
@@ -103,23 +104,6 @@ def test_residual_of_the_acceleration_is_zero(params, random_errors):
     dynamics.acceleration(t, q, v, par, OPTIONS, work, a)
     dynamics.residual(t, q, v, a, par, OPTIONS, work, out)
     assert np.abs(out).max() < 1e-11 * np.abs(work.force).max()
-
-
-def dense(work):
-    """Tangent as one matrix."""
-    s = np.zeros((N_DOF, N_DOF))
-    s[:6, :6] = work.lump_block[0]
-    for p in range(4):
-        pin, arm = 6 * (PIN + p), 6 * (ARM + ARM_OF_PIN[p])
-        i, j = slice(pin, pin + 6), slice(arm, arm + 6)
-        s[i, i], s[j, j] = work.lump_block[PIN + p], work.lump_block[ARM + ARM_OF_PIN[p]]
-        s[:6, i], s[i, :6] = work.hub_pin[p], work.pin_hub[p]
-        s[i, j], s[j, i] = work.pin_arm[p], work.arm_pin[p]
-    for a in range(4):
-        rows = slice(6 * (ARM + a), 6 * (ARM + a) + 6)
-        s[rows, PSI], s[PSI, rows] = work.arm_psi[a], work.psi_arm[a]
-    s[PSI, PSI] = work.core[0, 6, 6]
-    return s
 
 
 @pytest.mark.parametrize("law", list(Law))

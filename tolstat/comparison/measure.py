@@ -199,7 +199,7 @@ def own_ladders(setup: Setup, options: Options) -> dict[str, tuple[Options, ...]
     return ladders
 
 
-def run(setup: Setup, base: Study, params: Params, tell: Callable[[str], None]) -> list[Run]:
+def run(setup: Setup, base: Study, params: Params, tell: Callable[[str], None], more: Sequence[Job] = ()) -> list[Run]:
     """Run all jobs in worker processes, one a core.
 
     The kernels are compiled before, in this process: two that compile at once could spoil the cache.
@@ -210,6 +210,8 @@ def run(setup: Setup, base: Study, params: Params, tell: Callable[[str], None]) 
         As for `jobs`.
     tell : callable
         Told now and then how far it is, and of jobs whose process died.
+    more : sequence of Job
+        Jobs beside those of the setup.
 
     Returns
     -------
@@ -218,7 +220,7 @@ def run(setup: Setup, base: Study, params: Params, tell: Callable[[str], None]) 
     """
     warm_up()
     prepare(first_order(params[:1], base.solver.options(), from_start=True))
-    todo = list(jobs(setup, base, params))
+    todo = [*jobs(setup, base, params), *more]
     places = {job.contender: place for place, job in enumerate(todo)}
     runs: list[Run] = []
     with closing(map_in_processes(Work(_work), todo, available_workers())) as finished:

@@ -232,6 +232,30 @@ def _pick(value, lane):
     return (lambda value, lane: _extract(value, lane)) if value == LANE else (lambda value, lane: value)
 
 
+def fma(a, b, c):
+    """Return a b + c, rounded once where it is compiled."""
+    return a * b + c
+
+
+@intrinsic
+def _fused(typingctx, a, b, c):
+    vector = LANE in (a, b, c)
+    name, ty, emitted = (f"v{WIDTH}f64", LANE, DOUBLES) if vector else ("f64", types.float64, ir.DoubleType())
+
+    def codegen(context, builder, sig, args):
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(emitted, [emitted] * 3), f"llvm.fma.{name}"
+        )
+        return builder.call(function, args)
+
+    return ty(ty, ty, ty), codegen
+
+
+@overload(fma)
+def _fma(a, b, c):
+    return lambda a, b, c: _fused(a, b, c)
+
+
 def where(condition, a, b):
     """`a` where the condition holds, else `b`; both are evaluated."""
     return a if condition else b

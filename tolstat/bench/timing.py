@@ -1,0 +1,58 @@
+"""CPU times of things done in turn: what else the machine does falls on all of them, so that ratios hold."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Times(NamedTuple):
+    """CPU times by name, each of the same rounds.
+
+    Attributes
+    ----------
+    seconds : dict of str to ndarray, shape (rounds,)
+        What each took, s.
+    """
+
+    seconds: dict[str, NDArray[np.float64]]
+
+    def typical(self, name: str) -> float:
+        """Median over the rounds, s."""
+        return float(np.median(self.seconds[name]))
+
+    def ratio(self, name: str, to: str) -> float:
+        """Median over the rounds of the ratio of two times."""
+        return float(np.median(self.seconds[name] / self.seconds[to]))
+
+
+def in_turn(
+    tasks: Mapping[str, Callable[[], object]], rounds: int, clock: Callable[[], float] = time.process_time
+) -> Times:
+    """Do all tasks one after the other, then all again; a round before that is not counted.
+
+    Parameters
+    ----------
+    tasks : dict of str to callable
+        What to time, by name.
+    rounds : int
+        How often.
+    clock : callable, optional
+        Seconds; CPU time of this process without it.
+
+    Returns
+    -------
+    Times
+    """
+    seconds = {name: np.empty(rounds) for name in tasks}
+    for count in range(-1, rounds):
+        for name, task in tasks.items():
+            begin = clock()
+            task()
+            if count >= 0:
+                seconds[name][count] = clock() - begin
+    return Times(seconds)

@@ -24,7 +24,7 @@ from tolstat.tables import BUSHINGS, ERROR_COLUMNS, RESULT_COLUMNS, Simulation, 
 COMMANDS = (
     *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
     *("worst", "replay", "export", "fatigue", "report"),
-    *("capability", "causes", "reweight", "compare"),
+    *("capability", "causes", "reweight", "compare", "allocate"),
     *("work-precision", "bench"),
 )
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}

@@ -10,9 +10,7 @@ and the number of joints: it is the first joints of the sequence that are looked
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,16 +18,14 @@ from tolstat import kept
 from tolstat.analysis import exceedance
 from tolstat.errors import Fault, InputError
 from tolstat.report.source import load
-from tolstat.schema import did_you_mean
 from tolstat.store import ResultStore
 from tolstat.store.reader import BLOCK
-from tolstat.study.selection import LIMIT_UNITS, Entry, quantity
+from tolstat.study import rule as rules
 
 if TYPE_CHECKING:
     from tolstat.study import Study
 
 CONFIDENCE = 0.95
-_RULE = re.compile(r"\s*P\s*\(\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>[^)]+?)\s*\)\s*width\s*<\s*(?P<width>\S+)\s*")
 EXAMPLE = 'write --until "P(cross1.F > 700 N) width < 0.01"'
 
 
@@ -108,25 +104,10 @@ def parse(text: str) -> Rule:
     InputError
         With every fault of it.
     """
-    found = _RULE.fullmatch(text)
-    if found is None:
-        raise InputError([Fault("--until", f"{text!r} is no rule", EXAMPLE)])
-    faults: list[Fault] = []
-    name, level, width = found["load"], math.nan, math.nan
-    if name not in LIMIT_UNITS:
-        faults.append(Fault("--until", f"{name!r} is not a load", did_you_mean(name, list(LIMIT_UNITS))))
-    else:
-        try:
-            level = quantity(Entry(name, (name,), found["level"]), LIMIT_UNITS[name], "--until")
-        except InputError as error:
-            faults += error.faults
-    with suppress(ValueError):
-        width = float(found["width"])
-    if not 0.0 < width < 1.0:
-        faults.append(Fault("--until", f"width {found['width']} does not lie between 0 and 1", EXAMPLE))
-    if faults:
-        raise InputError(faults)
-    return Rule(text.strip(), name, level, width)
+    said = rules.parse(text, "width", "--until", EXAMPLE)
+    if len(said.loads) > 1:
+        raise InputError([Fault("--until", f"{text!r} is a rule for {len(said.loads)} loads", EXAMPLE)])
+    return Rule(said.text, said.loads[0], said.level, said.bound)
 
 
 def looks(width: float, n: int) -> list[int]:

@@ -139,6 +139,33 @@ def _convert(quantity: Any, unit: str, value: str) -> float:
     return float(quantity.to(unit).magnitude)
 
 
+def written(value: float, unit: str, like: object, digits: int = 12) -> str | float:
+    """Write an SI value in the unit of another one, for a file: the inverse of `to_si`.
+
+    Parameters
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        SI unit.
+    like : object
+        Quantity that can be converted to `unit`, as a file has it, whose unit is taken.
+    digits : int
+        Significant digits to round to.
+
+    Returns
+    -------
+    str or float
+        ``"0.08 mm"``, or a number where `like` is one.
+    """
+    number, name = value, ""
+    if isinstance(like, str) and (found := _QUANTITY.fullmatch(like)) is not None:
+        name = found["unit"]
+        number = float(registry().Quantity(value, "" if unit == "1" else unit).to(_parsed(like).units).magnitude)
+    number = float(f"{number:.{digits}g}")
+    return f"{number!r} {name}" if name else number
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Annotation that makes a pydantic ``float`` field read a unit string.

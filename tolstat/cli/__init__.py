@@ -1,6 +1,7 @@
 """The command line: a file a command; what commands share is in `_app`. Help lists them in the order given here."""
 
 from tolstat.cli import (
+    allocate,
     bench,
     capability,
     causes,
@@ -27,7 +28,7 @@ __all__ = ["app", "main"]
 COMMANDS = (
     *(simulate.simulate, plan.plan, run.run, extend.extend, merge.merge, status.status, verify.verify),
     *(worst.worst, replay.replay, export.export, fatigue.fatigue, report.report),
-    *(capability.capability, causes.causes, reweight.reweight, compare.compare),
+    *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate),
     *(work_precision.work_precision, bench.bench),
 )
 for command in COMMANDS:

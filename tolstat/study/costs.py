@@ -1,0 +1,156 @@
+"""What a tolerance costs: a table of reciprocal powers, from TOML or CSV.
+
+A tolerance t costs c(t) = fixed + (cost - fixed) (at / t)^power. The power 1 is the reciprocal model of Chase and
+Greenwood (1988, Design issues in mechanical tolerance analysis), 2 that of Spotts (1973), any other Sutherland and
+Roth's (1975).
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field, model_validator
+
+from tolstat import schema, units
+from tolstat.errors import Fault, InputError, gather
+from tolstat.schema import Strict, refuse
+from tolstat.study import selection
+from tolstat.study.scaling import Tolerance
+from tolstat.study.tolerance_entry import Positive
+
+REACH = (0.25, 4.0)
+"""Least and largest factor on a tolerance that are looked at."""
+
+
+class CostEntry(Strict):
+    """Cost of the tolerance of one error.
+
+    Attributes
+    ----------
+    cost : float
+        Cost of the tolerance `at`, in any currency.
+    fixed : float
+        Part of it that does not depend on the tolerance.
+    at : float, optional
+        A tolerance (half a band), SI; that of the study without it.
+    power : float
+        Of the reciprocal.
+    least, most : float, optional
+        Tolerances that the process can hold, and that the function allows, SI.
+    keep : bool
+        Whether the tolerance stays as it is.
+    """
+
+    cost: Annotated[units.Number, Field(ge=0)] = 1.0
+    fixed: Annotated[units.Number, Field(ge=0)] = 0.0
+    at: Positive | None = None
+    power: Annotated[units.Number, Field(gt=0, le=10)] = 1.0
+    least: Positive | None = None
+    most: Positive | None = None
+    keep: Annotated[bool, Field(strict=True)] = False
+
+    @model_validator(mode="after")
+    def _in_order(self) -> CostEntry:
+        if self.fixed > self.cost:
+            raise refuse("fixed is more than cost", "give the fixed part of the cost")
+        if self.least is not None and self.most is not None and not self.least < self.most:
+            raise refuse("least is not below most", "give least < most")
+        return self
+
+
+class Cost(NamedTuple):
+    """Cost of one tolerance of the drawing by its factor: the sum over the errors it is for.
+
+    Attributes
+    ----------
+    width : float
+        The tolerance as it is, SI.
+    entries : tuple of CostEntry
+        One an error.
+    """
+
+    width: float
+    entries: tuple[CostEntry, ...]
+
+    def at(self, factor: float) -> float:
+        """Cost of the tolerance made `factor` times as wide."""
+        t = self.width * factor
+        return float(sum(e.fixed + (e.cost - e.fixed) * ((e.at or self.width) / t) ** e.power for e in self.entries))
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Least and largest factor that all of its errors allow, within `REACH`; (1, 1) where it is kept."""
+        if any(e.keep for e in self.entries):
+            return 1.0, 1.0
+        least = max([REACH[0], *(e.least / self.width for e in self.entries if e.least is not None)])
+        most = min([REACH[1], *(e.most / self.width for e in self.entries if e.most is not None)])
+        return min(least, 1.0), max(most, 1.0)
+
+
+def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
+    """Cost of each tolerance.
+
+    Parameters
+    ----------
+    tolerances : sequence of Tolerance
+        Of the study.
+    path : Path, optional
+        TOML file whose keys are names or patterns of errors and whose entries are `CostEntry`, or CSV file with a
+        column ``tolerance`` of such names and the entries' keys as further columns. Errors that it does not name are
+        kept as they are. Without a file each tolerance of the study costs 1 an error, made f times as wide 1 / f.
+
+    Returns
+    -------
+    list of Cost
+        In the order of `tolerances`.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    if path is None:
+        return [Cost(t.width, (CostEntry(),) * len(t.names)) for t in tolerances]
+    table = _read_csv(path) if path.suffix == ".csv" else schema.read_toml(path)
+    units_of = {name: t.site for t in tolerances for name in t.names}
+    found: dict[str, CostEntry] = {}
+    faults: list[Fault] = []
+    claims = selection.Claims(str(path))
+    known = {name: site.unit for name, site in units_of.items()}
+    for entry in selection.entries(table):
+        with gather(faults):
+            names = selection.resolve(entry, known, str(path))
+            claims.claim(entry, names)
+            context = {"site": units_of[names[0]]}
+            cost = schema.validate(CostEntry, entry.value, str(path), prefix=entry.path, context=context)
+            found |= dict.fromkeys(names, cost)
+    if faults:
+        raise InputError(faults)
+    kept = CostEntry(cost=0.0, keep=True)
+    return [Cost(t.width, tuple(found.get(name, kept) for name in t.names)) for t in tolerances]
+
+
+def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError([Fault(str(path), f"cannot be read: {error}", "give a TOML or CSV file")]) from error
+    if not rows or "tolerance" not in rows[0]:
+        raise InputError([Fault(str(path), "has no column tolerance", "head it: tolerance,cost,fixed,at,power")])
+    return {row.pop("tolerance"): {key: _value(cell) for key, cell in row.items() if cell} for row in rows}
+
+
+def _value(cell: str) -> object:
+    """Cell of a CSV file as TOML would have it."""
+    if cell in ("true", "false"):
+        return cell == "true"
+    try:
+        value = float(cell)
+    except ValueError:
+        return cell
+    return value if math.isfinite(value) else cell

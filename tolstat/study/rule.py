@@ -1,0 +1,82 @@
+"""Statements on a probability as they are written on the command line: ``"P(cross1.F > 700 N) < 0.001"``."""
+
+from __future__ import annotations
+
+import math
+import re
+from contextlib import suppress
+from typing import NamedTuple
+
+from tolstat.errors import Fault, InputError, gather
+from tolstat.schema import did_you_mean
+from tolstat.study.selection import LIMIT_UNITS, Entry, quantity, resolve
+
+_STATEMENT = re.compile(
+    r"\s*P\s*\(\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>[^)]+?)\s*\)\s*(?P<what>\w*)\s*<\s*(?P<bound>\S+)\s*"
+)
+
+
+class Statement(NamedTuple):
+    """P(load > level) is, or its interval is narrower than, something.
+
+    Attributes
+    ----------
+    text : str
+        As it was written.
+    loads : tuple of str
+        Names of the loads that the pattern selects; the statement is on the largest of them.
+    level : float
+        In SI units.
+    bound : float
+        Between 0 and 1.
+    """
+
+    text: str
+    loads: tuple[str, ...]
+    level: float
+    bound: float
+
+
+def parse(text: str, what: str, option: str, example: str) -> Statement:
+    """Read a statement.
+
+    Parameters
+    ----------
+    text : str
+        ``"P(cross*.F > 700 N) < 0.001"``.
+    what : str
+        Word before the ``<``; empty for the probability itself.
+    option : str
+        Option that faults name.
+    example : str
+        Remedy where it is no statement.
+
+    Returns
+    -------
+    Statement
+        What it says.
+
+    Raises
+    ------
+    InputError
+        With every fault of it.
+    """
+    found = _STATEMENT.fullmatch(text)
+    if found is None or found["what"] != what:
+        raise InputError([Fault(option, f"{text!r} is no rule", example)])
+    faults: list[Fault] = []
+    loads, level, bound = [], math.nan, math.nan
+    entry = Entry(found["load"], (found["load"],), found["level"])
+    with gather(faults):
+        if not set(entry.pattern) & set("*?[") and entry.pattern not in LIMIT_UNITS:
+            remedy = did_you_mean(entry.pattern, list(LIMIT_UNITS))
+            raise InputError([Fault(option, f"{entry.pattern!r} is not a load", remedy)])
+        loads = resolve(entry, LIMIT_UNITS, option)
+        level = quantity(entry, LIMIT_UNITS[loads[0]], option)
+    with suppress(ValueError):
+        bound = float(found["bound"])
+    if not 0.0 < bound < 1.0:
+        faults.append(Fault(option, f"{what} {found['bound']} does not lie between 0 and 1".strip(), example))
+    if faults:
+        raise InputError(faults)
+    return Statement(text.strip(), tuple(loads), level, bound)

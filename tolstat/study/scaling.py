@@ -1,0 +1,169 @@
+"""Wider and narrower tolerances: entries of ``[tolerances]`` by a factor, and the text of a study that has them."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from tolstat import tolerance, units
+from tolstat.errors import Fault, InputError
+from tolstat.study import selection
+from tolstat.study.study import Study
+from tolstat.study.tolerance_entry import Site
+from tolstat.study.tolerance_kinds import KINDS, RADIAL_KINDS, distribution
+from tolstat.tolerance import Distribution
+
+SCALED = ("normal", "uniform", "triangular", "beta", "rayleigh")
+"""Distributions whose band has a factor: those of measured parts, and of positive values, have none."""
+_WIDTHS = ("plus_minus", "std", "sigma")
+_EXAMPLE = 'write it in one line: "pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal" }'
+
+
+class Tolerance(NamedTuple):
+    """One entry of ``[tolerances]``, which is one tolerance on the drawing of all features that it selects.
+
+    Attributes
+    ----------
+    pattern : str
+        As the study writes it.
+    names : tuple of str
+        Errors that it selects.
+    entry : dict
+        Keys of the entry.
+    site : Site
+        Unit and middle of the errors.
+    width : float
+        The tolerance t, SI: half the band; of an entry without band 3 standard deviations.
+    """
+
+    pattern: str
+    names: tuple[str, ...]
+    entry: dict[str, Any]
+    site: Site
+    width: float
+
+    def scaled(self, factor: float, digits: int = 12) -> dict[str, Any]:
+        """Entry with the tolerance `factor` times as wide, about the middle of the band; Cpk stays as it is.
+
+        Parameters
+        ----------
+        factor : float
+            Above zero.
+        digits : int
+            Significant digits that lengths are rounded to.
+
+        Returns
+        -------
+        dict
+            Keys of the entry; a band after ISO 2768 becomes ``plus_minus``.
+        """
+        entry = dict(self.entry)
+        if "iso2768" in entry:
+            like = "1 deg" if self.site.unit == "rad" else "1 mm"
+            entry = {"plus_minus": units.written(self.width, self.site.unit, like)} | entry
+            del entry["iso2768"], entry["nominal"]
+        for key in _WIDTHS:
+            if key in entry:
+                value = factor * units.to_si(entry[key], self.site.unit)
+                entry[key] = units.written(value, self.site.unit, entry[key], digits)
+        ends = [key for key in ("lower", "upper") if key in entry]
+        if ends:
+            values = {key: units.to_si(entry[key], self.site.unit) for key in (*ends, "peak") if key in entry}
+            middle = 0.5 * (values["lower"] + values["upper"])
+            for key, value in values.items():
+                moved = middle + factor * (value - middle)
+                entry[key] = units.written(moved, self.site.unit, entry[key], digits + 1)
+        return entry
+
+    def distribution(self, entry: Mapping[str, Any]) -> Distribution:
+        """Distribution of each of the errors with another entry."""
+        return distribution(dict(entry), self.site, "scaled", ("tolerances", self.pattern))
+
+    @property
+    def widens(self) -> bool:
+        """Whether joints drawn with this tolerance can tell of a wider one: a band that rejects parts cannot."""
+        found = self.distribution(self.entry)
+        unbounded = isinstance(found, tolerance.Rayleigh) and found.upper is None
+        return isinstance(found, tolerance.Normal) or unbounded
+
+
+def tolerances(study: Study) -> list[Tolerance]:
+    """Entries of a study that have a factor and are not of the operating point or the material, in its order.
+
+    Correlated errors are left out: theirs are not free of each other.
+    """
+    found = []
+    table = tomllib.loads(study.text).get("tolerances", {})
+    known = selection.UNITS | selection.RADIAL_UNITS
+    for entry in selection.entries(table, "tolerances"):
+        names = tuple(selection.select(entry.pattern, study.tolerances))
+        own = names and not names[0].startswith(("operation.", "material."))
+        if own and entry.value["distribution"] in SCALED and not set(names) & set(study.copula.names):
+            site = Site(names[0], known[names[0]], 0.0, study.path.parent)
+            found.append(Tolerance(entry.pattern, names, dict(entry.value), site, width(entry.value, site)))
+    return found
+
+
+def width(entry: Mapping[str, Any], site: Site) -> float:
+    """Tolerance t of an entry, SI; see `Tolerance.width`."""
+    kinds = RADIAL_KINDS if site.name.endswith(".offset_radial") else KINDS
+    model: Any = kinds[entry["distribution"]].model_validate(dict(entry), context={"site": site})
+    half: float | None = model.half_width(site)
+    if half is None and getattr(model, "lower", None) is not None:
+        half = 0.5 * (model.upper - model.lower)
+    return half if half is not None else 3.0 * float(getattr(model, "std", None) or model.sigma)
+
+
+def line(pattern: str, entry: Mapping[str, Any]) -> str:
+    """Entry as a line of a study."""
+    keys = ", ".join(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items())
+    return f"{json.dumps(pattern)} = {{ {keys} }}"
+
+
+def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int) -> str:
+    """Text of a study with other entries and another seed, comments kept.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    entries : mapping
+        Pattern to keys of its entry.
+    seed : int
+        Of the sampling.
+
+    Returns
+    -------
+    str
+        TOML.
+
+    Raises
+    ------
+    InputError
+        When the text has an entry that is not one line.
+    """
+    lines = study.text.splitlines()
+    section = ""
+    for number, text in enumerate(lines):
+        header = re.match(r"\s*\[+\s*([\w.]+)\s*\]", text)
+        section = header[1] if header else section
+        key, equals, _ = text.partition("=")
+        if section == "tolerances" and equals and (pattern := key.strip().strip("\"'")) in entries:
+            lines[number] = line(pattern, entries[pattern])
+        if section == "sampling" and key.strip() == "seed":
+            lines[number] = f"seed = {seed}"
+    found = "\n".join(lines) + "\n"
+    if "seed" not in tomllib.loads(study.text).get("sampling", {}):
+        found = re.sub(r"(?m)^\s*\[sampling\].*$", rf"\g<0>\nseed = {seed}", found, count=1)
+    wanted = tomllib.loads(study.text)
+    wanted["sampling"]["seed"] = seed
+    wanted["tolerances"] = {e.pattern: entries.get(e.pattern, e.value) for e in selection.entries(wanted["tolerances"])}
+    got = tomllib.loads(found)
+    got["tolerances"] = {e.pattern: e.value for e in selection.entries(got["tolerances"])}
+    if got != wanted:
+        place = f"{study.name}.toml: tolerances"
+        raise InputError([Fault(place, "has an entry that is not one line: it cannot be changed in place", _EXAMPLE)])
+    return found

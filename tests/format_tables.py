@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from tolstat import tables
+from tolstat import origins, tables
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "result_format.md"
 
@@ -39,6 +39,7 @@ def updated(text: str) -> str:
     """`text` of the document with its tables made anew."""
     content = {
         "design": field_table(tables.DESIGN_COLUMNS),
+        **{f"origin {method}": field_table(origins.columns({"method": method})) for method in origins.FIELDS},
         "errors": field_table(tables.ERROR_COLUMNS),
         "results": field_table(tables.RESULT_COLUMNS),
         "ledger": field_table(tables.LEDGER_COLUMNS),

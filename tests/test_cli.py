@@ -49,9 +49,8 @@ def invented_campaign():
     """`campaign.run` with a stand-in for the solver."""
     from tolstat import joint, sampling
 
-    stages = campaign.Stages(
-        sampling.draw_blocks, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, fakes.warm_up
-    )
+    own = sampling.draw_blocks, sampling.dimensions, joint.perturb
+    stages = campaign.Stages(*own, lambda *_: {}, simulate, fakes.warm_up, sampling.origin_blocks)
     return partial(campaign.run, stages=stages)
 
 

@@ -177,6 +177,7 @@ def _own_stages() -> Stages:
         simulation.history_specs,
         simulation.simulate_rows,
         simulation.warm_up,
+        sampling.origin_blocks,
     )
 
 
@@ -194,7 +195,8 @@ def _create_or_resume(
         options = settings(study.solver, choice)
         histories = stages.history_specs(options, *_history_options(study))
         errors = stages.draw(study, rows)
-        return ResultStore.create(path, study, errors, histories, stages.dimensions(), rows, options, choice)
+        origin = stages.origins(study, rows)
+        return ResultStore.create(path, study, errors, histories, stages.dimensions(), rows, options, choice, origin)
     store = ResultStore.open(path, "r+")
     try:
         _check_same(store, study, rows)

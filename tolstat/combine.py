@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 
 from tolstat.campaign import differing_keys
 from tolstat.errors import Fault, InputError
+from tolstat.origins import columns
 from tolstat.recall import recall
-from tolstat.sampling import draw_blocks
+from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Counts, ResultStore
 from tolstat.store.assembly import Differing, assemble, check_free
 from tolstat.store.reader import BLOCK
@@ -26,6 +28,7 @@ CANNOT_GROW = {
     "lhs": "a Latin hypercube has as many strata as joints: further joints would change those that are there",
     "sweep": "a sweep has its number of joints from its points",
     "cases": "its joints are listed one by one",
+    "subset": "how many joints a subset simulation has is for its levels to decide",
 }
 
 
@@ -80,11 +83,11 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
         attrs["campaign_rows"] = study.rows
         attrs.pop("stop", None)
 
-        def errors() -> Iterator[NDArray[np.void]]:
-            yield from _error_blocks(store, 0)
-            yield from draw_blocks(study, range(store.n, study.rows))
-
-        assemble(path, attrs, study.rows, [store], errors(), overwrite=True)
+        more = range(store.n, study.rows)
+        errors = chain(_blocks(store, store.errors), draw_blocks(study, more))
+        new = origin_blocks(study, more)
+        origin = None if new is None else chain(_blocks(store, store.origin), new)
+        assemble(path, attrs, study.rows, [store], errors, overwrite=True, origin=origin)
         return study
 
 
@@ -120,9 +123,11 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         attrs = stores[0].attributes()
         attrs.pop("stop", None)
         design = np.concatenate([s.design()[a:] for s, a in _shares(stores)]) if stores[0].case_names else None
-        errors = (block for store, begin in _shares(stores) for block in _error_blocks(store, begin))
+        errors = (block for store, begin in _shares(stores) for block in _blocks(store, store.errors, begin))
+        origin = (block for store, begin in _shares(stores) for block in _blocks(store, store.origin, begin))
+        drawn = origin if columns(stores[0].sampling) else None
         try:
-            assemble(out, attrs, stores[0].campaign_rows, stores, errors, design)
+            assemble(out, attrs, stores[0].campaign_rows, stores, errors, design, origin=drawn)
         except Differing as error:
             holding = [str(store.path) for store in stores if error.row in store.rows]
             found = f"hold different results of row {error.row}: {error.column} differs"
@@ -201,6 +206,8 @@ def _shares(stores: Sequence[ResultStore]) -> Iterator[tuple[ResultStore, int]]:
             covered = store.rows.stop
 
 
-def _error_blocks(store: ResultStore, begin: int) -> Iterator[NDArray[np.void]]:
+def _blocks(
+    store: ResultStore, read: Callable[[slice], NDArray[np.void]], begin: int = 0
+) -> Iterator[NDArray[np.void]]:
     for first in range(begin, store.n, BLOCK):
-        yield store.errors(slice(first, first + BLOCK))
+        yield read(slice(first, first + BLOCK))

@@ -54,6 +54,9 @@ class Stages(NamedTuple):
     warm_up : callable
         Compiles what `simulate` needs. Done before there are workers: two processes that compile into one
         cache can crash. Then done in each of them, to load it.
+    origins : callable
+        Study, rows of the campaign (range) -> how they were drawn, tables one after the other, or None where the
+        sampling method has no such table (`origins.columns`).
     """
 
     draw: Callable[..., Iterable[NDArray[np.void]]]
@@ -62,6 +65,7 @@ class Stages(NamedTuple):
     history_specs: Callable[..., Mapping[str, HistorySpec]]
     simulate: Callable[..., Simulation]
     warm_up: Callable[[], object]
+    origins: Callable[..., Iterable[NDArray[np.void]] | None] = lambda *_: None
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tolstat import rainflow
 from tolstat.analysis.cycles import Cycles, mix
 from tolstat.errors import Fault, InputError, StoreError
+from tolstat.origins import check_counted
 from tolstat.schema import did_you_mean
 from tolstat.simulation import restore
 from tolstat.store import ResultStore
@@ -134,6 +135,7 @@ def read(paths: Sequence[str | Path], shares: Sequence[float] = (1.0,), names: S
     status = np.zeros(0, np.uint8)
     for path in paths:
         with ResultStore.open(path) as store:
+            check_counted(store.sampling, store.path)
             if store.sampling["method"] in ("cases", "sweep"):
                 remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
                 raise StoreError(str(Fault(str(path), "holds joints that are no sample of a production", remedy)))

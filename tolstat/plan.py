@@ -17,7 +17,7 @@ from tolstat.executor import available_workers
 from tolstat.joint import perturb
 from tolstat.recorded import perturbed, settings, variants
 from tolstat.report.source import load
-from tolstat.sampling import dimensions, draw
+from tolstat.sampling import dimensions, draw, origin_blocks
 from tolstat.simulation import history_specs, simulate_rows
 from tolstat.store.histories import attach_scales, create_dataset
 from tolstat.store.result_file import attributes, fill
@@ -200,8 +200,9 @@ def _file_bytes(
     specs = history_specs(options, study.output.histories, study.output.harmonics)
     n = len(errors)
     design = study.design[:n] if study.case_names else None
+    origin = origin_blocks(study, range(n))
     with h5py.File("pilot", "w", driver="core", backing_store=False, block_size=512) as file:
-        fill(file, attributes(study, specs, dimensions(), options, choice), range(n), [errors], design)
+        fill(file, attributes(study, specs, dimensions(), options, choice), range(n), [errors], design, origin)
         groups = [group for group in file.values() if isinstance(group, h5py.Group)]
         datasets = [file["row"], *(dataset for group in groups for dataset in group.values())]
         group = file.create_group("histories") if specs else file

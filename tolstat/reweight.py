@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from tolstat import sampling
-from tolstat.analysis import exceedance, reweight
+from tolstat.analysis import reweight
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
 from tolstat.errors import Fault, InputError, StoreError
@@ -91,12 +91,11 @@ def of_store(
     faults = [f for name in names for f in _unreachable(name, study.tolerances[name], new[name])]
     if faults:
         raise InputError(faults)
-    campaign = source.read(store)
-    done = campaign.results["status"] != Status.PENDING
-    results, errors = campaign.results[done], campaign.errors[done]
-    weights = reweight.smooth(_log_ratios(study, new, names, errors))
-    rows = [_row(campaign, results, weights, name, level, confidence) for name, level in campaign.limits.items()]
-    table = pd.DataFrame(rows) if rows else _quantiles(campaign, results, weights, confidence)
+    campaign = source.read(store, weighted=True).done()
+    logs = _log_ratios(study, new, names, campaign.errors)
+    weights = reweight.smooth(logs if campaign.weights is None else logs + np.log(campaign.weights))
+    rows = [_row(campaign, weights, name, level, confidence) for name, level in campaign.limits.items()]
+    table = pd.DataFrame(rows) if rows else _quantiles(campaign, weights, confidence)
     return Reweighted(weights, names, table)
 
 
@@ -142,38 +141,27 @@ def _log_ratios(
     return logs
 
 
-def _row(
-    campaign: source.Campaign,
-    results: np.ndarray[tuple[int], np.dtype[np.void]],
-    weights: Weights,
-    name: str,
-    level: float,
-    confidence: float,
-) -> dict[str, object]:
-    values, unit = source.load(results, name)
-    valid = (results["status"] == Status.OK) & np.isfinite(values)
+def _row(campaign: source.Campaign, weights: Weights, name: str, level: float, confidence: float) -> dict[str, object]:
+    values, unit = source.load(campaign.results, name)
+    valid = (campaign.results["status"] == Status.OK) & np.isfinite(values)
     found = reweight.share_above(values[valid], _part(weights, valid), level, confidence, campaign.iid)
     counted = weights.values[valid & (values > level)].sum()
-    before = exceedance.at(values, results["status"], level).estimate
+    before = campaign.above(values, level, confidence).estimate
     head = {"load": name, "unit": unit, "level": level, "before": before}
     bounds = {"bound_lower": counted, "bound_upper": counted + weights.values[~valid].sum()}
     return {**head, **found._asdict(), **bounds}
 
 
-def _quantiles(
-    campaign: source.Campaign,
-    results: np.ndarray[tuple[int], np.dtype[np.void]],
-    weights: Weights,
-    confidence: float,
-) -> pd.DataFrame:
+def _quantiles(campaign: source.Campaign, weights: Weights, confidence: float) -> pd.DataFrame:
     rows = []
     for name in source.LOADS:
-        values, unit = source.load(results, name)
-        valid = (results["status"] == Status.OK) & np.isfinite(values)
+        values, unit = source.load(campaign.results, name)
+        valid = (campaign.results["status"] == Status.OK) & np.isfinite(values)
         part = _part(weights, valid)
         for share in (0.5, 0.9, 0.99):
             found = reweight.quantile(values[valid], part, share, confidence, campaign.iid)
-            rows.append([name, unit, share, np.quantile(values[valid], share, method="inverted_cdf"), *found, part.ess])
+            before = campaign.quantile(values, share, confidence).estimate
+            rows.append([name, unit, share, before, *found, part.ess])
     return pd.DataFrame(rows, columns=["load", "unit", "share", "before", "estimate", "lower", "upper", "ess"])
 
 

@@ -12,11 +12,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
 
+from tolstat import origins
 from tolstat.joint import nominal_errors
 from tolstat.study import Study
 from tolstat.study.design import Design, sobol
 from tolstat.study.model import SweepAxis
+from tolstat.study.proposal import component, weights
 from tolstat.study.selection import columns_of
 from tolstat.tables import ERROR_FIELDS
 
@@ -70,6 +73,24 @@ def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
         yield draw(study, range(first, min(first + size, rows.stop)))
 
 
+def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
+    """How `rows` of a study are drawn, as tables of at most `BLOCK` rows; None where `origins` has no such table."""
+    if study.sampling.method != "importance":
+        return None
+    blocks = range(rows.start, rows.stop, BLOCK)
+    return (_origin(study, range(first, min(first + BLOCK, rows.stop))) for first in blocks)
+
+
+def _origin(study: Study, rows: range) -> Table:
+    table = np.zeros(len(rows), origins.IMPORTANCE)
+    table["component"] = -1  # the nominal joint
+    drawn = table[max(0, int(study.sampling.nominal_first) - rows.start) :]
+    last = rows.stop - int(study.sampling.nominal_first)
+    scores, drawn["component"] = _proposed(study, _columns(study), range(last - drawn.size, last))
+    drawn["weight"] = weights(study.proposals, scores)
+    return table
+
+
 def values(errors: Table, name: str) -> Array:
     """Values that the distribution of an error gave, (n,), SI: for ``pin1.offset_radial`` the radii."""
     columns = columns_of(name)
@@ -106,9 +127,16 @@ def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
                 samples[name][index == number] = value
 
 
+def _columns(study: Study) -> list[str]:
+    """Columns of the errors that scatter."""
+    return list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
+
+
 def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
-    columns = list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
-    u = _uniforms(columns, numbers, study)
+    u = _uniforms(_columns(study), numbers, study)
+    if study.proposals:
+        scores, part = _proposed(study, list(u), numbers)
+        u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
     names = study.copula.names
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))
@@ -133,6 +161,26 @@ def _uniforms(names: Sequence[str], numbers: range, study: Study) -> dict[str, A
         return {name: _stratified(study.samples, _stream(seed, f"lhs {name}"))[here] for name in names}
     # a stream may give 0 itself, once in 2^53 draws
     return {name: np.maximum(_stream(seed, name, first).random(n), 2.0**-54) for name in names}
+
+
+def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[str, Array], NDArray[np.intp]]:
+    """Standard normal scores of the samples `numbers`, and the part of the mixture that each was drawn from.
+
+    Joint i of the tolerances' part is joint i of the random campaign.
+    """
+    part = component(study.proposals, _stream(study.sampling.seed, "proposal", numbers.start).random(len(numbers)))
+    scores = {name: ndtri(u) for name, u in _uniforms(names, numbers, study).items()}
+    for number, proposal in enumerate(study.proposals, 1):
+        here = part == number
+        for name, (mean, deviation) in proposal.scores.items():
+            scores[name][here] = mean + deviation * scores[name][here]
+    return scores, part
+
+
+def _probability(scores: Array) -> Array:
+    """Probabilities in (0, 1) of standard normal scores; what is beyond those of double precision is at its end."""
+    found: Array = np.clip(ndtr(scores), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+    return found
 
 
 def _stream(seed: int, name: str, first: int = 0) -> np.random.Generator:

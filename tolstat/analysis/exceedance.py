@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.tables import UNSETTLED, Status
 
 FloatArray = NDArray[np.float64]
+Table = NDArray[np.void]
 
 
 @dataclass(frozen=True)

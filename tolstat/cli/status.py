@@ -80,11 +80,14 @@ def _exceedance(
     store: ResultStore, states: NDArray[np.uint8], name: str, values: NDArray[np.float64], unit: str
 ) -> dict[str, Any]:
     """Share of the joints above a limit so far; None for what cannot be said."""
-    from tolstat.analysis import exceedance
+    from tolstat.analysis import exceedance, weighted
 
     counting = slice(int(store.sampling["nominal_first"] and store.rows.start == 0), None)
     level, iid = store.limits[name], store.sampling["method"] == "random"
-    share = exceedance.at(values[counting], states[counting], level, 0.95, iid)
+    if store.sampling["method"] == "importance":
+        share = weighted.at(values[counting], states[counting], store.origin()["weight"][counting], level)
+    else:
+        share = exceedance.at(values[counting], states[counting], level, 0.95, iid)
     numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
     rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}
     return {"load": name, "limit": level, "unit": unit, **rounded}

@@ -82,7 +82,7 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
             stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
                 return _noted(_cases(store, stem), stands_on)
-            campaign = read(store)
+            campaign = read(store, weighted=True)
             stop = _stopped(store.stop) if store.stop else ""
         report = _sweep(campaign, stem) if campaign.method == "sweep" else _exceedance(campaign, stem)
         for note in (campaign.missing(), stop, stands_on):

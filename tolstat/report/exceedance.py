@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance, quantile
+from tolstat.analysis import exceedance, weighted
 from tolstat.analysis.accuracy import KIND_OF, KINDS, OBSERVABLES, sizes
 from tolstat.report import accuracy, style
 from tolstat.report.source import Campaign, load
@@ -48,7 +48,7 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
     numerical = accuracy.usual(campaign.verification) if campaign.verification else {}
     for name, level in campaign.limits.items():
         values, unit = load(campaign.results, name)
-        share = exceedance.at(values, campaign.results["status"], level, confidence, campaign.iid)
+        share = campaign.above(values, level, confidence)
         head = {"load": name, "unit": unit, "nominal": _nominal(campaign, name)}
         budget = _budget(campaign, name, level, confidence, numerical)
         rows.append({**head, **asdict(share), "confidence": confidence, **budget})
@@ -71,10 +71,9 @@ def _budget(
     error = numerical.get(kind, np.nan)
     values = load(campaign.results, name)[0]
     shift = error * sizes(campaign.results)[:, OBSERVABLES.index(name)]
-    status = campaign.results["status"]
     if np.isnan(error):
         return {"numerical_error": error} | dict.fromkeys(BUDGET, np.nan)
-    low, high = (exceedance.at(values + s, status, level, confidence, campaign.iid) for s in (-shift, shift))
+    low, high = (campaign.above(values + s, level, confidence) for s in (-shift, shift))
     bounds = (low.estimate, high.estimate, low.outer_lower, high.outer_upper)
     return {"numerical_error": error, **dict(zip(BUDGET, bounds, strict=True))}
 
@@ -92,7 +91,7 @@ def quantiles(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
     for name in campaign.listed:
         values, unit = load(campaign.results, name)
         for share in SHARES:
-            q = quantile.at(values, campaign.results["status"], share, confidence, campaign.iid)
+            q = campaign.quantile(values, share, confidence)
             head = {"load": name, "unit": unit, "nominal": _nominal(campaign, name)}
             rows.append({**head, **q._asdict(), "confidence": confidence})
     return pd.DataFrame(rows)
@@ -119,13 +118,30 @@ def curves(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
 
 def note(campaign: Campaign) -> str:
     """Sentence on what the intervals cover."""
-    if campaign.iid:
+    if campaign.weights is not None:
+        text = (
+            "joints counted by their weights; bands: pointwise 95 % Clopper–Pearson intervals of as many equal joints "
+            f"as would be as sure{_distrust(campaign)}"
+        )
+    elif campaign.iid:
         text = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
     else:
         text = "no intervals: Clopper–Pearson holds for independent samples only"
     if campaign.count(Status.OK) + campaign.count(Status.PENDING) < len(campaign.results):
         text += "; light bands: with the others counted below and above every x"
     return text
+
+
+def _distrust(campaign: Campaign) -> str:
+    """Words on the limits above which too few joints of weight are seen for the share to be trusted."""
+    poor = []
+    weights = np.ones(len(campaign.results)) if campaign.weights is None else campaign.weights
+    for name, level in campaign.limits.items():
+        values, status = load(campaign.results, name)[0], campaign.results["status"]
+        found = weighted.trust(values, status, weights, level)
+        if not found.usable:
+            poor.append(f"{name} ({found.effective:.0f} effective joints above, Pareto k {found.k:.2f})")
+    return f"; not to be trusted, needs more joints or other proposals: {', '.join(poor)}" if poor else ""
 
 
 def figure(campaign: Campaign, confidence: float = 0.95) -> Figure:
@@ -159,14 +175,13 @@ def _nominal(campaign: Campaign, name: str) -> float:
 def _curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple[NDArray[np.void], str]:
     """Step curve of a load, thinned to `most` levels: every one at the highest loads, evenly spread below."""
     values, unit = load(campaign.results, name)
-    status = campaign.results["status"]
-    levels = np.unique(exceedance.sort_out(values, status).valid)
+    levels = np.unique(exceedance.sort_out(values, campaign.results["status"]).valid)
     if levels.size > most:
         top = levels.size - np.geomspace(1, levels.size, most // 2).round().astype(int)
         even = np.linspace(0, levels.size - 1, most // 2).round().astype(int)
         levels = levels[np.union1d(top, even)]
     below = np.nextafter(levels[:1], -np.inf)  # where every valid joint is above
-    return exceedance.curve(values, status, np.concatenate([below, levels]), confidence, campaign.iid), unit
+    return campaign.curve(values, np.concatenate([below, levels]), confidence), unit
 
 
 def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: float) -> None:
@@ -189,8 +204,7 @@ def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: fl
     marked = _limit_levels(campaign, group, letter)
     low, high = _range(levels, list(marked))
     ax.set_xlim(low, high)
-    n = max(int(table["n"][0]) for table in tables if table.size)
-    floor = 0.5 / n
+    floor = 0.5 * min(_least(campaign, table) for table in tables if table.size)
     style.share_axis(ax, floor)
     for i, table in enumerate(tables):
         if table.size:
@@ -202,6 +216,12 @@ def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: fl
         ends = [table["outer_upper"][-1] for table in tables if table.size]
         ax.axhline(max(ends), color=style.FAINT, lw=1.1, ls=ZERO_DASH, zorder=1.5)
     _limit_lines(ax, marked, unit)
+
+
+def _least(campaign: Campaign, table: NDArray[np.void]) -> float:
+    """Least share that a curve can show: one joint, or what the joints with weights come down to."""
+    shares = table["estimate"][table["estimate"] > 0]
+    return 1.0 / float(table["n"][0]) if campaign.weights is None else float(shares.min(initial=1.0))
 
 
 def _range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, float]:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tolstat import kept
+from tolstat.analysis import exceedance, quantile, weighted
+from tolstat.analysis.exceedance import Exceedance
+from tolstat.analysis.quantile import Quantile
 from tolstat.errors import Fault, InputError
+from tolstat.origins import check_counted
 from tolstat.store import verification
 from tolstat.store.verification import Verification
 from tolstat.study.selection import LIMIT_UNITS
@@ -22,7 +26,13 @@ if TYPE_CHECKING:
     from tolstat.store import ResultStore
 
 FloatArray = NDArray[np.float64]
-METHODS = {"random": "random sampling", "sobol": "Sobol' points", "lhs": "Latin hypercube", "sweep": "sweep"}
+METHODS = {
+    "random": "random sampling",
+    "sobol": "Sobol' points",
+    "lhs": "Latin hypercube",
+    "sweep": "sweep",
+    "importance": "importance sampling",
+}
 LOADS = tuple(f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT")
 """The loads that every report shows, where they are kept: force and torque of each bushing."""
 LOAD_FIELDS = ("status", "F_max", "T_max", "contact_max", "psi_max")
@@ -77,6 +87,8 @@ class Campaign:
         Some of the joints simulated in other ways, where the file holds that.
     columns : tuple of Column
         Columns of the results that the study keeps; the others are NaN.
+    weights : ndarray, shape (n,), optional
+        What each joint counts for, where joints were not drawn from the tolerances alone.
     """
 
     name: str
@@ -88,6 +100,31 @@ class Campaign:
     patterns: tuple[str, ...] = ()
     verification: Verification | None = None
     columns: tuple[Column, ...] = RESULT_COLUMNS
+    weights: FloatArray | None = None
+
+    def curve(self, values: FloatArray, levels: ArrayLike | None, confidence: float) -> NDArray[np.void]:
+        """Share of the joints above each level, see `exceedance.curve`, each joint counted by its weight."""
+        status = self.results["status"]
+        if self.weights is None:
+            return exceedance.curve(values, status, levels, confidence, self.iid)
+        return weighted.curve(values, status, self.weights, levels, confidence)
+
+    def above(self, values: FloatArray, level: float, confidence: float) -> Exceedance:
+        """Share of the joints above one level; see `curve`."""
+        return Exceedance(*self.curve(values, [level], confidence)[0].tolist())
+
+    def quantile(self, values: FloatArray, share: float, confidence: float) -> Quantile:
+        """Load that a share of the joints stays at or below, see `quantile.at`, each joint counted by its weight."""
+        status = self.results["status"]
+        if self.weights is None:
+            return quantile.at(values, status, share, confidence, self.iid)
+        return weighted.quantile(values, status, self.weights, share, confidence)
+
+    def done(self) -> Campaign:
+        """The same without the joints that are still pending."""
+        here = self.results["status"] != Status.PENDING
+        weights = None if self.weights is None else self.weights[here]
+        return replace(self, errors=self.errors[here], results=self.results[here], weights=weights)
 
     @property
     def drawn(self) -> tuple[str, ...]:
@@ -102,7 +139,7 @@ class Campaign:
     @property
     def iid(self) -> bool:
         """Whether the joints are independent samples."""
-        return self.method == "random"
+        return self.method in ("random", "importance")
 
     def count(self, *states: Status) -> int:
         """Joints in any of the given states."""
@@ -122,7 +159,12 @@ class Campaign:
         return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
 
 
-def read(store: ResultStore, fields: Sequence[str] | None = None, errors_of: Sequence[str] | None = None) -> Campaign:
+def read(
+    store: ResultStore,
+    fields: Sequence[str] | None = None,
+    errors_of: Sequence[str] | None = None,
+    weighted: bool = False,
+) -> Campaign:
     """Take from a result file what a report needs; row 0 goes apart where it is the nominal joint.
 
     Parameters
@@ -134,17 +176,27 @@ def read(store: ResultStore, fields: Sequence[str] | None = None, errors_of: Seq
         million joints take 1.2 GB when whole.
     errors_of : sequence of str, optional
         Columns of the errors to hold; all without it.
+    weighted : bool
+        Whether the caller counts joints by their `Campaign.weights`; others would be wrong on joints that were not
+        drawn from the tolerances alone.
 
     Returns
     -------
     Campaign
         With tables of these fields.
+
+    Raises
+    ------
+    StoreError
+        When the joints count differently, and the caller does not go by that.
     """
+    check_counted(store.sampling, store.path, weighted)
     errors, results = store.errors(fields=errors_of), store.results(fields=fields)
-    nominal = results[:0]
+    nominal, weights = results[:0], store.origin()["weight"] if store.sampling["method"] == "importance" else None
     if store.sampling["nominal_first"] and store.rows.start == 0:
         nominal = results[:1][results["status"][:1] == Status.OK]
         errors, results = errors[1:], results[1:]
+        weights = None if weights is None else weights[1:]
     patterns = tuple(_patterns(tomllib.loads(store.study_text).get("sweep", {})))
     method = str(store.sampling["method"])
     return Campaign(
@@ -157,6 +209,7 @@ def read(store: ResultStore, fields: Sequence[str] | None = None, errors_of: Seq
         patterns,
         verification.read(store),
         store.columns,
+        weights,
     )
 
 

@@ -41,6 +41,7 @@ def assemble(
     errors: Iterable[NDArray[np.void]],
     design: NDArray[np.void] | None = None,
     overwrite: bool = False,
+    origin: Iterable[NDArray[np.void]] | None = None,
 ) -> None:
     """Make the file of a whole campaign from files of its rows.
 
@@ -61,6 +62,8 @@ def assemble(
     overwrite : bool
         Whether a file at `path` is replaced. Histories then go beside it, since rows are still pending; otherwise
         into it, and every row must be done.
+    origin : iterable of tables, optional
+        How all rows were drawn, block after block, for methods that have `origins.columns`.
 
     Raises
     ------
@@ -71,7 +74,7 @@ def assemble(
     """
     try:
         with writing(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
-            fill(file, attrs, range(n), errors, design)
+            fill(file, attrs, range(n), errors, design, origin)
             for source in sources:
                 _copy_results(file, source)
             if overwrite:

@@ -16,7 +16,7 @@ import numpy as np
 
 from tolstat import kept, tables
 from tolstat.store import integrity
-from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, fault, text
+from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, descriptions, fault, text
 from tolstat.tables import HistorySpec
 
 DAMAGED = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
@@ -134,8 +134,7 @@ def check_tables(file: h5py.File, version: int) -> int:
     if version >= CHECKED_SINCE:
         histories = tuple(check_column(name) for name in mapping(file, "histories"))
         groups["ledger"] = (*tables.LEDGER_COLUMNS, *histories)
-    if "design" in file:
-        groups["design"] = tables.DESIGN_COLUMNS
+    groups |= {name: columns for name, (columns, _) in descriptions(file).items()}
     for group, columns in groups.items():
         for c in columns:
             if version < SCHEMA_VERSION and c.name not in file[group]:

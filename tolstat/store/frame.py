@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import tables
+from tolstat import origins, tables
 from tolstat.tables import Status
 
 if TYPE_CHECKING:
@@ -24,6 +24,10 @@ def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
 
     errors, results = store.errors(), store.results()
     data: dict[tuple[str, str], NDArray[Any]] = _design(store) if store.case_names else {}
+    drawn = origins.columns(store.sampling)
+    if drawn:
+        origin = store.origin()
+        data |= {(c.name, c.unit): c.of(origin) for c in drawn}
     data |= {(c.name, c.unit): c.of(errors) for c in tables.ERROR_COLUMNS}
     data |= {(c.name, c.unit): c.of(results) for c in store.columns}
     if store.retries:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
+from collections.abc import Sequence
 from typing import Any
 
 import h5py
@@ -23,6 +24,8 @@ from numpy.typing import NDArray
 from tolstat import tables
 
 Hash = NDArray[np.uint64]
+Described = tuple[tuple[tables.Column, ...], NDArray[np.void]]
+"""A table and its columns."""
 
 FACTOR = np.uint64(0x9E3779B97F4A7C15)
 """2^64 over the golden ratio, odd (Knuth 1998, The Art of Computer Programming 3, 6.4)."""
@@ -31,7 +34,7 @@ DIGEST = "digest"
 """Name of the attribute that holds the checksum of the others."""
 
 
-def errors_hash(first_row: int, errors: NDArray[np.void], design: NDArray[np.void] | None) -> Hash:
+def errors_hash(first_row: int, errors: NDArray[np.void], described: Sequence[Described] = ()) -> Hash:
     """Checksum of the errors of each row, and of what joint it is, (m,).
 
     Parameters
@@ -40,12 +43,12 @@ def errors_hash(first_row: int, errors: NDArray[np.void], design: NDArray[np.voi
         Row of the campaign that the first one is.
     errors : (m,) table ERROR
         Errors.
-    design : (m,) table DESIGN, optional
-        For a study that lists its joints.
+    described : sequence of (columns, (m,) table)
+        What else the file says of each joint, see `result_file.described`.
     """
     state = np.arange(first_row + 1, first_row + 1 + len(errors), dtype=np.uint64)
-    if design is not None:
-        _fold(state, tables.DESIGN_COLUMNS, design)
+    for columns, table in described:
+        _fold(state, columns, table)
     _fold(state, tables.ERROR_COLUMNS, errors)
     return state
 

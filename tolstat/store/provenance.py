@@ -13,7 +13,7 @@ import tolstat
 LIBRARIES = ("numpy", "numba", "scipy", "h5py")
 DECIDING = (
     *("kernel", "joint", "tables.py", "simulation.py", "rainflow.py", "sampling.py", "tolerance.py"),
-    *("study/correlation.py", "study/design.py"),
+    *("study/correlation.py", "study/design.py", "study/proposal.py"),
 )
 """Modules that decide the numbers of a campaign, given what its identity holds."""
 

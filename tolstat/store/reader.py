@@ -18,7 +18,7 @@ from tolstat.store import checks, integrity
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas
 from tolstat.store.histories import HistoryParts
-from tolstat.store.result_file import campaign_digest, fault, is_locked, open_hdf5, text
+from tolstat.store.result_file import campaign_digest, descriptions, fault, is_locked, open_hdf5, text
 from tolstat.tables import Status, Variant
 
 if TYPE_CHECKING:
@@ -151,13 +151,27 @@ class Reader:
         if "design" not in self._file:
             remedy = 'give the file of a study with sampling.method = "cases"'
             raise fault(self.path, "has no list of cases and variants", remedy)
-        table = self._design(slice(None))
+        table = self._described("design", slice(None))
         for name, end in (("variant", len(self.variants)), ("case", len(self.case_names))):
             if table[name].min() < 0 or table[name].max() >= end:
                 remedy = "run the campaign again with another --out"
                 raise fault(self.path, f"is damaged: there are {end} of design/{name}", remedy)
-        self._check_errors(slice(None), self._errors(slice(None)), table)
+        self._check_errors(slice(None), self._errors(slice(None)))
         return table
+
+    def origin(self, rows: slice = slice(None)) -> NDArray[np.void]:
+        """How every joint was drawn, (n,) table as `origins.columns` has it for the sampling method, or of a slice.
+
+        Raises
+        ------
+        StoreError
+            When the method has no such table, or it is damaged.
+        """
+        if "origin" not in self._file:
+            remedy = 'give a file with sampling.method = "importance", or one of tolstat rare'
+            raise fault(self.path, "does not tell how its joints were drawn", remedy)
+        self.errors(rows)  # whose checksums are of both
+        return self._described("origin", rows)
 
     def errors(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Errors of every joint, (n,) table ERROR, or of a slice of the rows of this file.
@@ -172,7 +186,7 @@ class Reader:
         if fields is not None:
             return self._in_blocks(self.errors, rows, tables.ERROR, fields)
         table = self._errors(rows)
-        self._check_errors(rows, table, self._design(rows) if "design" in self._file else None)
+        self._check_errors(rows, table)
         return table
 
     def results(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
@@ -289,8 +303,8 @@ class Reader:
             remedy = "run the campaign again with another --out"
             raise fault(self.path, f"is damaged: a joint has the status {found.max()}", remedy)
 
-    def _design(self, rows: slice) -> NDArray[np.void]:
-        return self._read("design", tables.DESIGN_COLUMNS, tables.DESIGN, rows)
+    def _described(self, group: str, rows: slice) -> NDArray[np.void]:
+        return self._read(group, *descriptions(self._file)[group], rows)
 
     def _errors(self, rows: slice) -> NDArray[np.void]:
         return self._read("errors", tables.ERROR_COLUMNS, tables.ERROR, rows)
@@ -305,11 +319,12 @@ class Reader:
         attempt, errors, held = (self.column("ledger", c.name, rows) for c in tables.LEDGER_COLUMNS)
         return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
 
-    def _check_errors(self, rows: slice, errors: NDArray[np.void], design: NDArray[np.void] | None) -> None:
+    def _check_errors(self, rows: slice, errors: NDArray[np.void]) -> None:
         if not self._checked:
             return
         first = self.rows.start + rows.indices(self.n)[0]
-        right = integrity.errors_hash(first, errors, design) == self.column("ledger", "errors_check", rows)
+        described = [(c, self._read(name, c, dtype, rows)) for name, (c, dtype) in descriptions(self._file).items()]
+        right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", rows)
         if not right.all():
             found = f"is damaged: the errors of row {first + int(np.argmin(right))} are not as they were written"
             remedy = "take a copy of it, or run the campaign again with another --out"

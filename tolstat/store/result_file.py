@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import kept, tables
+from tolstat import kept, origins, tables
 from tolstat.errors import Fault, StoreError
 from tolstat.files import check_room, writing
 from tolstat.store.integrity import errors_hash, seal
@@ -135,6 +135,7 @@ def fill(
     rows: range,
     errors: Iterable[NDArray[np.void]],
     design: NDArray[np.void] | None,
+    origin: Iterable[NDArray[np.void]] | None = None,
 ) -> None:
     """Fill an empty file with everything but histories, all rows pending.
 
@@ -150,6 +151,8 @@ def fill(
         Errors of these rows, block after block.
     design : (len(rows),) table DESIGN, optional
         What each row is, for a study that lists its joints.
+    origin : iterable of tables, optional
+        How each row was drawn, block after block, for methods that have `origins.columns`.
     """
     n = len(rows)
     put_attributes(file, dict(attrs) | {"first_row": rows.start})
@@ -161,11 +164,16 @@ def fill(
     put_attributes(scale, {"units": "1", "description": "row of the campaign: the joint's number"})
     if design is not None:
         create_table(file, "design", tables.DESIGN_COLUMNS, n, [design])
+    drawn = origins.columns(json.loads(str(attrs["sampling"])))
+    if bool(drawn) != (origin is not None):
+        raise ValueError("how the joints were drawn must be given for the methods that have columns for it, only")
+    if drawn:
+        create_table(file, "origin", drawn, n, origin)
     create_table(file, "results", kept.columns(json.loads(str(attrs["identity"]))), n)
     create_table(file, "ledger", (*tables.LEDGER_COLUMNS, *history_check_columns(attrs)), n)
     session = file.create_dataset("session", (2,), "f8", dcpl=_allocated("f8", 0.0))
     put_attributes(session, {"units": "s, 1", "description": "of the run under way: start (Unix time), joints done"})
-    create_table(file, "errors", tables.ERROR_COLUMNS, n, _checked(file, rows, errors, design))
+    create_table(file, "errors", tables.ERROR_COLUMNS, n, _checked(file, rows, errors))
     seal(file)
 
 
@@ -179,17 +187,32 @@ def check_column(history: str) -> tables.Column:
     return tables.Column(f"{history}_check", "1", f"CRC-32 of the joint's {history}", "u4", f"{history}_check", ())
 
 
-def _checked(
-    file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]], design: NDArray[np.void] | None
-) -> Iterator[NDArray[np.void]]:
+def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -> Iterator[NDArray[np.void]]:
     """Pass the blocks of `errors` on, writing their checksums."""
     first = 0
     for block in errors:
         here = slice(first, first + len(block))
-        part = None if design is None else design[here]
-        file["ledger/errors_check"][here] = errors_hash(rows.start + first, block, part)
+        described = []
+        for group, (columns, dtype) in descriptions(file).items():
+            table = np.empty(len(block), dtype)
+            for c in columns:
+                c.of(table)[:] = file[group][c.name][here]
+            described.append((columns, table))
+        file["ledger/errors_check"][here] = errors_hash(rows.start + first, block, described)
         yield block
         first = here.stop
+
+
+def descriptions(file: h5py.File) -> dict[str, tuple[tuple[tables.Column, ...], np.dtype[np.void]]]:
+    """Tables that say what each joint is beside its errors, by group: their columns and types.
+
+    Which of the joints listed it is, and how it was drawn; most campaigns have neither.
+    """
+    held = {"design": (tables.DESIGN_COLUMNS, tables.DESIGN)} if "design" in file else {}
+    if "origin" in file:
+        sampling = json.loads(text(file.attrs, "sampling"))
+        held["origin"] = (origins.columns(sampling), origins.dtype(sampling))
+    return held
 
 
 def create_table(

@@ -96,6 +96,7 @@ class ResultStore(Reader):
         rows: range | None = None,
         options: Options | None = None,
         fidelity: Mapping[str, Any] | None = None,
+        origin: Iterable[NDArray[np.void]] | None = None,
     ) -> Self:
         """Create the file of a new campaign, or of a slice of it, all rows pending, and open it for writing.
 
@@ -115,6 +116,8 @@ class ResultStore(Reader):
             Rows of the campaign that the file shall hold; all without it.
         options, fidelity : Options and mapping, optional
             Settings that ``solver.fidelity = "auto"`` chose, and its record.
+        origin : iterable of tables, optional
+            How the joints were drawn, as blocks of rows, for sampling methods that have `origins.columns`.
 
         Raises
         ------
@@ -134,7 +137,8 @@ class ResultStore(Reader):
             with writing(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
                 blocks = [errors] if isinstance(errors, np.ndarray) else errors
                 design = study.design[held.start : held.stop] if study.case_names else None
-                fill(file, attributes(study, specs, dimensions or {}, options, fidelity), held, blocks, design)
+                attrs = attributes(study, specs, dimensions or {}, options, fidelity)
+                fill(file, attrs, held, blocks, design, origin)
         except FileExistsError as error:
             raise fault(path, "exists already", "go on with it, delete it, or use another --out") from error
         except OSError as error:

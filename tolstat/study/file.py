@@ -11,10 +11,11 @@ from tolstat import joint, kept, schema
 from tolstat.errors import Fault, InputError, gather
 from tolstat.joint import Joint, Operation
 from tolstat.schema import read_toml
-from tolstat.study import fatigue, listing, selection
+from tolstat.study import fatigue, listing, proposal, selection
 from tolstat.study.correlation import Copula, assemble
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Correlation, Output, Sampling, Solver, SweepAxis, SweepEntry
+from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Claims, Entry
 from tolstat.study.tolerance_entry import Site
 from tolstat.study.tolerance_kinds import distribution
@@ -25,7 +26,11 @@ ModelT = TypeVar("ModelT", bound=schema.Strict)
 
 SCATTER = ("tolerances", "correlation", "errors")
 """Sections that say which joints there are, for the methods that draw; the first is needed."""
-SECTIONS_OF = {"sweep": ("sweep", "errors"), "cases": ("case", "grid", "variant")}
+SECTIONS_OF = {
+    "sweep": ("sweep", "errors"),
+    "cases": ("case", "grid", "variant"),
+    "importance": (*SCATTER, "proposal"),
+}
 """The same for the other methods."""
 
 
@@ -127,20 +132,22 @@ class StudyFile:
 
     def correlation(self) -> Copula:
         """``[[correlation]]``: which of the errors that `tolerances` has read come together."""
-        data = self.data.get("correlation", [])
-        if not isinstance(data, list):
-            self._fault(("correlation",), "is not a list of tables", "write [[correlation]]")
-            return Copula()
-        entries = []
         before = len(self._faults)
-        for number, item in enumerate(data):
-            with gather(self._faults):
-                prefix = ("correlation", number)
-                entries.append(schema.validate(Correlation, item, self.place, prefix=prefix))
+        entries = self._list("correlation", Correlation)
         if len(self._faults) == before:
             with gather(self._faults):
                 return assemble(entries, self._toleranced, self.place)
         return Copula()
+
+    def proposals(self) -> tuple[Proposal, ...]:
+        """``[[proposal]]``: what joints are drawn from beside the tolerances that `tolerances` has read."""
+        found = []
+        for number, entry in enumerate(self._list("proposal", ProposalEntry)):
+            with gather(self._faults):
+                found.append(proposal.resolve(entry, list(self._toleranced), self.place, ("proposal", number)))
+        with gather(self._faults):
+            proposal.check_shares(found, self.place)
+        return tuple(found)
 
     def sweep(self) -> tuple[SweepAxis, ...]:
         """``[sweep]``: the axes of a grid."""
@@ -189,7 +196,7 @@ class StudyFile:
         needed = used[0]
         if not self.data.get(needed):
             header = "[[case]]" if needed == "case" else f"[{needed}]"
-            found = "missing table: nothing scatters" if used is SCATTER else "missing table"
+            found = "missing table: nothing scatters" if needed == "tolerances" else "missing table"
             self._fault((needed,), found, f"add {header}, or another sampling.method")
         known = dict.fromkeys((*SCATTER, *(name for names in SECTIONS_OF.values() for name in names)))
         for section in known:
@@ -198,6 +205,9 @@ class StudyFile:
                 self._fault((section,), f"has no effect with {sampling.method!r}", remedy)
         if sampling.method == "cases" and self.data.get("limits"):
             self._fault(("limits",), "has no effect with 'cases'", "remove it: listed joints have no exceedance")
+        if sampling.method == "importance" and not self.data.get("proposal"):
+            remedy = "add [[proposal]] with share, and widen or shift"
+            self._fault(("proposal",), "missing table: what joints are drawn from beside the tolerances", remedy)
         points = math.prod(axis.points for axis in sweep)
         if points > MAX_ROWS:
             self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
@@ -236,6 +246,18 @@ class StudyFile:
         if lacking:
             found = f"leaves out what [limits] judges by: {', '.join(lacking)}"
             self._fault(("output", "results"), found, "add these, or remove their limits")
+
+    def _list(self, section: str, model: type[ModelT]) -> list[ModelT]:
+        """Section that is a list of tables; those of them that are valid."""
+        data = self.data.get(section, [])
+        if not isinstance(data, list):
+            self._fault((section,), "is not a list of tables", f"write [[{section}]]")
+            return []
+        found = []
+        for number, item in enumerate(data):
+            with gather(self._faults):
+                found.append(schema.validate(model, item, self.place, prefix=(section, number)))
+        return found
 
     def _table(self, section: str) -> Mapping[str, Any]:
         table = self.data.get(section, {})

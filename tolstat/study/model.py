@@ -81,7 +81,8 @@ class Sampling(Strict):
     n : int, optional
         Number of joints, the nominal one not counted; a sweep has its number from its points, cases from their list.
     method : str
-        ``random``, ``sobol``, ``lhs``; ``sweep``: a grid of errors; ``cases``: joints listed one by one.
+        ``random``, ``sobol``, ``lhs``; ``sweep``: a grid of errors; ``cases``: joints listed one by one;
+        ``importance``: random, from the tolerances and ``[[proposal]]``.
     seed : int
         Seed of all draws.
     nominal_first : bool
@@ -89,7 +90,7 @@ class Sampling(Strict):
         group of joints has its own.
     """
 
-    method: Literal["random", "sobol", "lhs", "sweep", "cases"] = "random"
+    method: Literal["random", "sobol", "lhs", "sweep", "cases", "importance"] = "random"
     n: Annotated[int, Field(strict=True, ge=1, le=MAX_SAMPLES)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Flag = True

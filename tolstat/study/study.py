@@ -18,6 +18,7 @@ from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
+from tolstat.study.proposal import Proposal
 from tolstat.study.selection import LIMIT_UNITS
 from tolstat.tables import DESIGN, Variant
 from tolstat.tolerance import Distribution
@@ -68,6 +69,8 @@ class Study(Case):
         Error name to distribution; ``pin1.offset_radial`` stands for offset_t and offset_z of a feature.
     copula : Copula
         Correlation of the errors.
+    proposals : tuple of Proposal
+        What joints are drawn from beside the tolerances; empty unless ``sampling.method`` is ``importance``.
     sampling : Sampling
         How many, and how they are drawn.
     sweep : tuple of SweepAxis
@@ -86,6 +89,7 @@ class Study(Case):
     output: Output
     tolerances: dict[str, Distribution] = field(default_factory=dict)
     copula: Copula = field(default_factory=Copula)
+    proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
     listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
@@ -152,6 +156,8 @@ class Study(Case):
             "sweep": [[list(axis.names), axis.start, axis.stop, axis.points] for axis in self.sweep],
             "output": self.output.identity(),
         }
+        if self.proposals:
+            parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
         return dict(flat(parts | (self.listed.identity() if self.listed else {})))
 
 
@@ -181,7 +187,7 @@ def load_case(path: str | Path) -> Case:
 
 SECTIONS = (
     *("joint", "operation", "solver", "errors", "tolerances", "correlation"),
-    *("sampling", "sweep", "grid", "case", "variant", "limits", "fatigue", "output"),
+    *("sampling", "proposal", "sweep", "grid", "case", "variant", "limits", "fatigue", "output"),
 )
 
 
@@ -216,6 +222,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     errors = file.errors()
     tolerances = file.tolerances(operation)
     copula = file.correlation()
+    proposals = file.proposals()
     sampling = file.model("sampling", Sampling, required=True)
     sweep = file.sweep()
     limits = file.limits()
@@ -248,6 +255,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         output=output,
         tolerances=tolerances,
         copula=copula,
+        proposals=proposals,
         sweep=sweep,
         listed=listed,
         limits=limits,

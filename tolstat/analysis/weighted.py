@@ -1,0 +1,207 @@
+"""Exceedance and quantiles of joints that were drawn more often than the tolerances make them: importance sampling.
+
+Each joint counts by its weight, the density of its errors under the tolerances over that under what it was drawn from.
+Shares are ratios of sums of weights; their variance is that of such a ratio. The interval is Clopper and Pearson's for
+the number of equal joints that would be as sure of the share (Korn and Graubard 1998), its far end for one joint more,
+as heavy as the heaviest seen (Fay and Feuer 1997). With equal weights it is just Clopper and Pearson's; with no joint
+above, one as heavy as any could have been.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import betaincinv
+
+from tolstat.analysis.exceedance import CURVE, Exceedance, FloatArray, Table, clopper_pearson
+from tolstat.analysis.quantile import Quantile
+from tolstat.analysis.reweight import smooth
+from tolstat.tables import UNSETTLED, Status
+
+LEAST_EFFECTIVE = 20.0
+"""Effective number of joints above a level below which its share is to be taken with care."""
+
+
+class Trust(NamedTuple):
+    """How far the joints above a level can be believed to be all that matters there.
+
+    Attributes
+    ----------
+    effective : float
+        Effective number of joints above the level, (sum of weights)^2 / sum of squares (Kish 1965).
+    k : float
+        Shape of the tail of their weights (Vehtari et al. 2024); NaN below 25 joints, -inf with equal weights.
+    usable : bool
+        Whether there are `LEAST_EFFECTIVE`, and k is below 0.7.
+    """
+
+    effective: float
+    k: float
+    usable: bool
+
+
+class _Sums(NamedTuple):
+    """Sum of weights, sum of their squares and largest of them, of the joints above each level and of the others."""
+
+    above: FloatArray
+    below: FloatArray
+
+    @classmethod
+    def at(cls, first: NDArray[np.intp], weights: FloatArray, below: FloatArray, above: FloatArray) -> _Sums:
+        """Take the weights from number `first` on, and `above`, as above; those before, and `below`, as below."""
+        parts = []
+        for w, rest, number in ((weights[::-1], above, weights.size - first), (weights, below, first)):
+            sums = [np.cumsum(w), np.cumsum(w**2), np.maximum.accumulate(w)]
+            own = np.array([np.insert(part, 0, 0.0)[number] for part in sums])
+            most = np.maximum(own[2], rest.max(initial=0.0))
+            parts.append(np.array([own[0] + rest.sum(), own[1] + (rest**2).sum(), most]))
+        return cls(*parts)
+
+    @property
+    def share(self) -> FloatArray:
+        """Share above; NaN where no joint has any weight."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.above[0] / (self.above[0] + self.below[0]))
+
+    def interval(self, confidence: float) -> tuple[FloatArray, FloatArray]:
+        """Ends of the interval of the share."""
+        tail = 0.5 * (1.0 - confidence)
+        none_above, none_below = self.above[0] == 0, self.below[0] == 0
+        most = np.maximum(self.above[2], self.below[2])
+        ends = []
+        for end, own, other, empty in ((1.0 - tail, *self, none_above), (1.0 - tail, *self[::-1], none_below)):
+            # one more joint on the side that is to be larger, as heavy as the heaviest there, or of all
+            one = np.where(empty, most, own[2])
+            first, squares = own[0] + one, own[1] + one**2
+            with np.errstate(invalid="ignore", divide="ignore"):
+                share = first / (first + other[0])
+                variance = ((1.0 - share) ** 2 * squares + share**2 * other[1]) / (first + other[0]) ** 2
+                effective = share * (1.0 - share) / variance
+                ends.append(betaincinv(share * effective, (1.0 - share) * effective, end))
+        upper = np.where(none_below | np.isnan(ends[0]), 1.0, ends[0])
+        lower = np.where(none_above | np.isnan(ends[1]), 0.0, 1.0 - ends[1])
+        return lower, upper
+
+
+class _Sample(NamedTuple):
+    """Loads of the valid joints, ascending, and their weights; weights of the unresolved joints."""
+
+    loads: FloatArray
+    weights: FloatArray
+    failed: FloatArray
+    unsettled: FloatArray
+
+
+def curve(
+    values: ArrayLike,
+    status: ArrayLike,
+    weights: ArrayLike,
+    levels: ArrayLike | None = None,
+    confidence: float = 0.95,
+) -> Table:
+    """Share of the joints above each of many levels, see `exceedance.curve`.
+
+    Parameters
+    ----------
+    values, status, levels, confidence
+        As there.
+    weights : array_like, shape (n,)
+        Weight of each joint; independent draws, mean 1.
+
+    Returns
+    -------
+    ndarray of CURVE, shape (m,)
+        ``count``, ``n``, ``n_failed`` and ``n_unsettled`` are numbers of joints; all shares are of weights.
+
+    Raises
+    ------
+    ValueError
+        When the shapes differ, a weight is negative or not finite, or a level is NaN.
+    """
+    sample = _sort_out(values, status, weights)
+    x = np.unique(sample.loads) if levels is None else np.atleast_1d(np.asarray(levels, dtype=float))
+    if np.isnan(x).any():
+        raise ValueError("a level is NaN")
+    first, w = np.searchsorted(sample.loads, x, side="right"), sample.weights
+    lost, none = np.concatenate([sample.failed, sample.unsettled]), np.empty(0)
+    table = np.zeros(x.shape, CURVE)
+    table["level"], table["count"] = x, w.size - first
+    table["n"], table["n_failed"], table["n_unsettled"] = w.size + lost.size, sample.failed.size, sample.unsettled.size
+    valid, least, most = (_Sums.at(first, w, *rest) for rest in ((none, none), (lost, none), (none, lost)))
+    table["estimate"], (table["lower"], table["upper"]) = valid.share, valid.interval(confidence)
+    table["bound_lower"], (table["outer_lower"], _) = least.share, least.interval(confidence)
+    table["bound_upper"], (_, table["outer_upper"]) = most.share, most.interval(confidence)
+    return table
+
+
+def at(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, confidence: float = 0.95) -> Exceedance:
+    """Share of the joints above one level; see `curve`."""
+    return Exceedance(*curve(values, status, weights, [level], confidence)[0].tolist())
+
+
+def trust(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float) -> Trust:
+    """Tell how far the share above a level can be trusted; parameters as in `at`."""
+    sample = _sort_out(values, status, weights)
+    w = sample.weights[sample.loads > level]
+    w = w[w > 0]
+    effective = float(w.sum() ** 2 / (w**2).sum()) if w.size else 0.0
+    k = smooth(np.log(w)).k if w.size >= 25 else np.nan
+    return Trust(effective, k, effective >= LEAST_EFFECTIVE and not k >= 0.7)
+
+
+def quantile(
+    values: ArrayLike, status: ArrayLike, weights: ArrayLike, share: float, confidence: float = 0.95
+) -> Quantile:
+    """Load that a share of the joints stays at or below, its interval by Woodruff (1952).
+
+    Parameters
+    ----------
+    values, status, weights, confidence
+        As in `curve`.
+    share : float
+        Between 0 and 1.
+
+    Returns
+    -------
+    Quantile
+        As `quantile.at` gives it for joints that count alike.
+    """
+    sample = _sort_out(values, status, weights)
+    loads, below = sample.loads, np.cumsum(sample.weights)
+    n_failed, n_unsettled = sample.failed.size, sample.unsettled.size
+    lost = sample.failed.sum() + sample.unsettled.sum()
+    numbers = (share, loads.size + n_failed + n_unsettled, n_failed, n_unsettled)
+    if not loads.size:
+        return Quantile(*numbers, np.nan, -np.inf, np.inf, -np.inf, np.inf)
+    total = below[-1]
+
+    def load_at(part: float) -> float:
+        """Smallest load that joints of this weight do not exceed; infinite where there is none."""
+        if part <= 0:
+            return -np.inf
+        rank = int(np.searchsorted(below, part * (1 - 1e-12)))
+        return float(loads[rank]) if rank < loads.size else np.inf
+
+    estimate = load_at(share * total)
+    spread = np.where(loads <= estimate, 1.0 - share, share) * sample.weights
+    effective = share * (1.0 - share) * total**2 / (spread**2).sum()
+    low, high = clopper_pearson(share * effective, effective, confidence)
+    bounds = load_at(share * (total + lost) - lost), load_at(share * (total + lost))
+    # as in order statistics: the largest load is no upper end unless a heavier one could have been seen
+    ends = load_at(low * total), load_at(high * total) if high < 1.0 - sample.weights[-1] / total else np.inf
+    return Quantile(*numbers, estimate, *ends, *bounds)
+
+
+def _sort_out(values: ArrayLike, status: ArrayLike, weights: ArrayLike) -> _Sample:
+    load, state, w = np.asarray(values, dtype=float), np.asarray(status), np.asarray(weights, dtype=float)
+    if load.ndim != 1 or not load.shape == state.shape == w.shape:
+        raise ValueError(f"values {load.shape}, status {state.shape} and weights {w.shape} must be of one length")
+    if not (np.isfinite(w) & (w >= 0)).all():
+        raise ValueError("a weight is negative or no number")
+    unsettled = np.isin(state, UNSETTLED)
+    valid = (state == Status.OK) & np.isfinite(load)
+    failed = ~valid & ~unsettled & (state != Status.PENDING)
+    order = np.argsort(load[valid], kind="stable")
+    return _Sample(load[valid][order], w[valid][order], w[failed], w[unsettled])

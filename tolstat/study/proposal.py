@@ -1,0 +1,167 @@
+"""Importance sampling: joints drawn from a mixture of the tolerances and of distributions with more joints of interest.
+
+Everything happens in the space of standard normal scores, independent of each other, that the errors are made from: a
+proposal gives some scores another mean and deviation. Whatever the tolerance's distribution, a proposal reaches no
+value that the tolerance does not; a normal error gets just this mean and deviation; and ratios of densities are those
+of normal distributions, with or without correlation.
+
+One part of the mixture is the tolerances themselves (Owen and Zhou 2000, defensive mixture). Weighing each joint by
+the density of the whole mixture, whichever part it was drawn from (balance heuristic), no joint counts for more than
+one over their share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from tolstat.errors import Fault, InputError, gather
+from tolstat.schema import Strict, did_you_mean, dotted
+from tolstat.study.selection import columns_of, entries, select
+from tolstat.units import Number
+
+Array = NDArray[np.float64]
+
+LEAST_NOMINAL = 0.05
+"""Least share that is drawn from the tolerances themselves: no joint counts for more than twenty."""
+FARTHEST, WIDEST = 10.0, 10.0
+"""Largest shift, in standard deviations, and widening (narrowing: one over it)."""
+
+
+class ProposalEntry(Strict):
+    """One ``[[proposal]]``: a part of the mixture that joints are drawn from.
+
+    Attributes
+    ----------
+    share : float
+        Its share of the joints.
+    widen : float or dict
+        Factor on the standard deviation of all scores, or by name or pattern of errors.
+    shift : dict
+        Mean of the scores, in standard deviations, by name or pattern of errors.
+    """
+
+    share: Annotated[Number, Field(gt=0, lt=1)]
+    widen: float | dict[str, Any] = 1.0
+    shift: Annotated[dict[str, Any], Field(default_factory=dict)]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A part of the mixture: share, and mean and deviation of the scores that are not standard normal in it.
+
+    Attributes
+    ----------
+    share : float
+        Of the joints.
+    scores : dict of str to (float, float)
+        Mean and standard deviation by column of the errors.
+    """
+
+    share: float
+    scores: dict[str, tuple[float, float]]
+
+    def log_ratio(self, scores: Mapping[str, Array]) -> Array:
+        """Logarithm of the density under the proposal over that under the tolerances, (n,)."""
+        logs: Array = np.zeros(len(next(iter(scores.values()))))
+        for name, (mean, deviation) in self.scores.items():
+            z = scores[name]
+            logs += 0.5 * z**2 - 0.5 * ((z - mean) / deviation) ** 2 - math.log(deviation)
+        return logs
+
+
+def weights(proposals: Sequence[Proposal], scores: Mapping[str, Array]) -> Array:
+    """Density of each joint under the tolerances over that under the mixture (balance heuristic), (n,).
+
+    Parameters
+    ----------
+    proposals : sequence of Proposal
+        Parts of the mixture; the tolerances have the rest of it.
+    scores : mapping of str to ndarray, (n,)
+        Standard normal scores by column of the errors.
+    """
+    density = np.full(len(next(iter(scores.values()))), 1.0 - math.fsum(p.share for p in proposals))
+    with np.errstate(over="ignore"):  # a joint that the tolerances all but never make has no weight
+        for proposal in proposals:
+            density += proposal.share * np.exp(proposal.log_ratio(scores))
+    return 1.0 / density
+
+
+def component(proposals: Sequence[Proposal], u: Array) -> NDArray[np.intp]:
+    """Part of the mixture that each uniform number selects, (n,): 0 the tolerances, k proposal k."""
+    ends = np.cumsum([1.0 - math.fsum(p.share for p in proposals), *(p.share for p in proposals)])
+    return np.minimum(np.searchsorted(ends, u, side="right"), len(proposals))
+
+
+def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: tuple[int | str, ...]) -> Proposal:
+    """Expand the patterns of an entry.
+
+    Parameters
+    ----------
+    entry : ProposalEntry
+        As the file has it.
+    toleranced : sequence of str
+        Errors that scatter; of ``pin1.offset_radial`` it is the score of the radius that is meant.
+    place, path
+        File and key path that faults name.
+
+    Raises
+    ------
+    InputError
+        For names without tolerance, values out of range, and an entry that changes nothing.
+    """
+    faults: list[Fault] = []
+    means = dict.fromkeys(toleranced, 0.0)
+    widths = dict.fromkeys(toleranced, 1.0)
+    widen = entry.widen if isinstance(entry.widen, dict) else {}
+    if not widen:
+        with gather(faults):
+            widths = dict.fromkeys(toleranced, _number(entry.widen, "widen", f"{place}: {dotted((*path, 'widen'))}"))
+    for key, table, found in (("widen", widen, widths), ("shift", entry.shift, means)):
+        for item in entries(table, *path, key):
+            where = f"{place}: {dotted(item.path)}"
+            with gather(faults):
+                value = _number(item.value, key, where)
+                names = select(item.pattern, toleranced)
+                if not names:
+                    raise InputError([Fault(where, "has no tolerance", did_you_mean(item.pattern, list(toleranced)))])
+                found |= dict.fromkeys(names, value)
+    scores = {
+        columns_of(name)[0]: (means[name], widths[name])
+        for name in toleranced
+        if (means[name], widths[name]) != (0.0, 1.0)
+    }
+    if not scores and not faults:
+        faults.append(Fault(f"{place}: {dotted(path)}", "is the tolerances themselves", "give widen or shift"))
+    if faults:
+        raise InputError(faults)
+    return Proposal(entry.share, scores)
+
+
+def _number(value: object, key: str, where: str) -> float:
+    low, high = (1.0 / WIDEST, WIDEST) if key == "widen" else (-FARTHEST, FARTHEST)
+    number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
+    if not low <= number <= high:
+        raise InputError([Fault(where, f"{value!r} is no {key}", f"give a number from {low:g} to {high:g}")])
+    return number
+
+
+def check_shares(proposals: Sequence[Proposal], place: str) -> None:
+    """Refuse a mixture with too little of the tolerances in it.
+
+    Raises
+    ------
+    InputError
+        When less than `LEAST_NOMINAL` is left for them.
+    """
+    left = 1.0 - math.fsum(p.share for p in proposals)
+    if left < LEAST_NOMINAL - 1e-12:
+        found = f"leave {left:.3g} of the joints to the tolerances themselves"
+        remedy = f"give shares with a sum of at most {1.0 - LEAST_NOMINAL:g}"
+        raise InputError([Fault(f"{place}: proposal.share", found, remedy)])

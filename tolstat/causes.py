@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 
 from tolstat import sampling
-from tolstat.analysis import exceedance, overrepresentation, quantile, regression, sensitivity
+from tolstat.analysis import exceedance, overrepresentation, pick_freeze, quantile, regression, sensitivity
 from tolstat.errors import Fault, InputError, StoreError
 from tolstat.recall import recall
 from tolstat.report import source
 from tolstat.schema import did_you_mean
 from tolstat.store import ResultStore
-from tolstat.study.selection import LIMIT_UNITS
+from tolstat.study import Study
+from tolstat.study.selection import LIMIT_UNITS, columns_of
 from tolstat.tables import Status
 from tolstat.tolerance import score
 
@@ -46,7 +47,8 @@ class Causes(NamedTuple):
     table : DataFrame
         One row an error that scatters, the largest first-order index first: ``error``, then each with ``_lower`` and
         ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``; ``direction`` and ``size``, with ``_p``
-        (NaN where too few joints are above the level).
+        (NaN where too few joints are above the level). Of a pick-freeze design one row a group of errors, with
+        ``first`` and ``total`` only.
     """
 
     load: str
@@ -97,7 +99,9 @@ def of_store(
     if not study.tolerances:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
-    campaign = source.read(store)
+    if study.groups:
+        return _frozen(store, study, by, confidence, log)
+    campaign = source.read(store, source.LOAD_FIELDS, [c for name in study.tolerances for c in columns_of(name)])
     values, unit = source.load(campaign.results, by)
     status = campaign.results["status"]
     valid = (status == Status.OK) & np.isfinite(values)
@@ -126,6 +130,34 @@ def of_store(
     std = float(np.sqrt(first.variance))
     counts = (level, int(above.sum()), unit, std, float(first.estimate.sum()), ranks.r2)
     return Causes(by, int(valid.sum()), lost, *counts, table)
+
+
+def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: bool) -> Causes:
+    """Causes from a pick-freeze design: Sobol' indices of groups of errors."""
+    if not store.whole:
+        raise StoreError(
+            str(Fault(str(store.path), "holds a slice of a design", "merge all slices first: tolstat merge"))
+        )
+    campaign = source.read(store, source.LOAD_FIELDS, ())
+    values, unit = source.load(campaign.results, by)
+    status = campaign.results["status"]
+    valid = (status == Status.OK) & np.isfinite(values)
+    if log and values[valid].min(initial=np.inf) <= 0:
+        raise InputError([Fault("--log", f"{by} is not positive in all joints", "leave it out")])
+    load = np.full(len(values), np.nan)
+    load[valid] = np.log(values[valid]) if log else values[valid]
+    points = load.reshape(-1, len(study.groups) + 2)
+    try:
+        found = pick_freeze.indices(points[:, 0], points[:, 1], points[:, 2:], confidence)
+    except ValueError as error:
+        raise StoreError(str(Fault(str(store.path), str(error), f"run {pick_freeze.FEWEST} points or more"))) from error
+    parts: dict[str, NamedTuple] = {"first": found.first, "total": found.total}
+    names = [group.label for group in study.groups]
+    table = _table(names, parts).sort_values("first", ascending=False, ignore_index=True)
+    level = campaign.limits.get(by, quantile.at(values, status, TAIL).estimate)
+    lost = exceedance.sort_out(values, status).n_unresolved
+    counts = (level, int((values[valid] > level).sum()), unit, float(np.sqrt(found.variance)))
+    return Causes(by, int(valid.sum()), lost, *counts, float(found.first.estimate.sum()), np.nan, table)
 
 
 def _table(names: list[str], parts: dict[str, NamedTuple]) -> pd.DataFrame:

@@ -1,8 +1,8 @@
 """From a study to the errors of its joints, drawn before anything runs.
 
 The errors of joint i depend on the seed, i and the error's name only: not on the number of joints, not on which
-others are drawn with it, and not on other errors that are added to the study later (`lhs` excepted, whose strata are
-as many as its joints).
+others are drawn with it, and not on other errors that are added to the study later (excepted are `lhs`, whose strata
+are as many as its joints, and `pick_freeze`, of which a point has as many joints as there are groups).
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ def draw(study: Study, rows: range | None = None) -> Table:
         _fill_grid(samples, study.sweep, numbers)
     elif study.listed is not None:
         _fill_listed(samples, study.listed, numbers)
+    elif study.groups:
+        _fill_frozen(samples, study, numbers)
     else:
         _fill_scatter(samples, study, numbers)
     return table
@@ -132,8 +134,22 @@ def _columns(study: Study) -> list[str]:
     return list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
 
 
-def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
-    u = _uniforms(_columns(study), numbers, study)
+def _fill_frozen(samples: Table, study: Study, numbers: range) -> None:
+    """Two joints a point, A and B, and for each group A with the errors of that group from B."""
+    size = len(study.groups) + 2
+    points = range(numbers.start // size, -(-numbers.stop // size))
+    a, b = np.zeros(len(points), samples.dtype), np.zeros(len(points), samples.dtype)
+    _fill_scatter(a, study, points)
+    _fill_scatter(b, study, points, " B")
+    point, part = np.divmod(np.arange(numbers.start, numbers.stop), size)
+    for number, group in enumerate(study.groups, start=2):
+        of_b = (part == 1) | (part == number)
+        for column in (column for name in group.names for column in columns_of(name)):
+            samples[column] = np.where(of_b, b[column][point - points.start], a[column][point - points.start])
+
+
+def _fill_scatter(samples: Table, study: Study, numbers: range, stream: str = "") -> None:
+    u = _uniforms(_columns(study), numbers, study, stream)
     if study.proposals:
         scores, part = _proposed(study, list(u), numbers)
         u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
@@ -150,8 +166,11 @@ def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
             samples[name] = distribution.ppf(u[name])
 
 
-def _uniforms(names: Sequence[str], numbers: range, study: Study) -> dict[str, Array]:
-    """Probabilities in (0, 1) of the samples `numbers`, independent from name to name; shape (len(numbers),) each."""
+def _uniforms(names: Sequence[str], numbers: range, study: Study, stream: str = "") -> dict[str, Array]:
+    """Probabilities in (0, 1) of the samples `numbers`, independent from name to name; shape (len(numbers),) each.
+
+    Random ones of another `stream` are independent too.
+    """
     seed, n, first = study.sampling.seed, len(numbers), numbers.start
     if study.sampling.method == "sobol":
         points = sobol(n, len(ERROR_FIELDS), seed, first)
@@ -160,7 +179,7 @@ def _uniforms(names: Sequence[str], numbers: range, study: Study) -> dict[str, A
         here = slice(first, numbers.stop)
         return {name: _stratified(study.samples, _stream(seed, f"lhs {name}"))[here] for name in names}
     # a stream may give 0 itself, once in 2^53 draws
-    return {name: np.maximum(_stream(seed, name, first).random(n), 2.0**-54) for name in names}
+    return {name: np.maximum(_stream(seed, name + stream, first).random(n), 2.0**-54) for name in names}
 
 
 def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[str, Array], NDArray[np.intp]]:

@@ -101,7 +101,7 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
             found[0, i] = share
             found[1, i] = _error(influence, _chance(share, degrees, len(loads)))
     estimate, error = found.reshape(2, errors.shape[1], *loads.shape[1:])
-    half = _normal_half(confidence) * error if iid else np.full(estimate.shape, np.nan)
+    half = normal_half(confidence) * error if iid else np.full(estimate.shape, np.nan)
     return FirstOrder(
         estimate, np.clip(estimate - half, 0, 1), np.clip(estimate + half, 0, 1), variance.reshape(loads.shape[1:])
     )
@@ -155,7 +155,7 @@ def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
     errors_lower = _error(own, chance + chance_of_pairs.sum(axis=1))
     without = chance.sum() - chance + 0.5 * chance_of_pairs.sum() - chance_of_pairs.sum(axis=1)
     errors_upper = _error(own - everything[:, None], without)
-    z = _normal_half(confidence) if iid else np.nan
+    z = normal_half(confidence) if iid else np.nan
     np.fill_diagonal(pairs, np.nan)
     lower = np.clip(estimate - z * errors_lower, 0, 1)
     upper = np.clip(np.maximum(estimate + rest + z * errors_upper, estimate + z * errors_lower), 0, 1)
@@ -239,7 +239,14 @@ def _error(influence: FloatArray, chance: FloatArray) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(np.maximum(plain - chance, chance)))
 
 
-def _normal_half(confidence: float) -> float:
+def normal_half(confidence: float) -> float:
+    """Half the width of a normal interval, in standard errors.
+
+    Raises
+    ------
+    ValueError
+        When the confidence is not between 0 and 1.
+    """
     from scipy.special import ndtri
 
     if not 0.0 < confidence < 1.0:

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, say
+from tolstat.cli._app import Workers, as_text, say
 from tolstat.cli.extend import StudyFile
+from tolstat.errors import Fault, InputError
+
+
+class Groups(StrEnum):
+    """Errors that a pick-freeze design moves together."""
+
+    TOLERANCE = "tolerance"
+    ERROR = "error"
 
 
 def causes(
-    file: ResultFile,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Result file; with --pick-freeze a study (TOML).")],
     by: Annotated[str, typer.Option("--by", metavar="LOAD", help="cross1.F, pin2.contact, psi.")] = "cross1.F",
     n: Annotated[int, typer.Option("--n", metavar="N", min=1, help="How many errors the table shows.")] = 12,
     log: Annotated[bool, typer.Option("--log", help="Shares of the variance of the load's logarithm.")] = False,
+    points: Annotated[
+        int | None,
+        typer.Option("--pick-freeze", metavar="N", min=50, help="Run a design of N points."),
+    ] = None,
+    groups: Annotated[
+        Groups, typer.Option("--groups", metavar="WHAT", help="Of the design: a tolerance of the study, or each error.")
+    ] = Groups.TOLERANCE,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="OUT", help="Of the design: result file; default STUDY_causes.h5.")
+    ] = None,
+    workers: Workers = None,
     study_file: StudyFile = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with all errors, instead of a table.")] = False,
 ) -> None:
@@ -23,16 +44,40 @@ def causes(
     For each error: the share of the load's variance that it explains alone, and that it has a part in (Sobol' indices
     from the joints of the file); how the load moves with it (rank regression); and the probability that a joint above
     the limit (or the 90 % quantile) has the larger error, or the one farther from the middle, than one below.
+
+    With --pick-freeze the indices come from joints simulated for them: no fit, and intervals in place of bounds. Each
+    point takes two joints and one for each group of errors. Stopped, the same command goes on where it was; the joints
+    are in OUT, which this command takes as FILE too.
     """
     from tolstat import causes as source
     from tolstat.report import causes as report
     from tolstat.report import text
     from tolstat.store import ResultStore
 
+    if points is not None:
+        file = _run_design(file, points, groups, out, workers)
+    elif out is not None:
+        raise InputError([Fault("--out", "is for a design", "add --pick-freeze 1024")])
     with ResultStore.open(file) as store:
         found = source.of_store(store, by, study_file, log=log)
     if as_json:
-        typer.echo(as_text(found._asdict() | {"table": text.records(found.table)}))
+        summary = found._asdict() | {"table": text.records(found.table)}
+        summary["r2"] = None if found.r2 != found.r2 else found.r2
+        typer.echo(as_text(summary))
         return
     typer.echo(report.text(found, n))
     say(report.note(found, log))
+
+
+def _run_design(path: Path, points: int, groups: Groups, out: Path | None, workers: int | None) -> Path:
+    """Simulate a pick-freeze design of a study; returns the result file."""
+    from tolstat import study
+    from tolstat.cli.run import carry_out
+    from tolstat.execution import Execution
+    from tolstat.study.rewriting import with_keys
+
+    keys = {"method": "pick_freeze", "n": points, "groups": groups.value}
+    plan = study.load(path, text=with_keys(study.load(path).text, "sampling", keys, str(path)))
+    target = out if out is not None else Path(f"{path.stem}_causes.h5")
+    carry_out(plan, target, False, execution=Execution("processes", workers))
+    return target

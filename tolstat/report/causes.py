@@ -22,7 +22,7 @@ def text(causes: Causes, shown: int = 12) -> str:
     str
         Shares of the variance in per cent, rank coefficients, and the probability that a joint of the tail has the
         larger error (``direction``) and the error farther from the middle (``size``), each with its interval; ``*``
-        marks what chance does not explain.
+        marks what chance does not explain. Columns that are not known are left out.
     """
     table = causes.table
     marked = (table["direction_p"] < SIGNIFICANT) | (table["size_p"] < SIGNIFICANT)
@@ -30,7 +30,8 @@ def text(causes: Causes, shown: int = 12) -> str:
     for row in table[(table.index < shown) | marked].to_dict("records"):
         line = [row["error"], _interval(row, "first", 100), _ends(row, "total", 100), _interval(row, "srrc")]
         rows.append([*line, _tail(row, "direction"), _tail(row, "size")])
-    return align(rows)
+    columns = [column for column in zip(*rows, strict=True) if set(column[1:]) != {"-"}]
+    return align([list(row) for row in zip(*columns, strict=True)])
 
 
 def note(causes: Causes, log: bool = False) -> str:
@@ -38,9 +39,13 @@ def note(causes: Causes, log: bool = False) -> str:
     unit = UNITS.get(causes.unit, causes.unit)
     std = f"{causes.std:.4g}, of the logarithm" if log else f"{causes.std:.4g} {unit}".rstrip()
     tail = f"tail: {causes.above} joints above {causes.level:.5g} {unit}".rstrip()
+    if math.isnan(causes.r2):
+        tail, ranks = "from a pick-freeze design", ""
+    else:
+        ranks = f", ranks {100 * causes.r2:.0f} %"
     lines = [
         f"{causes.load}: {causes.joints} joints, {causes.lost} without a valid load left out; standard deviation {std}",
-        f"errors alone explain {100 * causes.additive:.0f} % of the variance, ranks {100 * causes.r2:.0f} %; {tail}",
+        f"errors alone explain {100 * causes.additive:.0f} % of the variance{ranks}; {tail}",
     ]
     if causes.table["total"].isna().all():
         lines.append("errors are correlated: shares overlap, and there is no share in all")

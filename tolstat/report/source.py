@@ -32,6 +32,7 @@ METHODS = {
     "lhs": "Latin hypercube",
     "sweep": "sweep",
     "importance": "importance sampling",
+    "pick_freeze": "pick-freeze design",
 }
 LOADS = tuple(f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT")
 """The loads that every report shows, where they are kept: force and torque of each bushing."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tolstat import kept, units
 from tolstat.schema import Strict, refuse
@@ -82,7 +82,12 @@ class Sampling(Strict):
         Number of joints, the nominal one not counted; a sweep has its number from its points, cases from their list.
     method : str
         ``random``, ``sobol``, ``lhs``; ``sweep``: a grid of errors; ``cases``: joints listed one by one;
-        ``importance``: random, from the tolerances and ``[[proposal]]``.
+        ``importance``: random, from the tolerances and ``[[proposal]]``;
+        ``pick_freeze``: for Sobol' indices, `n` times two random joints, and for each group of errors the first of the
+        two with that group's errors of the second (Saltelli et al. 2010).
+    groups : str
+        Of ``pick_freeze``: ``tolerance``, the errors of an entry of ``[tolerances]`` together, or ``error``, each by
+        itself.
     seed : int
         Seed of all draws.
     nominal_first : bool
@@ -90,10 +95,19 @@ class Sampling(Strict):
         group of joints has its own.
     """
 
-    method: Literal["random", "sobol", "lhs", "sweep", "cases", "importance"] = "random"
+    method: Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze"] = "random"
     n: Annotated[int, Field(strict=True, ge=1, le=MAX_SAMPLES)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Flag = True
+    groups: Literal["tolerance", "error"] = "tolerance"
+
+    @model_serializer(mode="wrap")
+    def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out `groups` where it means nothing: identities of other methods do not have it."""
+        data: dict[str, Any] = write(self)
+        if self.method != "pick_freeze":
+            data.pop("groups")
+        return data
 
     @model_validator(mode="before")
     @classmethod
@@ -110,6 +124,8 @@ class Sampling(Strict):
             raise refuse("missing key n", "add n, the number of joints, for example n = 1024")
         if self.method == "lhs" and self.n is not None and self.n > MAX_ROWS:
             raise refuse(f"a Latin hypercube of {self.n} joints", f"stay at {MAX_ROWS}, or draw them another way")
+        if self.method != "pick_freeze" and "groups" in self.model_fields_set:
+            raise refuse(f"groups is given with {self.method!r}", 'leave it out: it is for method = "pick_freeze"')
         if self.method == "cases" and self.nominal_first:
             raise refuse("nominal_first with 'cases'", "leave it out: each group of joints has the ideal one")
         return self

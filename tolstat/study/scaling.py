@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 import tomllib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from tolstat import tolerance, units
 from tolstat.errors import Fault, InputError
-from tolstat.study import selection
+from tolstat.study import rewriting, selection
 from tolstat.study.study import Study
 from tolstat.study.tolerance_entry import Site
 from tolstat.study.tolerance_kinds import KINDS, RADIAL_KINDS, distribution
@@ -145,19 +144,13 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     InputError
         When the text has an entry that is not one line.
     """
-    lines = study.text.splitlines()
-    section = ""
-    for number, text in enumerate(lines):
-        header = re.match(r"\s*\[+\s*([\w.]+)\s*\]", text)
-        section = header[1] if header else section
+    lines = []
+    for section, text in rewriting.by_section(study.text):
         key, equals, _ = text.partition("=")
-        if section == "tolerances" and equals and (pattern := key.strip().strip("\"'")) in entries:
-            lines[number] = line(pattern, entries[pattern])
-        if section == "sampling" and key.strip() == "seed":
-            lines[number] = f"seed = {seed}"
-    found = "\n".join(lines) + "\n"
-    if "seed" not in tomllib.loads(study.text).get("sampling", {}):
-        found = re.sub(r"(?m)^\s*\[sampling\].*$", rf"\g<0>\nseed = {seed}", found, count=1)
+        pattern = key.strip().strip("\"'")
+        changes = section == "tolerances" and equals and pattern in entries
+        lines.append(line(pattern, entries[pattern]) if changes else text)
+    found = rewriting.with_keys("\n".join(lines), "sampling", {"seed": seed}, f"{study.name}.toml")
     wanted = tomllib.loads(study.text)
     wanted["sampling"]["seed"] = seed
     wanted["tolerances"] = {e.pattern: entries.get(e.pattern, e.value) for e in selection.entries(wanted["tolerances"])}

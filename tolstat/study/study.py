@@ -17,6 +17,7 @@ from tolstat.study.correlation import Copula
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
+from tolstat.study.freeze import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.proposal import Proposal
 from tolstat.study.selection import LIMIT_UNITS
@@ -83,6 +84,8 @@ class Study(Case):
         What the cycles of the loads are judged by.
     output : Output
         What is stored beside the results.
+    groups : tuple of Group
+        Errors that ``sampling.method`` ``pick_freeze`` moves together; empty for other methods.
     """
 
     sampling: Sampling
@@ -94,6 +97,7 @@ class Study(Case):
     listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
+    groups: tuple[Group, ...] = ()
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -125,6 +129,8 @@ class Study(Case):
         """Number of joints, the nominal one not counted."""
         if self.listed:
             return len(self.listed.table)
+        if self.groups:
+            return (self.sampling.n or 0) * (len(self.groups) + 2)
         return self.sampling.n or math.prod(axis.points for axis in self.sweep)
 
     @property
@@ -158,6 +164,8 @@ class Study(Case):
         }
         if self.proposals:
             parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
+        if self.groups:
+            parts["groups"] = [[group.label, list(group.names)] for group in self.groups]
         return dict(flat(parts | (self.listed.identity() if self.listed else {})))
 
 
@@ -229,6 +237,9 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     fatigue = file.fatigue()
     output = file.model("output", Output)
     listed = None
+    moved: tuple[Group, ...] = ()
+    if sampling is not None and sampling.method == "pick_freeze":
+        moved = groups(file.data.get("tolerances", {}), tolerances, copula, sampling.groups)
     if sampling is not None and sampling.method == "cases":
         listed = file.listed(joint, operation, solver)
     if sampling is not None:
@@ -260,4 +271,5 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         listed=listed,
         limits=limits,
         fatigue=fatigue,
+        groups=moved,
     )

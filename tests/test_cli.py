@@ -25,6 +25,7 @@ COMMANDS = (
     *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
     *("worst", "replay", "export", "fatigue", "report"),
     *("capability", "causes", "reweight", "compare", "allocate"),
+    "rare",
     *("work-precision", "bench"),
 )
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}

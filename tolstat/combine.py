@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import chain
 from pathlib import Path
@@ -77,18 +77,41 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
     with ResultStore.open(path, "r+") as store:
         _check_extendable(store, n)
         study = recall(store, n, study_path)
-        sampling = study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]}
-        changed = {"identity": study.identity(), "sampling": sampling}
-        attrs = store.attributes() | {name: json.dumps(value, allow_nan=False) for name, value in changed.items()}
-        attrs["campaign_rows"] = study.rows
-        attrs.pop("stop", None)
-
         more = range(store.n, study.rows)
-        errors = chain(_blocks(store, store.errors), draw_blocks(study, more))
-        new = origin_blocks(study, more)
-        origin = None if new is None else chain(_blocks(store, store.origin), new)
-        assemble(path, attrs, study.rows, [store], errors, overwrite=True, origin=origin)
+        grow(store, study, draw_blocks(study, more), origin_blocks(study, more))
         return study
+
+
+def grow(
+    store: ResultStore,
+    study: Study,
+    errors: Iterable[NDArray[np.void]],
+    origin: Iterable[NDArray[np.void]] | None = None,
+) -> None:
+    """Replace a result file by one with further rows, pending; nothing that it holds changes.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The file, open for writing; of no use afterwards.
+    study : Study
+        The study of the larger campaign.
+    errors, origin : iterable of tables
+        Errors of the further rows, block after block; how they were drawn, where `origins.columns` has that.
+
+    Raises
+    ------
+    StoreError
+        When the file cannot be replaced.
+    """
+    sampling = study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]}
+    changed = {"identity": study.identity(), "sampling": sampling}
+    attrs = store.attributes() | {name: json.dumps(value, allow_nan=False) for name, value in changed.items()}
+    attrs["campaign_rows"] = study.rows
+    attrs.pop("stop", None)
+    drawn = None if origin is None else chain(_blocks(store, store.origin), origin)
+    whole = chain(_blocks(store, store.errors), errors)
+    assemble(store.path, attrs, study.rows, [store], whole, overwrite=True, origin=drawn)
 
 
 def merge(paths: Sequence[Path], out: Path) -> Merged:

@@ -19,7 +19,7 @@ IMPORTANCE_FIELDS = (
     Field("weight", "1", "density of its errors under the tolerances over that under the mixture; 0 if not drawn"),
 )
 SUBSET_FIELDS = (
-    Field("level", "1", "level of the subset simulation: 0 is drawn from the tolerances", "i4"),
+    Field("level", "1", "level of the subset simulation: 0 is drawn from the tolerances, -1 the nominal joint", "i4"),
     Field("parent", "1", "row of the joint whose errors were moved to give these; -1 at level 0", "i8"),
 )
 FIELDS: dict[str, tuple[Field, ...]] = {"importance": IMPORTANCE_FIELDS, "subset": SUBSET_FIELDS}

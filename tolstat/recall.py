@@ -8,7 +8,7 @@ from pathlib import Path
 from tolstat.campaign import differing_keys
 from tolstat.errors import Fault, StoreError
 from tolstat.store import ResultStore
-from tolstat.study import Study, load
+from tolstat.study import Study, load, subset_of
 
 
 def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -> Study:
@@ -39,6 +39,8 @@ def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -
     source = path if path is not None else store.path.parent / f"{store.study_name}.toml"
     text = None if path is not None else store.study_text
     study = load(source, n=held, text=text)
+    if store.sampling["method"] == "subset":
+        study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     if differing:
         found = "\n    ".join(["its study is not as it was when the file was made", *differing])

@@ -77,10 +77,19 @@ def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
 
 def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
     """How `rows` of a study are drawn, as tables of at most `BLOCK` rows; None where `origins` has no such table."""
+    if study.sampling.method == "subset":
+        return iter([_level_0(study, rows)])
     if study.sampling.method != "importance":
         return None
     blocks = range(rows.start, rows.stop, BLOCK)
     return (_origin(study, range(first, min(first + BLOCK, rows.stop))) for first in blocks)
+
+
+def _level_0(study: Study, rows: range) -> Table:
+    table = np.zeros(len(rows), origins.SUBSET)
+    table["level"][: max(0, int(study.sampling.nominal_first) - rows.start)] = -1  # the nominal joint
+    table["parent"] = -1
+    return table
 
 
 def _origin(study: Study, rows: range) -> Table:
@@ -88,15 +97,58 @@ def _origin(study: Study, rows: range) -> Table:
     table["component"] = -1  # the nominal joint
     drawn = table[max(0, int(study.sampling.nominal_first) - rows.start) :]
     last = rows.stop - int(study.sampling.nominal_first)
-    scores, drawn["component"] = _proposed(study, _columns(study), range(last - drawn.size, last))
+    scores, drawn["component"] = _proposed(study, columns(study), range(last - drawn.size, last))
     drawn["weight"] = weights(study.proposals, scores)
+    return table
+
+
+def scores(study: Study, numbers: range) -> Array:
+    """Independent standard normal scores that the errors of samples of the random campaign are made from.
+
+    Returns
+    -------
+    ndarray, (len(numbers), d)
+        A column for each column of the errors that scatters.
+    """
+    return np.column_stack([ndtri(u) for u in _uniforms(columns(study), numbers, study).values()])
+
+
+def noise(study: Study, level: int, first: int, count: int) -> Array:
+    """Independent standard normal numbers `first` and following of a level of a subset simulation, (count, d)."""
+    streams = (_stream(study.sampling.seed, f"subset {level} {name}", first) for name in columns(study))
+    return np.column_stack([ndtri(np.maximum(stream.random(count), 2.0**-54)) for stream in streams])
+
+
+def from_scores(study: Study, scores: Array) -> Table:
+    """Errors of joints with given scores.
+
+    Parameters
+    ----------
+    study : Study
+        Its tolerances, correlation and fixed errors hold.
+    scores : ndarray, (n, d)
+        As those of `scores`.
+
+    Returns
+    -------
+    ndarray, (n,), dtype ERROR
+    """
+    table = nominal_errors(len(scores), study.operation)
+    for name, value in study.errors.items():
+        table[name] = value
+    _fill_from(table, study, {name: _probability(z) for name, z in zip(columns(study), scores.T, strict=True)})
     return table
 
 
 def values(errors: Table, name: str) -> Array:
     """Values that the distribution of an error gave, (n,), SI: for ``pin1.offset_radial`` the radii."""
-    columns = columns_of(name)
-    return np.asarray(errors[name] if len(columns) == 1 else np.hypot(*(errors[column] for column in columns)))
+    own = columns_of(name)
+    return np.asarray(errors[name] if len(own) == 1 else np.hypot(*(errors[column] for column in own)))
+
+
+def columns(study: Study) -> list[str]:
+    """Columns of the errors that scatter."""
+    return list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
 
 
 def dimensions() -> dict[str, int]:
@@ -129,11 +181,6 @@ def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
                 samples[name][index == number] = value
 
 
-def _columns(study: Study) -> list[str]:
-    """Columns of the errors that scatter."""
-    return list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
-
-
 def _fill_frozen(samples: Table, study: Study, numbers: range) -> None:
     """Two joints a point, A and B, and for each group A with the errors of that group from B."""
     size = len(study.groups) + 2
@@ -149,10 +196,15 @@ def _fill_frozen(samples: Table, study: Study, numbers: range) -> None:
 
 
 def _fill_scatter(samples: Table, study: Study, numbers: range, stream: str = "") -> None:
-    u = _uniforms(_columns(study), numbers, study, stream)
+    u = _uniforms(columns(study), numbers, study, stream)
     if study.proposals:
         scores, part = _proposed(study, list(u), numbers)
         u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
+    _fill_from(samples, study, u)
+
+
+def _fill_from(samples: Table, study: Study, u: dict[str, Array]) -> None:
+    """Errors that scatter, from independent probabilities of their columns."""
     names = study.copula.names
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))

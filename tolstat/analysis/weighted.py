@@ -3,8 +3,8 @@
 Each joint counts by its weight, the density of its errors under the tolerances over that under what it was drawn from.
 Shares are ratios of sums of weights; their variance is that of such a ratio. The interval is Clopper and Pearson's for
 the number of equal joints that would be as sure of the share (Korn and Graubard 1998), its far end for one joint more,
-as heavy as the heaviest seen (Fay and Feuer 1997). With equal weights it is just Clopper and Pearson's; with no joint
-above, one as heavy as any could have been.
+as heavy as the heaviest there, or of the outermost twenty (after Fay and Feuer 1997). With equal weights it is just
+Clopper and Pearson's; with no joint above, one as heavy as any could have been.
 """
 
 from __future__ import annotations
@@ -43,7 +43,10 @@ class Trust(NamedTuple):
 
 
 class _Sums(NamedTuple):
-    """Sum of weights, sum of their squares and largest of them, of the joints above each level and of the others."""
+    """Sum of weights, sum of their squares and largest of them, of the joints above each level and of the others.
+
+    The largest is that of the outermost `LEAST_EFFECTIVE` joints where there are fewer.
+    """
 
     above: FloatArray
     below: FloatArray
@@ -53,10 +56,12 @@ class _Sums(NamedTuple):
         """Take the weights from number `first` on, and `above`, as above; those before, and `below`, as below."""
         parts = []
         for w, rest, number in ((weights[::-1], above, weights.size - first), (weights, below, first)):
-            sums = [np.cumsum(w), np.cumsum(w**2), np.maximum.accumulate(w)]
-            own = np.array([np.insert(part, 0, 0.0)[number] for part in sums])
-            most = np.maximum(own[2], rest.max(initial=0.0))
-            parts.append(np.array([own[0] + rest.sum(), own[1] + (rest**2).sum(), most]))
+            sums, squares, largest = (
+                np.insert(f, 0, 0.0) for f in (w.cumsum(), (w**2).cumsum(), np.maximum.accumulate(w))
+            )
+            most = largest[np.clip(number, min(int(LEAST_EFFECTIVE), w.size), None)]
+            own = sums[number] + rest.sum(), squares[number] + (rest**2).sum(), np.maximum(most, rest.max(initial=0.0))
+            parts.append(np.array(own))
         return cls(*parts)
 
     @property

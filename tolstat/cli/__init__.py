@@ -11,6 +11,7 @@ from tolstat.cli import (
     fatigue,
     merge,
     plan,
+    rare,
     replay,
     report,
     reweight,
@@ -29,6 +30,7 @@ COMMANDS = (
     *(simulate.simulate, plan.plan, run.run, extend.extend, merge.merge, status.status, verify.verify),
     *(worst.worst, replay.replay, export.export, fatigue.fatigue, report.report),
     *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate),
+    rare.rare,
     *(work_precision.work_precision, bench.bench),
 )
 for command in COMMANDS:

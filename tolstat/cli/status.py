@@ -60,7 +60,8 @@ def _summary(store: ResultStore) -> dict[str, Any]:
     summary |= {state.label: int(found[state]) for state in Status}
     condition = {"damaged": damaged, "simulated_again": int((store.attempt() > 0).sum())}
     summary |= {name: count for name, count in condition.items() if count} | _pace(store, summary["pending"])
-    summary["exceedance"] = [_exceedance(store, states, name, loads[name], unit) for name, unit in units.items()]
+    judged = {} if store.sampling["method"] == "subset" else units  # whose joints are no sample
+    summary["exceedance"] = [_exceedance(store, states, name, loads[name], unit) for name, unit in judged.items()]
     return summary
 
 

@@ -205,6 +205,9 @@ class StudyFile:
                 self._fault((section,), f"has no effect with {sampling.method!r}", remedy)
         if sampling.method == "cases" and self.data.get("limits"):
             self._fault(("limits",), "has no effect with 'cases'", "remove it: listed joints have no exceedance")
+        if sampling.method == "subset":
+            remedy = 'write "random", and run: tolstat rare STUDY --limit "cross1.F > 900 N"'
+            self._fault(("sampling", "method"), "'subset' is what tolstat rare makes of a study", remedy)
         if sampling.method == "importance" and not self.data.get("proposal"):
             remedy = "add [[proposal]] with share, and widen or shift"
             self._fault(("proposal",), "missing table: what joints are drawn from beside the tolerances", remedy)

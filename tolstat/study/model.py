@@ -87,7 +87,7 @@ class Sampling(Strict):
         two with that group's errors of the second (Saltelli et al. 2010).
     groups : str
         Of ``pick_freeze``: ``tolerance``, the errors of an entry of ``[tolerances]`` together, or ``error``, each by
-        itself.
+        itself. ``subset``: not in a file, see `Subset`.
     seed : int
         Seed of all draws.
     nominal_first : bool
@@ -95,7 +95,7 @@ class Sampling(Strict):
         group of joints has its own.
     """
 
-    method: Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze"] = "random"
+    method: Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"] = "random"
     n: Annotated[int, Field(strict=True, ge=1, le=MAX_SAMPLES)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Flag = True
@@ -128,6 +128,38 @@ class Sampling(Strict):
             raise refuse(f"groups is given with {self.method!r}", 'leave it out: it is for method = "pick_freeze"')
         if self.method == "cases" and self.nominal_first:
             raise refuse("nominal_first with 'cases'", "leave it out: each group of joints has the ideal one")
+        return self
+
+
+class Subset(Sampling):
+    """How the joints of a subset simulation are drawn, see `analysis.subset`; `n` is how many there are by now.
+
+    Attributes
+    ----------
+    per_level : int
+        Joints a level.
+    p0 : float
+        Share of them that is carried to the next level.
+    load : str
+        The load asked about, ``cross1.F``.
+    above : float
+        The level asked about, SI.
+    unresolved : str
+        Whether a joint without a valid load counts as above every level or below.
+    """
+
+    method: Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "subset"] = "subset"
+    per_level: Annotated[int, Field(strict=True, ge=20, le=MAX_ROWS)]
+    p0: Annotated[Number, Field(gt=0, le=0.5)]
+    load: str
+    above: Number
+    unresolved: Literal["above", "below"] = "below"
+
+    @model_validator(mode="after")
+    def _whole_seeds(self) -> Self:
+        seeds = self.per_level * self.p0
+        if abs(seeds - round(seeds)) > 1e-9 or seeds < 2:
+            raise refuse(f"{self.p0:g} of {self.per_level} joints are {seeds:g} seeds", "give a whole number above 1")
         return self
 
 

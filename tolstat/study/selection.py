@@ -74,6 +74,19 @@ def quantity(entry: Entry, unit: str, place: str) -> float:
         raise InputError([Fault(f"{place}: {dotted(entry.path)}", context["found"], context["remedy"])]) from error
 
 
+def limit_of(load: str, level: str, place: str) -> float:
+    """Level of a load that can have a limit, SI.
+
+    Raises
+    ------
+    InputError
+        When there is no such load, or the level is no quantity of its unit.
+    """
+    if load not in LIMIT_UNITS:
+        raise InputError([Fault(place, f"{load!r} is not a load", did_you_mean(load, list(LIMIT_UNITS)))])
+    return quantity(Entry(load, (load,), level), LIMIT_UNITS[load], place)
+
+
 def fixed_errors(
     table: Mapping[str, Any], section: Sequence[int | str], place: str, claims: Claims
 ) -> dict[str, float]:

@@ -1,0 +1,192 @@
+"""Probabilities of rare loads by subset simulation: its levels are rows of a result file, stage after stage.
+
+A stage is what can be simulated at once: all joints of level 0, or one step of all chains. Before each the file grows
+by its joints, pending, and a campaign simulates them. Nothing else is kept: which joints come next follows from the
+study and the loads in the file, so that a run that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tolstat import campaign, sampling
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
+from tolstat.combine import grow
+from tolstat.errors import Fault, InputError, StoreError
+from tolstat.execution import Execution
+from tolstat.origins import SUBSET
+from tolstat.progress import note
+from tolstat.report.source import load
+from tolstat.store import ResultStore
+from tolstat.study import Study
+from tolstat.study.model import Subset
+from tolstat.study.selection import limit_of
+from tolstat.tables import Status
+
+MANY = 2000
+"""Joints of a stage from which on it is worth starting worker processes: some seconds of work."""
+_LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
+
+
+class Found(NamedTuple):
+    """What a subset simulation came to.
+
+    Attributes
+    ----------
+    sampling : Subset
+        The question, and how it was put.
+    levels : list of Level
+        See `analysis.subset.Level`; loads in SI units.
+    reached : bool
+        Whether the levels reached the limit.
+    estimate : Estimate
+        The probability.
+    joints : int
+        Joints simulated, the nominal one not counted.
+    unresolved : int
+        Joints among them without a valid load.
+    unresolved_first : int
+        Joints among those of level 0, which are drawn at random, without a valid load.
+    """
+
+    sampling: Subset
+    levels: list[Level]
+    reached: bool
+    estimate: Estimate
+    joints: int
+    unresolved: int
+    unresolved_first: int
+
+    @property
+    def as_sure_as(self) -> float:
+        """Number of joints drawn at random that would be as sure of the probability; NaN where it is not known."""
+        p, deviation = self.estimate.probability, self.estimate.deviation
+        return (1.0 - p) / (p * deviation**2) if deviation > 0 else math.nan
+
+    @property
+    def upper_if_above(self) -> float:
+        """Most that the probability can be if all joints without a valid load are above, as far as level 0 tells."""
+        return min(1.0, self.estimate.upper + self.unresolved_first / self.sampling.per_level)
+
+
+def parse(text: str) -> tuple[str, float]:
+    """Load and level (SI) that ``"cross1.F > 900 N"`` asks about.
+
+    Raises
+    ------
+    InputError
+        When it is something else.
+    """
+    found = _LIMIT.fullmatch(text)
+    if found is None:
+        raise InputError([Fault("--limit", f"{text!r} is no limit", 'write --limit "cross1.F > 900 N"')])
+    return found["load"], limit_of(found["load"], found["level"], "--limit")
+
+
+def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> Found:
+    """Carry a subset simulation through, or on.
+
+    Parameters
+    ----------
+    plan : Study
+        As `study.subset_of` makes it.
+    out : Path
+        Result file; made if it does not exist, otherwise gone on with.
+    workers : int, optional
+        Processes for each stage, which change no number. Without it stages of few joints stay in this process, which
+        nothing then protects from a joint that crashes.
+    tell : callable, optional
+        Told of each level that is complete.
+
+    Returns
+    -------
+    Found
+
+    Raises
+    ------
+    StoreError
+        When the file is of another question, or was begun by other code.
+    Interrupted, WorkerDied
+        As `campaign.run`; the same call goes on.
+    """
+    asked = plan.sampling
+    assert isinstance(asked, Subset)
+    walk = Walk(Settings(asked.per_level, asked.p0, asked.above), lambda *which: _noise(plan, *which))
+    unresolved: list[int] = []
+    first, told = int(asked.nominal_first), 0
+    held = _rows(out) or first + asked.per_level
+    _simulate(plan, out, held, held, workers, tell)  # which also finds out that the file is of another question
+    while not walk.done:
+        stage = range(first, first + walk.next.parent.size)
+        if held < stage.stop:
+            held = stage.stop
+            _append(plan, out, stage, walk.next)
+            _simulate(plan, out, held, len(stage), workers, tell)
+        loads, lost = _loads(asked, out, stage, walk.next)
+        unresolved.append(lost)
+        walk.take(loads)
+        first = stage.stop
+        for number, level in enumerate(walk.levels[told:], told):
+            tell(f"level {number}: {level.joints} joints, {level.share:.3g} of them beyond the next threshold")
+        told = len(walk.levels)
+    joints = first - int(asked.nominal_first)
+    return Found(asked, walk.levels, walk.reached, walk.estimate(), joints, sum(unresolved), unresolved[0])
+
+
+def _noise(plan: Study, level: int, first: int, count: int) -> FloatArray:
+    """Scores of level 0, what moves them at the others."""
+    if level == 0:
+        return sampling.scores(plan, range(first, first + count))
+    return sampling.noise(plan, level, first, count)
+
+
+def _rows(out: Path) -> int:
+    if not out.exists():
+        return 0
+    with ResultStore.open(out) as store:
+        return store.n
+
+
+def _sized(plan: Study, rows: int) -> Study:
+    """The study with so many rows."""
+    n = rows - int(plan.sampling.nominal_first)
+    return replace(plan, sampling=plan.sampling.model_copy(update={"n": n}))
+
+
+def _simulate(plan: Study, out: Path, rows: int, count: int, workers: int | None, tell: Callable[[str], None]) -> None:
+    """Simulate the rows of the file that are pending, some `count` of them."""
+    execution = Execution(workers=workers)
+    if workers is None and count < MANY:
+        execution = Execution("serial", 1, block=count)
+    campaign.run(_sized(plan, rows), out, execution=execution, tell=tell, check=False)
+
+
+def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
+    """Give the file the joints of a stage, pending."""
+    origin = np.empty(len(stage), SUBSET)
+    origin["level"], origin["parent"] = joints.level, joints.parent + int(plan.sampling.nominal_first)
+    with ResultStore.open(out, "r+") as store:
+        grow(store, _sized(plan, stage.stop), [sampling.from_scores(plan, joints.scores)], [origin])
+
+
+def _loads(asked: Subset, out: Path, stage: range, joints: Candidates) -> tuple[FloatArray, int]:
+    """Loads of a stage, those that are not valid beyond every level or below, and how many these are."""
+    rows = slice(stage.start, stage.stop)
+    with ResultStore.open(out) as store:
+        results, origin = store.results(rows), store.origin(rows)
+    parent = np.where(joints.parent < 0, -1, joints.parent + int(asked.nominal_first))
+    if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():
+        found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
+        raise StoreError(str(Fault(str(out), found, "run it anew with another --out")))
+    values = load(results, asked.load)[0].copy()
+    lost = (results["status"] != Status.OK) | ~np.isfinite(values)
+    values[lost] = math.inf if asked.unresolved == "above" else -math.inf
+    return values, int(lost.sum())

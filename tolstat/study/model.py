@@ -73,6 +73,9 @@ class Solver(Strict):
         )
 
 
+Drawing = Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"]
+
+
 class Sampling(Strict):
     """``[sampling]``: how many joints, and how they are drawn.
 
@@ -84,10 +87,10 @@ class Sampling(Strict):
         ``random``, ``sobol``, ``lhs``; ``sweep``: a grid of errors; ``cases``: joints listed one by one;
         ``importance``: random, from the tolerances and ``[[proposal]]``;
         ``pick_freeze``: for Sobol' indices, `n` times two random joints, and for each group of errors the first of the
-        two with that group's errors of the second (Saltelli et al. 2010).
+        two with that group's errors of the second (Saltelli et al. 2010); ``subset``: not in a file, see `Subset`.
     groups : str
         Of ``pick_freeze``: ``tolerance``, the errors of an entry of ``[tolerances]`` together, or ``error``, each by
-        itself. ``subset``: not in a file, see `Subset`.
+        itself.
     seed : int
         Seed of all draws.
     nominal_first : bool
@@ -95,7 +98,7 @@ class Sampling(Strict):
         group of joints has its own.
     """
 
-    method: Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"] = "random"
+    method: Drawing = "random"
     n: Annotated[int, Field(strict=True, ge=1, le=MAX_SAMPLES)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Flag = True
@@ -106,7 +109,7 @@ class Sampling(Strict):
         """Leave out `groups` where it means nothing: identities of other methods do not have it."""
         data: dict[str, Any] = write(self)
         if self.method != "pick_freeze":
-            data.pop("groups")
+            data.pop("groups", None)
         return data
 
     @model_validator(mode="before")
@@ -148,7 +151,7 @@ class Subset(Sampling):
         Whether a joint without a valid load counts as above every level or below.
     """
 
-    method: Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "subset"] = "subset"
+    method: Drawing = "subset"
     per_level: Annotated[int, Field(strict=True, ge=20, le=MAX_ROWS)]
     p0: Annotated[Number, Field(gt=0, le=0.5)]
     load: str

@@ -23,7 +23,7 @@ from tolstat.tables import BUSHINGS, ERROR_COLUMNS, RESULT_COLUMNS, Simulation, 
 
 COMMANDS = (
     *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
-    *("worst", "replay", "export", "fatigue", "report"),
+    *("worst", "replay", "export", "fatigue", "time-above", "report"),
     *("capability", "causes", "reweight", "compare", "allocate"),
     "rare",
     *("work-precision", "bench"),

@@ -179,13 +179,34 @@ def _counted(store: ResultStore) -> Iterator[tuple[NDArray[np.intp], dict[str, N
         if "cycles" in held:
             yield rows, {name: store.histories(name, rows) for name in rainflow.SPECS}
             continue
-        joints = [rainflow.count(load) for load in _loads(store, rows)]
+        joints = [rainflow.count(load) for load in loads(store, rows)]
         yield rows, {name: np.stack([joint[name] for joint in joints]) for name in rainflow.SPECS}
 
 
-def _loads(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[Any]:
-    """Bushing loads of `rows`, (m, samples, 8, 6), N and N m."""
+def loads(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[Any]:
+    """Bushing loads of rows of a file over a revolution.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The campaign.
+    rows : ndarray of int, shape (m,)
+        Rows of the file.
+
+    Returns
+    -------
+    ndarray, shape (m, samples, 8, 6)
+        Force and torque of each bushing along e, t, z, N and N m, from histories in full or restored from harmonics.
+
+    Raises
+    ------
+    StoreError
+        When the file holds neither.
+    """
     if "loads" in store.history_specs:
         return store.histories("loads", rows)
+    if "coefficients_real" not in store.history_specs:
+        remedy = 'set histories = "harmonics" or "full" in [output] of the study and run it anew'
+        raise StoreError(str(Fault(str(store.path), "holds no load histories", remedy)))
     real, imag = (store.histories(f"coefficients_{part}", rows) for part in ("real", "imag"))
     return np.moveaxis(restore(real, imag, int(store.options["steps_per_rev"])), 0, 1)

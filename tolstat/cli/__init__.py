@@ -18,6 +18,7 @@ from tolstat.cli import (
     run,
     simulate,
     status,
+    time_above,
     verify,
     work_precision,
     worst,
@@ -28,7 +29,7 @@ __all__ = ["app", "main"]
 
 COMMANDS = (
     *(simulate.simulate, plan.plan, run.run, extend.extend, merge.merge, status.status, verify.verify),
-    *(worst.worst, replay.replay, export.export, fatigue.fatigue, report.report),
+    *(worst.worst, replay.replay, export.export, fatigue.fatigue, time_above.time_above, report.report),
     *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate),
     rare.rare,
     *(work_precision.work_precision, bench.bench),

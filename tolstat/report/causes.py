@@ -26,9 +26,10 @@ def text(causes: Causes, shown: int = 12) -> str:
     """
     table = causes.table
     marked = (table["direction_p"] < SIGNIFICANT) | (table["size_p"] < SIGNIFICANT)
+    total = _interval if math.isnan(causes.r2) else _ends  # from given data there are but bounds
     rows = [["error", "alone, %", "in all, %", "rank coefficient", "tail: larger", "tail: farther out"]]
     for row in table[(table.index < shown) | marked].to_dict("records"):
-        line = [row["error"], _interval(row, "first", 100), _ends(row, "total", 100), _interval(row, "srrc")]
+        line = [row["error"], _interval(row, "first", 100), total(row, "total", 100), _interval(row, "srrc")]
         rows.append([*line, _tail(row, "direction"), _tail(row, "size")])
     columns = [column for column in zip(*rows, strict=True) if set(column[1:]) != {"-"}]
     return align([list(row) for row in zip(*columns, strict=True)])
@@ -40,12 +41,13 @@ def note(causes: Causes, log: bool = False) -> str:
     std = f"{causes.std:.4g}, of the logarithm" if log else f"{causes.std:.4g} {unit}".rstrip()
     tail = f"tail: {causes.above} joints above {causes.level:.5g} {unit}".rstrip()
     if math.isnan(causes.r2):
-        tail, ranks = "from a pick-freeze design", ""
+        tail, ranks, alone = "from a pick-freeze design", "", "groups of errors"
     else:
+        alone = "errors"
         ranks = f", ranks {100 * causes.r2:.0f} %"
     lines = [
         f"{causes.load}: {causes.joints} joints, {causes.lost} without a valid load left out; standard deviation {std}",
-        f"errors alone explain {100 * causes.additive:.0f} % of the variance{ranks}; {tail}",
+        f"{alone} alone explain {100 * causes.additive:.0f} % of the variance{ranks}; {tail}",
     ]
     if causes.table["total"].isna().all():
         lines.append("errors are correlated: shares overlap, and there is no share in all")

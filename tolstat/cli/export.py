@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, say, writing
+from tolstat.cli._app import ResultFile, as_text, say, writing
+from tolstat.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from typing import TextIO
@@ -27,13 +29,26 @@ def export(
         str | None,
         typer.Option("--pylife", metavar="OUT", help="CSV file for load cycles as pyLife takes them; - likewise."),
     ] = None,
+    parquet: Annotated[
+        str | None, typer.Option("--parquet", metavar="OUT", help="Parquet file for the joints (needs pyarrow).")
+    ] = None,
+    statistics: Annotated[
+        str | None, typer.Option("--json", metavar="OUT", help="JSON file for all statistics; - likewise.")
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        typer.Option("--by", metavar="LOAD", help="With --json: loads whose causes are told; repeat for more."),
+    ] = None,
 ) -> None:
-    """Write all joints of a campaign, or the cycles of their loads, as CSV.
+    """Write the joints of a campaign, the cycles of their loads, or all statistics.
 
     One row a joint: its errors, then its results, in SI units; before them the case and variant that it is,
     if the study lists its joints. The first line names the columns, the second
     gives their units: pandas reads it with header=[0, 1]. Joints that are pending or failed have their row
     too; what is not known is empty.
+
+    Parquet has the same columns, and their units in the metadata: pandas has them as frame.attrs["units"]. JSON has the
+    share above each limit, quantiles, capability, the numerical error and what the file was made by.
 
     With --pylife one row a joint, channel and class of range and mean: cycles per revolution, for files whose study
     keeps cycles or load histories. See docs/fatigue.md for the lines that read it as a Series.
@@ -41,21 +56,35 @@ def export(
     from tolstat.files import check_target
     from tolstat.store import ResultStore
 
-    targets = [target for target in (out, cycles) if target is not None]
-    if not targets or (targets[0] == targets[-1] and len(targets) == 2):
-        raise typer.BadParameter("give --csv OUT, --pylife OUT, or both with two names")
+    given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--json": statistics}
+    targets = [target for target in given.values() if target is not None]
+    if not targets or len(set(targets)) < len(targets):
+        raise typer.BadParameter(
+            "give --csv OUT, --parquet OUT, --json OUT or --pylife OUT, or some with different names"
+        )
+    if by and statistics is None:
+        raise typer.BadParameter("--by is for --json OUT")
+    if parquet is not None and find_spec("pyarrow") is None:
+        raise InputError([Fault("--parquet", "pyarrow is not installed", "pip install pyarrow, or take --csv")])
     for target in targets:
         if target != "-":
             check_target(Path(target), file)
     with ResultStore.open(file) as store:
         if cycles is not None:
             _write(cycles, *_collectives(store))
-        if out is not None:
-            frame = store.to_pandas(units=True)
-            _write(out, lambda stream: _write_table(frame, stream), f"{len(frame)} joints")
+        if statistics is not None:
+            _write(statistics, *_statistics(store, by or ()))
+        if out is None and parquet is None:
+            return
+        frame = store.to_pandas(units=True)
+    if out is not None:
+        _write(out, lambda stream: _write_table(frame, stream), f"{len(frame)} joints")
+    if parquet is not None:
+        _write_parquet(frame, Path(parquet))
+        say(f"wrote {parquet}: {len(frame)} joints")
 
 
-def _write(out: str, write: Callable[[TextIO], None], what: str) -> None:
+def _write(out: str, write: Callable[[TextIO], object], what: str) -> None:
     import sys
 
     if out == "-":
@@ -72,6 +101,23 @@ def _collectives(store: ResultStore) -> tuple[Callable[[TextIO], None], str]:
     table = pylife.table(pylife.series(store))
     what = f"cycles of {table['joint'].nunique()} joints"
     return lambda stream: table.to_csv(stream, index=False, lineterminator="\n"), what
+
+
+def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
+    from tolstat import causes, summary
+    from tolstat.report import text
+
+    found = summary.of_store(store)
+    asked = {load: causes.of_store(store, load) for load in by}
+    found["causes"] = {load: own._asdict() | {"table": text.records(own.table)} for load, own in asked.items()}
+    return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"
+
+
+def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
+    plain = frame.droplevel(1, axis=1)
+    plain.attrs["units"] = dict(zip(*(frame.columns.get_level_values(k) for k in (0, 1)), strict=True))
+    with writing(path) as temporary:
+        plain.to_parquet(temporary, engine="pyarrow")
 
 
 def _write_table(frame: pd.DataFrame, stream: TextIO) -> None:

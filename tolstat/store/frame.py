@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import origins, tables
+from tolstat.errors import Fault, InputError
 from tolstat.tables import Status
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray
 
     from tolstat.store.reader import Reader
 
@@ -37,6 +39,20 @@ def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
     if units:
         return pd.DataFrame(data, index=index)
     return pd.DataFrame({name: values for (name, _), values in data.items()}, index=index)
+
+
+def to_xarray(store: Reader) -> xarray.Dataset:
+    """Put a campaign into one data set, see `ResultStore.to_xarray`."""
+    try:
+        import xarray
+    except ImportError as error:
+        fault = Fault(str(store.path), "xarray is not installed", "pip install xarray, or take to_pandas()")
+        raise InputError([fault]) from error
+    frame = to_pandas(store)
+    columns = (*origins.columns(store.sampling), *tables.ERROR_COLUMNS, *store.columns)
+    told = {c.name: {"units": c.unit, "description": c.description} for c in columns}
+    data = {name: ("row", frame[name].to_numpy(), told.get(str(name), {})) for name in frame}
+    return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": store.study_name})
 
 
 def _design(store: Reader) -> dict[tuple[str, str], NDArray[Any]]:

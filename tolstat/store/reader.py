@@ -16,13 +16,14 @@ from tolstat import kept, tables
 from tolstat.errors import StoreError
 from tolstat.store import checks, integrity
 from tolstat.store.counts import Counts
-from tolstat.store.frame import to_pandas
+from tolstat.store.frame import to_pandas, to_xarray
 from tolstat.store.histories import HistoryParts
 from tolstat.store.result_file import campaign_digest, descriptions, fault, is_locked, open_hdf5, text
 from tolstat.tables import Status, Variant
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray
 
 BLOCK = 1 << 16
 """Rows that are looked at together: no table of a large campaign is needed whole to go on with it."""
@@ -270,6 +271,10 @@ class Reader:
             them, where the study lists its joints, name of the case, index and family of the variant, and group.
         """
         return to_pandas(self, units)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Errors and results along ``row``, with ``units`` and ``description``; raises InputError without xarray."""
+        return to_xarray(self)
 
     def _read_judgement(self) -> None:
         attrs = self._file.attrs

@@ -4,8 +4,11 @@
     tolstat.run(study, "iso2768_f.h5")
     with tolstat.open("iso2768_f.h5") as store:
         frame = store.to_pandas()
+        found = tolstat.causes_of(store, "cross1.F")
 
-Names are imported when first used, so that the command line starts at once.
+Functions on arrays (`exceedance`, `quantile`, `capability`) take the loads of joints and what became of them; those on
+an open result file answer what the command line does. Names are imported when first used, so that the command line
+starts at once.
 """
 
 from __future__ import annotations
@@ -14,17 +17,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tolstat.allocate import of_store as allocated
+    from tolstat.analysis.capability import at as capability
     from tolstat.analysis.exceedance import at as exceedance
+    from tolstat.analysis.quantile import at as quantile
     from tolstat.campaign import run
+    from tolstat.causes import of_store as causes_of
+    from tolstat.compare import of_stores as compared
+    from tolstat.duration import of_store as time_above
     from tolstat.errors import InputError, StoreError, TolstatError
+    from tolstat.fatigue import read as load_cycles
     from tolstat.integration import integrate
     from tolstat.joint import perturb
     from tolstat.pylife import series as pylife_series
-    from tolstat.report import write as report
+    from tolstat.report import write as write_report
+    from tolstat.report.fatigue import equivalent_loads
+    from tolstat.reweight import of_store as reweighted
     from tolstat.sampling import draw
     from tolstat.simulation import simulate_rows
     from tolstat.study import load, load_case
+    from tolstat.summary import of_store as statistics
     from tolstat.tables import Status
+    from tolstat.tail import worst as worst_joints
     from tolstat.trace import simulate_case
 
 __version__ = "0.1.0"
@@ -34,18 +48,29 @@ __all__ = [
     "Status",
     "StoreError",
     "TolstatError",
+    "allocated",
+    "capability",
+    "causes_of",
+    "compared",
     "draw",
+    "equivalent_loads",
     "exceedance",
     "integrate",
     "load",
     "load_case",
+    "load_cycles",
     "open",
     "perturb",
     "pylife_series",
-    "report",
+    "quantile",
+    "reweighted",
     "run",
     "simulate_case",
     "simulate_rows",
+    "statistics",
+    "time_above",
+    "worst_joints",
+    "write_report",
 ]
 
 _HOMES = {
@@ -53,18 +78,29 @@ _HOMES = {
     "Status": "tolstat.tables:Status",
     "StoreError": "tolstat.errors:StoreError",
     "TolstatError": "tolstat.errors:TolstatError",
+    "allocated": "tolstat.allocate:of_store",
+    "capability": "tolstat.analysis.capability:at",
+    "causes_of": "tolstat.causes:of_store",
+    "compared": "tolstat.compare:of_stores",
     "draw": "tolstat.sampling:draw",
+    "equivalent_loads": "tolstat.report.fatigue:equivalent_loads",
     "exceedance": "tolstat.analysis.exceedance:at",
     "integrate": "tolstat.integration:integrate",
     "load": "tolstat.study:load",
     "load_case": "tolstat.study:load_case",
+    "load_cycles": "tolstat.fatigue:read",
     "open": "tolstat.store:ResultStore.open",
     "perturb": "tolstat.joint:perturb",
     "pylife_series": "tolstat.pylife:series",
-    "report": "tolstat.report:write",
+    "quantile": "tolstat.analysis.quantile:at",
+    "reweighted": "tolstat.reweight:of_store",
     "run": "tolstat.campaign:run",
     "simulate_case": "tolstat.trace:simulate_case",
     "simulate_rows": "tolstat.simulation:simulate_rows",
+    "statistics": "tolstat.summary:of_store",
+    "time_above": "tolstat.duration:of_store",
+    "worst_joints": "tolstat.tail:worst",
+    "write_report": "tolstat.report:write",
 }
 
 

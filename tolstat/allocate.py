@@ -132,6 +132,13 @@ def of_store(
         With every fault of limits, costs and names.
     StoreError
         When the file's joints are not drawn from tolerances, or too few.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as store:
+    ...     found = tolstat.allocated(store, ["P(cross1.F > 700 N) < 0.08"])
+    >>> found.tolerances.set_index("tolerance")["factor"].round(1).to_dict()
+    {'pin4.tilt_t': 1.0, 'pin[12].offset_t': 0.8}
     """
     study = recall(store, path=study_path)
     if not study.tolerances:

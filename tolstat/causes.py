@@ -92,6 +92,13 @@ def of_store(
         When there is no such load.
     StoreError
         When the file has too few valid joints, or joints that are not drawn from tolerances.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as store:
+    ...     found = tolstat.causes_of(store, "cross1.F")
+    >>> found.table["error"][:2].sort_values().tolist()
+    ['pin1.offset_t', 'pin2.offset_z']
     """
     if by not in LIMIT_UNITS:
         raise InputError([Fault("--by", f"{by!r} is not a load", did_you_mean(by, list(LIMIT_UNITS)))])

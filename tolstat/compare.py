@@ -120,6 +120,15 @@ def of_stores(a: ResultStore, b: ResultStore, by: Sequence[str] = (), confidence
         When a load is none, or not kept by both.
     StoreError
         When a file holds joints that are not drawn from tolerances, or has none with a valid load.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as a, tolstat.open(other) as b:
+    ...     found = tolstat.compared(a, b, ["cross1.F"])
+    >>> found.sides.paired, [change.keys[0] for change in found.changes]
+    (True, ['sampling.n'])
+    >>> int(found.shares["only_a"].iloc[0]), int(found.shares["only_b"].iloc[0])
+    (0, 0)
     """
     for store in (a, b):
         if store.sampling["method"] not in DRAWN:

@@ -81,6 +81,14 @@ def of_store(
         With the faults of the settings, and every error whose new distribution reaches where no joint was drawn.
     StoreError
         When the joints of the file are not drawn from tolerances.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as store:
+    ...     found = tolstat.reweighted(store, ["pin1.offset_t.plus_minus=0.09 mm"])
+    >>> row = found.table.iloc[0]
+    >>> found.weights.usable, row["load"], bool(row["estimate"] < row["before"])
+    (True, 'cross1.F', True)
     """
     study = recall(store, path=study_path)
     if not study.tolerances:

@@ -34,6 +34,13 @@ def of_store(store: ResultStore, confidence: float = 0.95) -> dict[str, Any]:
     ------
     StoreError
         When the file holds listed joints or a sweep.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as store:
+    ...     found = tolstat.statistics(store)
+    >>> found["joints"], round(found["limits"][0]["estimate"], 2)
+    ({'ok': 12000}, 0.15)
     """
     if store.sampling["method"] in ("cases", "sweep"):
         remedy = "its joints are in: tolstat export --csv"

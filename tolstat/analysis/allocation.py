@@ -185,6 +185,13 @@ def joints_needed(share: float, ess: float, target: float, confidence: float = 0
     -------
     float
         Factor, a power of two; inf where the estimate itself is not below the target.
+
+    Examples
+    --------
+    >>> joints_needed(share=0.002, ess=1000, target=0.01)
+    1.0
+    >>> joints_needed(share=0.008, ess=1000, target=0.01)
+    16.0
     """
     from tolstat.analysis.exceedance import clopper_pearson
 

@@ -88,6 +88,14 @@ def at(values: ArrayLike, status: ArrayLike, limit: float, confidence: float = 0
     ------
     ValueError
         As `exceedance.at`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> load = np.random.default_rng(1).normal(650.0, 10.0, 5000)  # N
+    >>> found = at(load, [1] * 5000, limit=690.0)
+    >>> round(found.cpk_normal, 1), found.above.count, found.needed
+    (1.3, 0, 3244)
     """
     above = exceedance.at(values, status, limit, confidence, iid)
     valid = exceedance.sort_out(values, status).valid

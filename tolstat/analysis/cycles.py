@@ -174,6 +174,11 @@ def share_of_revolution_above(loads: ArrayLike, level: float) -> FloatArray:
     -------
     ndarray, shape (n,)
         Between 0 and 1; NaN for joints without results.
+
+    Examples
+    --------
+    >>> share_of_revolution_above([[0.0, 1.0, 2.0, 1.0]], level=1.5).tolist()
+    [0.25]
     """
     x = np.asarray(loads, dtype=float)
     following = np.roll(x, -1, axis=1)

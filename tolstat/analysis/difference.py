@@ -99,6 +99,14 @@ def shares(
     ------
     ValueError
         When the lengths of pairs differ or a side has no valid load.
+
+    Examples
+    --------
+    >>> a = [650.0, 690.0, 705.0, 640.0]
+    >>> b = [660.0, 710.0, 720.0, 650.0]
+    >>> found = shares(a, b, [700.0], paired=True)
+    >>> found.only_a.tolist(), found.only_b.tolist(), found.estimate.tolist(), found.p.tolist()
+    ([0], [1], [0.25], [1.0])
     """
     x, y = _sides(a, b, paired)
     level = np.atleast_1d(np.asarray(levels, dtype=float))

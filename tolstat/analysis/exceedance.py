@@ -167,6 +167,15 @@ def at(values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0
     -------
     Exceedance
         Estimate, interval and bounds.
+
+    Examples
+    --------
+    >>> load = [640.0, 655.0, 720.0, 690.0]  # N, the largest of each joint
+    >>> found = at(load, status=[1, 1, 1, 2], level=700.0)  # the last joint has not settled
+    >>> found.count, round(found.estimate, 3), round(found.lower, 4), round(found.upper, 3)
+    (1, 0.333, 0.0084, 0.906)
+    >>> found.bound_lower, found.bound_upper
+    (0.25, 0.5)
     """
     row = curve(values, status, [level], confidence, iid)[0]
     return Exceedance(*row.tolist())

@@ -70,6 +70,15 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     ------
     ValueError
         When the lengths differ, the load does not scatter, or an index has fewer than `FEWEST` points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> a, b = np.random.default_rng(1).normal(size=(2, 4000, 2))
+    >>> load = lambda x: x[..., 0] + 2.0 * x[..., 1]
+    >>> mixed = np.stack([np.where([True, False], b, a), np.where([False, True], b, a)], axis=1)
+    >>> indices(load(a), load(b), load(mixed)).total.estimate.round(1).tolist()
+    [0.2, 0.8]
     """
     x, y, mixed = (np.asarray(v, dtype=float) for v in (a, b, ab))
     if x.ndim != 1 or x.shape != y.shape or mixed.ndim != 2 or len(mixed) != len(x):

@@ -66,6 +66,12 @@ def at(values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0
     ------
     ValueError
         When `share` or `confidence` is not between 0 and 1, or the shapes differ.
+
+    Examples
+    --------
+    >>> found = at(range(1, 101), [1] * 100, share=0.9)
+    >>> found.estimate, found.lower, found.upper
+    (90.0, 84.0, 96.0)
     """
     if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
         raise ValueError(f"share {share} and confidence {confidence} must lie between 0 and 1")
@@ -102,6 +108,11 @@ def wilks(share: float, confidence: float = 0.95) -> int:
     ------
     ValueError
         When `share` or `confidence` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> wilks(0.95), wilks(0.99)
+    (59, 299)
     """
     if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
         raise ValueError(f"share {share} and confidence {confidence} must lie between 0 and 1")

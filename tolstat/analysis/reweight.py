@@ -80,6 +80,16 @@ def smooth(log_ratios: ArrayLike) -> Weights:
     ------
     ValueError
         When no joint has any weight, or a ratio is NaN or +inf.
+
+    Examples
+    --------
+    >>> from scipy.stats import norm
+    >>> errors = norm.ppf([(k + 0.5) / 400 for k in range(400)])  # of normal tolerances, sigma 1
+    >>> weights = smooth(norm.logpdf(errors, 0, 0.8) - norm.logpdf(errors))  # and for sigma 0.8
+    >>> weights.usable, round(weights.ess)
+    (True, 373)
+    >>> [round(float(x), 3) for x in (share_above(errors, weights, 1.0).estimate, norm.sf(1.0 / 0.8))]
+    [0.105, 0.106]
     """
     logs = np.asarray(log_ratios, dtype=float)
     if np.isnan(logs).any() or (logs == np.inf).any():

@@ -90,6 +90,13 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     ------
     ValueError
         When the lengths differ, a value is not finite, or there are fewer than `FEWEST` joints.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x = np.random.default_rng(1).normal(size=(4000, 2))
+    >>> first_order(x, x[:, 0] + 2.0 * x[:, 1]).estimate.round(1).tolist()
+    [0.2, 0.8]
     """
     errors, loads = _checked(x, y)
     centred = (loads - loads.mean(axis=0)).reshape(len(loads), -1)

@@ -1,0 +1,73 @@
+"""The names of the package: each is there, documented, no module in its place; examples in docstrings and studies."""
+
+import doctest
+import importlib
+import inspect
+import re
+import runpy
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import tolstat
+from tests.test_allocate import TWO
+from tests.test_causes import TEXT, made
+from tests.test_reweight import campaign
+
+ROOT = Path(__file__).parent.parent
+ON_ARRAYS = (
+    *("exceedance", "quantile", "capability", "reweight", "difference", "pick_freeze", "sensitivity"),
+    *("cycles", "allocation"),
+)
+
+
+def test_names_are_documented_functions_and_no_modules():
+    listed = re.findall(r"`(\w+)`", (ROOT / "docs" / "python.md").read_text(encoding="utf-8").split("|---|---|")[1])
+    for name in tolstat.__all__:
+        value = getattr(tolstat, name)
+        assert value == getattr(tolstat, name)
+        assert inspect.getdoc(value), name
+        assert find_spec(f"tolstat.{name}") is None, f"the module {name} takes the place of the function"
+        assert name in listed or issubclass(value, Exception), name
+    with pytest.raises(AttributeError, match="no attribute"):
+        _ = tolstat.nothing
+
+
+@pytest.mark.parametrize("module", ON_ARRAYS)
+def test_examples_on_arrays(module):
+    failed, attempted = doctest.testmod(importlib.import_module(f"tolstat.analysis.{module}"))
+    assert (failed, attempted > 0) == (0, True)
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory):
+    """Result files that the examples of each module are about."""
+    folder = tmp_path_factory.mktemp("api")
+    two = campaign(folder, TWO, "two")
+    fewer = campaign(folder, TWO.replace("n = 12000", "n = 500"), "fewer")
+    known = made(folder, TEXT.replace("3000", "600"))
+    return {
+        **{name: {"path": two} for name in ("allocate", "reweight", "summary")},
+        "compare": {"path": two, "other": fewer},
+        "causes": {"path": known},
+    }
+
+
+@pytest.mark.parametrize("module", ["allocate", "reweight", "summary", "compare", "causes"])
+def test_examples_on_files(module, examples):
+    # import_module, as a name of the package may be a function
+    found = doctest.testmod(
+        importlib.import_module(f"tolstat.{module}"), extraglobs={"tolstat": tolstat, **examples[module]}
+    )
+    assert (found.failed, found.attempted > 0) == (0, True)
+
+
+def test_the_example_study_runs_cell_by_cell(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["example.py", str(tmp_path)])
+    runpy.run_path(str(ROOT / "studies" / "example.py"))
+    said = capsys.readouterr().out
+    assert "P(cross1.F > 1500 N)" in said
+    assert "times a joint changed the side of a limit" in said
+    assert (tmp_path / "example_next_exceedance.png").stat().st_size > 10_000

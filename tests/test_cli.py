@@ -23,9 +23,9 @@ from tolstat.tables import BUSHINGS, ERROR_COLUMNS, RESULT_COLUMNS, Simulation, 
 
 COMMANDS = (
     *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
-    *("worst", "replay", "export", "fatigue", "time-above", "report"),
-    *("capability", "causes", "reweight", "compare", "allocate"),
-    "rare",
+    *("worst", "replay", "export", "fatigue", "report"),
+    *("capability", "causes", "reweight", "compare", "allocate", "time-above"),
+    *("rare", "multifidelity"),
     *("work-precision", "bench"),
 )
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}

@@ -131,7 +131,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
     params = perturbed(study, rows, errors, perturb)
     choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
     own = [settings(solver, choice) for solver in study.solvers]
-    simulation, seconds = _simulate(study, params, [own[number] for number in variants(study, rows)])
+    simulation, seconds = simulate_timed(study, params, [own[number] for number in variants(study, rows)])
     each = seconds / len(rows)
     iid = study.sampling.method == "random"
     valid = slice(int(study.sampling.nominal_first), None)
@@ -160,7 +160,7 @@ def _errors(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:
     return np.concatenate([draw(study, range(row, row + 1)) for row in rows])
 
 
-def _simulate(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[Simulation, float]:
+def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[Simulation, float]:
     """Simulate each joint with its own settings; also tell the processor time of all together, s."""
     kinds = study.output.histories, study.output.harmonics
     specs = history_specs(options[0], *kinds)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from tolstat.campaign import differing_keys
 from tolstat.errors import Fault, StoreError
 from tolstat.store import ResultStore
 from tolstat.study import Study, load, subset_of
+from tolstat.study.model import Solver
 
 
 def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -> Study:
@@ -41,8 +43,20 @@ def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -
     study = load(source, n=held, text=text)
     if store.sampling["method"] == "subset":
         study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
+    if path is None:
+        study = replace(study, solver=_solver(store, study))
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     if differing:
         found = "\n    ".join(["its study is not as it was when the file was made", *differing])
         raise StoreError(str(Fault(str(store.path), found, "give the study file as it was then with --study")))
-    return study if n is None else load(source, n=n, text=text)
+    if n is None:
+        return study
+    return replace(load(source, n=n, text=text), solver=study.solver)
+
+
+def _solver(store: ResultStore, study: Study) -> Solver:
+    """Settings that the file was made with: those of its study, but for the files of `tolstat.multifidelity`."""
+    held = {key.removeprefix("solver."): value for key, value in store.identity.items() if key.startswith("solver.")}
+    own = study.solver.model_dump()
+    changed = {key: value for key, value in held.items() if key in own and own[key] != value}
+    return study.solver.model_copy(update=changed)

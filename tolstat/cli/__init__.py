@@ -10,6 +10,7 @@ from tolstat.cli import (
     extend,
     fatigue,
     merge,
+    multifidelity,
     plan,
     rare,
     replay,
@@ -29,9 +30,9 @@ __all__ = ["app", "main"]
 
 COMMANDS = (
     *(simulate.simulate, plan.plan, run.run, extend.extend, merge.merge, status.status, verify.verify),
-    *(worst.worst, replay.replay, export.export, fatigue.fatigue, time_above.time_above, report.report),
-    *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate),
-    rare.rare,
+    *(worst.worst, replay.replay, export.export, fatigue.fatigue, report.report),
+    *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate, time_above.time_above),
+    *(rare.rare, multifidelity.multifidelity),
     *(work_precision.work_precision, bench.bench),
 )
 for command in COMMANDS:

@@ -109,8 +109,8 @@ def run(
         carry_out(plan, path, report, until, execution=execution)
 
 
-def seconds_of(text: str) -> float:
-    """Time that ``"60 s"`` stands for, in seconds.
+def seconds_of(text: str, option: str = "--joint-timeout") -> float:
+    """Time that ``"60 s"`` of an option stands for, in seconds.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def seconds_of(text: str) -> float:
     except (KeyError, ValueError):
         seconds = 0.0
     if not 0 < seconds < float("inf"):
-        raise InputError([Fault("--joint-timeout", f"{text!r} is no time", 'write "60 s", "5 min" or "1 h"')])
+        raise InputError([Fault(option, f"{text!r} is no time", 'write "60 s", "5 min" or "1 h"')])
     return seconds
 
 

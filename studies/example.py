@@ -2,8 +2,8 @@
 """From a study to a decision, cell by cell.
 
 Any editor with "percent" cells runs this as a notebook, and `python studies/example.py [FOLDER]` as a script.
-Equilibrium at each angle in place of dynamics keeps it at a few seconds, once the kernels are compiled; leave `FIDELITY`
-out of the text for the real thing.
+Equilibrium at each angle in place of dynamics keeps it at a few seconds, once the kernels are compiled; leave
+`FIDELITY` out of the text for the real thing.
 """
 
 import sys

@@ -7,6 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tolstat.kernel import rotation
+from tolstat.kernel.topology import TRIAD
+from tolstat.kernel.triad import from_triad, to_triad
+from tolstat.kernel.trigonometry import sine_cosine
 
 SIZES = [0.0, 1e-9, 1e-3, 0.3, 0.31622, 0.31624, 1.0, 2.5]
 """Angles on both sides of the change from series to closed form at 0.3162 rad."""
@@ -63,3 +66,18 @@ def test_relative_vector_is_scipys(size):
         first = Rotation.from_rotvec(other)
         pair = np.stack([first.as_matrix(), (first * Rotation.from_rotvec(phi)).as_matrix()])
         np.testing.assert_allclose(rotation.relative_vector(pair, 0, 1), phi, atol=3e-15)
+
+
+@pytest.mark.parametrize("size", [0.8, 7.0, 200.0, 1e6])
+def test_sine_and_cosine_are_those_of_the_library(size):
+    x = np.concatenate([np.random.default_rng(1).uniform(-size, size, 2000), np.arange(-9, 10) * np.pi / 4])
+    found = np.array([sine_cosine(float(value)) for value in x])
+    np.testing.assert_allclose(found, np.column_stack([np.sin(x), np.cos(x)]), rtol=0, atol=3e-16)
+    assert np.isnan(sine_cosine(np.nan)).all()
+
+
+def test_triads_are_quarter_turns():
+    vector = (1.0, 2.0, 3.0)
+    for body, triad in enumerate(TRIAD):
+        np.testing.assert_array_equal(to_triad(body, vector), triad @ vector)
+        np.testing.assert_array_equal(from_triad(body, vector), triad.T @ vector)

@@ -45,6 +45,7 @@ class Dense:
 def dense(work: np.record) -> NDArray[np.float64]:
     """Tangent as one matrix, (55, 55): the blocks of ``work`` after assembly and before elimination."""
     from tolstat.kernel.topology import ARM, ARM_OF_PIN, N_DOF, PIN, PSI
+    from tolstat.kernel.work import PSI_PSI
 
     s = np.zeros((N_DOF, N_DOF))
     s[:6, :6] = work.lump_block[0]
@@ -57,7 +58,7 @@ def dense(work: np.record) -> NDArray[np.float64]:
     for a in range(4):
         rows = slice(6 * (ARM + a), 6 * (ARM + a) + 6)
         s[rows, PSI], s[PSI, rows] = work.arm_psi[a], work.psi_arm[a]
-    s[PSI, PSI] = work.core[0, 6, 6]
+    s[PSI, PSI] = work.core[0, PSI_PSI, 0]
     return s
 
 

@@ -3,6 +3,7 @@
 from tolstat.kernel._jit import njit
 from tolstat.kernel.rotation import relative_vector, unspin
 from tolstat.kernel.topology import BUSHING_BASE, BUSHING_LUMP, FRAME, FRAME_I, HUB, TRIAD
+from tolstat.kernel.triad import from_triad, to_triad
 from tolstat.kernel.vector import add, axpy, cross, row, scale, sub, turn, turn_back
 
 
@@ -41,8 +42,8 @@ def bushing_load(i, par, work):
     dphi = unspin(phi, turn_back(work.rot, base, sub(row(work.spin, lump), row(work.spin, base))))
     x, dx = turn_back(work.rot, base, d), turn_back(work.rot, base, rate)
 
-    x, dx = turn(TRIAD, lump, x), turn(TRIAD, lump, dx)
-    phi, dphi = turn(TRIAD, lump, phi), turn(TRIAD, lump, dphi)
+    x, dx = to_triad(lump, x), to_triad(lump, dx)
+    phi, dphi = to_triad(lump, phi), to_triad(lump, dphi)
     cross_bushing = base == HUB
     for k in range(3):
         if cross_bushing:
@@ -52,8 +53,8 @@ def bushing_load(i, par, work):
             work.load[i, k] = -par.k_fork[k] * x[k] - par.c_fork[k] * dx[k]
             work.load[i, 3 + k] = -par.k_fork[3 + k] * phi[k] - par.c_fork[3 + k] * dphi[k]
 
-    f = turn(work.rot, base, turn_back(TRIAD, lump, (work.load[i, 0], work.load[i, 1], work.load[i, 2])))
-    torque = turn(work.rot, base, turn_back(TRIAD, lump, (work.load[i, 3], work.load[i, 4], work.load[i, 5])))
+    f = turn(work.rot, base, from_triad(lump, (work.load[i, 0], work.load[i, 1], work.load[i, 2])))
+    torque = turn(work.rot, base, from_triad(lump, (work.load[i, 3], work.load[i, 4], work.load[i, 5])))
     accumulate(work.force, lump, f, axpy(1.0, cross(lever, f), torque))
     minus_f, minus_torque = scale(-1.0, f), scale(-1.0, torque)
     accumulate(work.force, base, minus_f, axpy(1.0, cross(base_lever, minus_f), minus_torque))

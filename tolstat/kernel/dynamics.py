@@ -10,7 +10,7 @@ from tolstat.kernel._jit import njit
 from tolstat.kernel.bushing import bushing_load
 from tolstat.kernel.contact import contact_load, smooth_step
 from tolstat.kernel.motion import ideal_motion
-from tolstat.kernel.rotation import exponential, spin, spin_bias, unspin
+from tolstat.kernel.rotation import exponential, spin, spin_bias, spin_rate, unspin
 from tolstat.kernel.topology import (
     ARM,
     FRAME,
@@ -22,6 +22,7 @@ from tolstat.kernel.topology import (
     PSI,
     TRIAD,
 )
+from tolstat.kernel.triad import from_triad, to_triad
 from tolstat.kernel.vector import add, axpy, cross, put, row, scale, sub, turn, turn_back
 from tolstat.tables import Start
 
@@ -96,13 +97,13 @@ def body_inertia(body, a, par, work):
     ddx, dw = a
     centripetal = cross(omega, axpy(2.0, dx, cross(omega, x)))
     acceleration = add(add(ddx, centripetal), cross(domega, x))
-    total = turn(TRIAD, body, turn_back(work.rot, body, add(omega, w)))
+    total = to_triad(body, turn_back(work.rot, body, add(omega, w)))
     angular = add(add(domega, dw), cross(omega, w))
-    angular = turn(TRIAD, body, turn_back(work.rot, body, angular))
+    angular = to_triad(body, turn_back(work.rot, body, angular))
     momentum = (inertia[0] * total[0], inertia[1] * total[1], inertia[2] * total[2])
     rate = (inertia[0] * angular[0], inertia[1] * angular[1], inertia[2] * angular[2])
     rate = add(rate, cross(total, momentum))
-    return scale(mass, acceleration), turn(work.rot, body, turn_back(TRIAD, body, rate))
+    return scale(mass, acceleration), turn(work.rot, body, from_triad(body, rate))
 
 
 @njit
@@ -128,7 +129,7 @@ def residual(t, q, v, a, par, options, work, out):
     for body in range(N_LUMPS):
         i = 6 * body
         phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
-        dw = add(spin(phi, (a[i + 3], a[i + 4], a[i + 5])), spin_bias(phi, rate))
+        dw = spin_rate(phi, rate, (a[i + 3], a[i + 4], a[i + 5]))
         f, torque = body_inertia(body, ((a[i], a[i + 1], a[i + 2]), dw), par, work)
         for k in range(3):
             out[i + k] = f[k] - work.force[body, k]
@@ -148,9 +149,9 @@ def acceleration(t, q, v, par, options, work, out):
         f, torque = body_inertia(body, (zero, spin_bias(phi, rate)), par, work)
         mass, inertia = mass_of(body, par)
         torque = sub((work.force[body, 3], work.force[body, 4], work.force[body, 5]), torque)
-        torque = turn(TRIAD, body, turn_back(work.rot, body, torque))
+        torque = to_triad(body, turn_back(work.rot, body, torque))
         dw = (torque[0] / inertia[0], torque[1] / inertia[1], torque[2] / inertia[2])
-        ddphi = unspin(phi, turn(work.rot, body, turn_back(TRIAD, body, dw)))
+        ddphi = unspin(phi, turn(work.rot, body, from_triad(body, dw)))
         for k in range(3):
             out[i + k] = (work.force[body, k] - f[k]) / mass
             out[i + 3 + k] = ddphi[k]

@@ -25,9 +25,9 @@ from tolstat.kernel.topology import (
     INPUT_SHAFT,
     N_LUMPS,
     PSI,
-    TRIAD,
 )
-from tolstat.kernel.vector import add, cross, dot, row, sub, turn, turn_back
+from tolstat.kernel.triad import to_triad
+from tolstat.kernel.vector import add, cross, dot, row, sub, turn_back
 from tolstat.kernel.work import DELTA, FORCE, V_NORMAL, V_TANGENT
 from tolstat.tables import Field, dtype_of
 
@@ -54,7 +54,7 @@ def kinetic_energy(v, par, work):
         mass, inertia = mass_of(body, par)
         omega = row(work.frame_w, FRAME[body])
         velocity = add(row(work.vel, body), cross(omega, row(work.pos, body)))
-        w = turn(TRIAD, body, turn_back(work.rot, body, add(omega, row(work.spin, body))))
+        w = to_triad(body, turn_back(work.rot, body, add(omega, row(work.spin, body))))
         energy += 0.5 * mass * dot(velocity, velocity)
         for k in range(3):
             energy += 0.5 * inertia[k] * w[k] ** 2
@@ -66,7 +66,7 @@ def bushing_energy(i, par, springs, dampers, work, out):
     """Add the elastic energy and the powers of bushing `i`."""
     base, lump = BUSHING_BASE[i], BUSHING_LUMP[i]
     stiffness, damping = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
-    w = turn(TRIAD, lump, turn_back(work.rot, base, sub(row(work.spin, lump), row(work.spin, base))))
+    w = to_triad(lump, turn_back(work.rot, base, sub(row(work.spin, lump), row(work.spin, base))))
     bushing_load(i, springs, work)
     elastic_moment = (work.load[i, 3], work.load[i, 4], work.load[i, 5])
     for k in range(6):

@@ -28,6 +28,7 @@ from tolstat.kernel.topology import (
     PIN,
     TRIAD,
 )
+from tolstat.kernel.triad import to_triad
 from tolstat.kernel.vector import add, cross, row, scale, sub, turn
 from tolstat.tables import Mode
 
@@ -120,6 +121,6 @@ def carry(i, par, work):
     lever, _ = markers(i, par)
     f = row(work.force, lump)
     torque = sub((work.force[lump, 3], work.force[lump, 4], work.force[lump, 5]), cross(lever, f))
-    f, torque = turn(TRIAD, lump, f), turn(TRIAD, lump, torque)
+    f, torque = to_triad(lump, f), to_triad(lump, torque)
     for k in range(3):
         work.load[i, k], work.load[i, 3 + k] = f[k], torque[k]

@@ -4,12 +4,15 @@ import math
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.topology import FRAME_C, FRAME_F, FRAME_I
+from tolstat.kernel.trigonometry import sine_cosine
 
 
 @njit
 def speed_ratio(theta, alpha):
     """Speed ratio of the ideal joint, d theta_o / d theta (Cirelli et al. 2021, eq. 2)."""
-    return math.cos(alpha) / (1 - (math.sin(alpha) * math.cos(theta)) ** 2)
+    sa, ca = sine_cosine(alpha)
+    _, ct = sine_cosine(theta)
+    return ca / (1 - (sa * ct) ** 2)
 
 
 @njit
@@ -25,8 +28,8 @@ def ideal_motion(theta, alpha, omega, work):
     work : record of WORK
         Its ``frame_w``, ``frame_dw``, ``relative``, ``relative_w`` and ``shaft`` are written.
     """
-    sa, ca = math.sin(alpha), math.cos(alpha)
-    st, ct = math.sin(theta), math.cos(theta)
+    sa, ca = sine_cosine(alpha)
+    st, ct = sine_cosine(theta)
     # cross against input fork: tan(beta) = tan(alpha) sin(theta)
     ta = sa / ca
     tb = ta * st

@@ -81,7 +81,23 @@ def unspin(phi, w):
 def spin_bias(phi, rate):
     """Part of the angular acceleration that the rates alone make: dT/dt rate, so that w' = T phi'' + bias."""
     x = dot(phi, phi)
-    s1, s2, s3 = coefficients(x)
+    return _bias(x, coefficients(x), phi, rate)
+
+
+@njit
+def spin_rate(phi, rate, change):
+    """Angular acceleration w' = T(phi) change + dT/dt rate, `change` being the second derivative of phi."""
+    x = dot(phi, phi)
+    s = coefficients(x)
+    turned = cross(phi, change)
+    w = add(change, axpy(s[2], cross(phi, turned), scale(s[1], turned)))
+    return add(w, _bias(x, s, phi, rate))
+
+
+@njit
+def _bias(x, s, phi, rate):
+    """`spin_bias`, x = |phi|^2 and its coefficients given."""
+    s1, s2, s3 = s
     small = x < SERIES_BELOW
     ds2 = -1 / 24 + x * (1 / 360 - x * (1 / 13440 - x * (1 / 907200 - x * (1 / 95800320))))
     ds3 = -1 / 120 + x * (1 / 2520 - x * (1 / 120960 - x * (1 / 9979200 - x * (1 / 1245404160))))

@@ -10,7 +10,7 @@ from tolstat.kernel._jit import njit
 from tolstat.kernel.bushing import markers
 from tolstat.kernel.contact import MODE_LAW, smooth_step, smooth_step_slope
 from tolstat.kernel.dynamics import mass_of
-from tolstat.kernel.lane import any_of, where
+from tolstat.kernel.lane import any_of, fma, where
 from tolstat.kernel.topology import (
     ARM,
     ARM_OF_PIN,
@@ -21,23 +21,22 @@ from tolstat.kernel.topology import (
     N_LUMPS,
     OUTPUT_SHAFT,
     PIN,
-    TRIAD,
+    QUARTERS,
 )
-from tolstat.kernel.vector import add, cross, row, sub, turn, turn_back
+from tolstat.kernel.vector import add, axpy, cross, of_column, row, scale, sub, turn, turn_back
 from tolstat.kernel.work import (
     DELTA,
     EXCESS,
     FORCE,
     NORMAL,
     POINT,
+    PSI_PSI,
     RHO,
     SLOPE,
     TANGENT,
     V_NORMAL,
     V_TANGENT,
 )
-
-UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @njit
@@ -50,79 +49,129 @@ def clear(work):
     work.arm_pin[:] = 0.0
     work.arm_psi[:] = 0.0
     work.psi_arm[:] = 0.0
-    work.core[0, 6, 6] = 0.0
+    work.core[0, PSI_PSI, 0] = 0.0
+
+
+@njit
+def spread(matrices, i, body, k):
+    """Columns of R diag(k) R^T, R being matrix `i` and k given along the triad of `body`: a symmetric tensor turned."""
+    x, y = (k[1], k[0]) if QUARTERS[body] % 2 == 1 else (k[0], k[1])
+    columns = of_column(matrices, i, 0), of_column(matrices, i, 1), of_column(matrices, i, 2)
+    return (
+        _spread_column(columns, (x * columns[0][0], y * columns[1][0], k[2] * columns[2][0])),
+        _spread_column(columns, (x * columns[0][1], y * columns[1][1], k[2] * columns[2][1])),
+        _spread_column(columns, (x * columns[0][2], y * columns[1][2], k[2] * columns[2][2])),
+    )
+
+
+@njit
+def _spread_column(columns, s):
+    return axpy(s[2], columns[2], axpy(s[1], columns[1], scale(s[0], columns[0])))
+
+
+@njit
+def turning(a, lever):
+    """Columns of the displacements u x lever of small turns about the axes, after the tensor with columns `a`."""
+    x, y, z = lever
+    return (
+        axpy(y, a[2], scale(-z, a[1])),
+        axpy(z, a[0], scale(-x, a[2])),
+        axpy(x, a[1], scale(-y, a[0])),
+    )
+
+
+@njit
+def crossed(lever, a):
+    """Columns of lever x a."""
+    return cross(lever, a[0]), cross(lever, a[1]), cross(lever, a[2])
+
+
+@njit
+def transposed(a):
+    """Columns of the transpose of the matrix with columns `a`."""
+    return (
+        (a[0][0], a[1][0], a[2][0]),
+        (a[0][1], a[1][1], a[2][1]),
+        (a[0][2], a[1][2], a[2][2]),
+    )
+
+
+@njit
+def plus(a, b):
+    """Columns of a + b."""
+    return add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])
+
+
+@njit
+def put(blocks, b, i, j, a):
+    """Add the 3 x 3 matrix with columns `a` to block `b` from row `i` and column `j` on."""
+    for k in range(3):
+        blocks[b, i + k, j] += a[0][k]
+        blocks[b, i + k, j + 1] += a[1][k]
+        blocks[b, i + k, j + 2] += a[2][k]
+
+
+@njit
+def take(blocks, b, i, j, a):
+    """As `put`, subtracted."""
+    for k in range(3):
+        blocks[b, i + k, j] -= a[0][k]
+        blocks[b, i + k, j + 1] -= a[1][k]
+        blocks[b, i + k, j + 2] -= a[2][k]
 
 
 @njit
 def inertia_tangent(body, ca, par, work):
     """Add ca M of a lump to its diagonal block."""
     mass, inertia = mass_of(body, par)
-    block = work.lump_block
     for j in range(3):
-        block[body, j, j] += ca * mass
-        u = turn(TRIAD, body, turn_back(work.rot, body, UNIT[j]))
-        u = turn(work.rot, body, turn_back(TRIAD, body, (inertia[0] * u[0], inertia[1] * u[1], inertia[2] * u[2])))
-        for i in range(3):
-            block[body, 3 + i, 3 + j] += ca * u[i]
-
-
-@njit
-def column(blocks, b, j, f, torque, sign):
-    """Add a force and a torque to column `j` of block `b`."""
-    for i in range(3):
-        blocks[b, i, j] += sign * f[i]
-        blocks[b, 3 + i, j] += sign * torque[i]
+        work.lump_block[body, j, j] += ca * mass
+    put(work.lump_block, body, 3, 3, spread(work.rot, body, body, scale(ca, inertia)))
 
 
 @njit
 def bushing_tangent(i, cv, par, work):
-    """Add bushing `i`: stiffness and cv times damping between lump and base."""
+    """Add bushing `i`: stiffness and cv times damping between lump and base.
+
+    With a and b the stiffness against displacements and turns in axes of the frame, the lump's lever l and the base's
+    m, columns and rows of a turn are those of the displacement that it makes: the tangent is symmetric.
+    """
     base, lump = BUSHING_BASE[i], BUSHING_LUMP[i]
     k, c = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
     on_lump, _ = markers(i, par)
     lever = turn(work.rot, lump, on_lump)
     base_lever = sub(add(row(work.pos, lump), lever), row(work.pos, base))
-    for j in range(6):
-        u = UNIT[j % 3]
-        local = turn(TRIAD, lump, turn_back(work.rot, base, u))
-        zero = (0.0, 0.0, 0.0)
-        if j < 3:  # displacement of the lump, then of the base
-            f_lump = _restore(local, k, c, cv, 0, base, lump, work)
-            torque = zero
-            f_base = f_lump
-        else:  # rotation
-            torque = _restore(local, k, c, cv, 3, base, lump, work)
-            by_lump = turn(TRIAD, lump, turn_back(work.rot, base, cross(u, lever)))
-            by_base = turn(TRIAD, lump, turn_back(work.rot, base, cross(u, base_lever)))
-            f_lump = _restore(by_lump, k, c, cv, 0, base, lump, work)
-            f_base = _restore(by_base, k, c, cv, 0, base, lump, work)
-        on_lump_by_lump = add(torque, cross(lever, f_lump))
-        column(work.lump_block, lump, j, f_lump, on_lump_by_lump, 1.0)
-        if base == HUB:
-            pin = lump - PIN
-            column(work.pin_hub, pin, j, f_base, add(torque, cross(lever, f_base)), -1.0)
-            column(work.hub_pin, pin, j, f_lump, add(torque, cross(base_lever, f_lump)), -1.0)
-            column(work.lump_block, HUB, j, f_base, add(torque, cross(base_lever, f_base)), 1.0)
-        elif base == OUTPUT_SHAFT:  # of the shaft only rotation about z is free
-            arm = lump - ARM
-            work.psi_arm[arm, j] -= torque[2] + cross(base_lever, f_lump)[2]
-            if j == 5:
-                on_arm = add(torque, cross(lever, f_base))
-                for n in range(3):
-                    work.arm_psi[arm, n] -= f_base[n]
-                    work.arm_psi[arm, 3 + n] -= on_arm[n]
-                work.core[0, 6, 6] += torque[2] + cross(base_lever, f_base)[2]
-
-
-@njit
-def _restore(x, k, c, cv, first, base, lump, work):
-    """Restoring force, in axes of the frame, of a displacement `x` in the base marker's axes."""
-    f = (
-        (k[first] + cv * c[first]) * x[0],
-        (k[first + 1] + cv * c[first + 1]) * x[1],
-        (k[first + 2] + cv * c[first + 2]) * x[2],
-    )
-    return turn(work.rot, base, turn_back(TRIAD, lump, f))
+    a = spread(work.rot, base, lump, (fma(cv, c[0], k[0]), fma(cv, c[1], k[1]), fma(cv, c[2], k[2])))
+    b = spread(work.rot, base, lump, (fma(cv, c[3], k[3]), fma(cv, c[4], k[4]), fma(cv, c[5], k[5])))
+    by_lump, by_base = turning(a, lever), turning(a, base_lever)
+    block = work.lump_block
+    put(block, lump, 0, 0, a)
+    put(block, lump, 0, 3, by_lump)
+    put(block, lump, 3, 0, transposed(by_lump))
+    put(block, lump, 3, 3, plus(b, crossed(lever, by_lump)))
+    between = plus(b, crossed(lever, by_base))
+    if base == HUB:
+        pin = lump - PIN
+        put(block, HUB, 0, 0, a)
+        put(block, HUB, 0, 3, by_base)
+        put(block, HUB, 3, 0, transposed(by_base))
+        put(block, HUB, 3, 3, plus(b, crossed(base_lever, by_base)))
+        take(work.pin_hub, pin, 0, 0, a)
+        take(work.pin_hub, pin, 0, 3, by_base)
+        take(work.pin_hub, pin, 3, 0, transposed(by_lump))
+        take(work.pin_hub, pin, 3, 3, between)
+        take(work.hub_pin, pin, 0, 0, a)
+        take(work.hub_pin, pin, 0, 3, by_lump)
+        take(work.hub_pin, pin, 3, 0, transposed(by_base))
+        take(work.hub_pin, pin, 3, 3, transposed(between))
+    elif base == OUTPUT_SHAFT:  # of the shaft only rotation about z is free
+        arm = lump - ARM
+        for n in range(3):
+            work.arm_psi[arm, n] -= by_base[2][n]
+            work.psi_arm[arm, n] -= by_base[2][n]
+            work.arm_psi[arm, 3 + n] -= between[2][n]
+            work.psi_arm[arm, 3 + n] -= between[2][n]
+        work.core[0, PSI_PSI, 0] += b[2][2] + cross(base_lever, by_base[2])[2]
 
 
 @njit
@@ -144,8 +193,22 @@ def _directions(pin, j, work):
 
 
 @njit
+def _add_dyads(pin, n, by_n, m, by_m, work):
+    """Add n by_n^T + m by_m^T, all over (pin, arm), to the four blocks of a pin and its arm."""
+    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
+    for i in range(6):
+        for j in range(6):
+            here, there = work.lump_block[body, i, j], work.pin_arm[pin, i, j]
+            work.lump_block[body, i, j] = fma(m[i], by_m[j], fma(n[i], by_n[j], here))
+            work.pin_arm[pin, i, j] = fma(m[i], by_m[6 + j], fma(n[i], by_n[6 + j], there))
+            here, there = work.arm_pin[pin, i, j], work.lump_block[arm, i, j]
+            work.arm_pin[pin, i, j] = fma(m[6 + i], by_m[j], fma(n[6 + i], by_n[j], here))
+            work.lump_block[arm, i, j] = fma(m[6 + i], by_m[6 + j], fma(n[6 + i], by_n[6 + j], there))
+
+
+@njit
 def _add_dyad(pin, left, right, work):
-    """Add left right^T, both over (pin, arm), to the four blocks of a pin and its arm."""
+    """Add left right^T in the same way."""
     body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
     for i in range(6):
         for j in range(6):
@@ -158,7 +221,7 @@ def _add_dyad(pin, left, right, work):
 @njit
 def contact_tangent(pin, cv, par, work):
     """Add the contact of `pin`: elastic, damping, film, and the sharing between its stations."""
-    left, right = work.left, work.right  # row 0 for one station, row 1 summed over stations for the sharing
+    left, right = work.left, work.right  # row 0: rows n and m of one station; row 1: summed over stations, the sharing
     left[1, :] = 0.0
     right[1, :] = 0.0
     for j in range(par.n_stations):
@@ -179,11 +242,9 @@ def contact_tangent(pin, cv, par, work):
         _directions(pin, j, work)
         n, m = work.vectors[0], work.vectors[1]
         for i in range(12):
-            right[0, i] = nn * n[i] + nm * m[i]
-        _add_dyad(pin, n, right[0], work)
-        for i in range(12):
-            right[0, i] = mn * n[i] + mm * m[i]
-        _add_dyad(pin, m, right[0], work)
+            left[0, i] = fma(nm, m[i], nn * n[i])
+            right[0, i] = fma(mm, m[i], mn * n[i])
+        _add_dyads(pin, n, left[0], m, right[0], work)
         if par.law == MODE_LAW:
             by_delta, by_m = work.mode_weight[pin, 1 + 2 * j], work.mode_weight[pin, 2 + 2 * j]
             for i in range(12):
@@ -203,4 +264,4 @@ def assemble(cv, ca, par, work):
         bushing_tangent(i, cv, par, work)
     for pin in range(4):
         contact_tangent(pin, cv, par, work)
-    work.core[0, 6, 6] += ca * par.Js
+    work.core[0, PSI_PSI, 0] += ca * par.Js

@@ -32,6 +32,9 @@ def _triads():
 
 TRIAD = _triads()
 
+QUARTERS = np.round(np.arctan2(TRIAD[:, 0, 1], TRIAD[:, 0, 0]) / (0.5 * np.pi)).astype(np.int64) % 4
+"""Quarter turns about z that take the frame's axes to each body's triad."""
+
 BUSHING_BASE = np.array([HUB] * 4 + [INPUT_SHAFT] * 2 + [OUTPUT_SHAFT] * 2)
 BUSHING_LUMP = np.arange(PIN, PIN + 8)
 """Base and lump of the bushings cross 1-4, fork 1-4."""

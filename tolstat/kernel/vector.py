@@ -1,7 +1,7 @@
 """Vectors of three as tuples: they live in registers and nothing is allocated."""
 
 from tolstat.kernel._jit import njit
-from tolstat.kernel.lane import where
+from tolstat.kernel.lane import fma, where
 
 
 @njit
@@ -25,19 +25,23 @@ def scale(s, a):
 @njit
 def axpy(s, a, b):
     """Return s a + b."""
-    return (s * a[0] + b[0], s * a[1] + b[1], s * a[2] + b[2])
+    return (fma(s, a[0], b[0]), fma(s, a[1], b[1]), fma(s, a[2], b[2]))
 
 
 @njit
 def dot(a, b):
     """Return the scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return fma(a[2], b[2], fma(a[1], b[1], a[0] * b[0]))
 
 
 @njit
 def cross(a, b):
     """Return the vector product a x b."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    return (
+        fma(a[1], b[2], -(a[2] * b[1])),
+        fma(a[2], b[0], -(a[0] * b[2])),
+        fma(a[0], b[1], -(a[1] * b[0])),
+    )
 
 
 @njit
@@ -59,23 +63,27 @@ def put(matrix, i, a):
 
 
 @njit
+def of_row(matrices, i, j):
+    """Row `j` of matrix `i` of an (n, 3, 3) array."""
+    return (matrices[i, j, 0], matrices[i, j, 1], matrices[i, j, 2])
+
+
+@njit
+def of_column(matrices, i, j):
+    """Column `j` of matrix `i` of an (n, 3, 3) array."""
+    return (matrices[i, 0, j], matrices[i, 1, j], matrices[i, 2, j])
+
+
+@njit
 def turn(matrices, i, a):
     """Return A a, A being matrix `i` of an (n, 3, 3) array."""
-    return (
-        matrices[i, 0, 0] * a[0] + matrices[i, 0, 1] * a[1] + matrices[i, 0, 2] * a[2],
-        matrices[i, 1, 0] * a[0] + matrices[i, 1, 1] * a[1] + matrices[i, 1, 2] * a[2],
-        matrices[i, 2, 0] * a[0] + matrices[i, 2, 1] * a[1] + matrices[i, 2, 2] * a[2],
-    )
+    return (dot(of_row(matrices, i, 0), a), dot(of_row(matrices, i, 1), a), dot(of_row(matrices, i, 2), a))
 
 
 @njit
 def turn_back(matrices, i, a):
     """Return A^T a, A being matrix `i` of an (n, 3, 3) array."""
-    return (
-        matrices[i, 0, 0] * a[0] + matrices[i, 1, 0] * a[1] + matrices[i, 2, 0] * a[2],
-        matrices[i, 0, 1] * a[0] + matrices[i, 1, 1] * a[1] + matrices[i, 2, 1] * a[2],
-        matrices[i, 0, 2] * a[0] + matrices[i, 1, 2] * a[1] + matrices[i, 2, 2] * a[2],
-    )
+    return (dot(of_column(matrices, i, 0), a), dot(of_column(matrices, i, 1), a), dot(of_column(matrices, i, 2), a))
 
 
 @njit

@@ -15,6 +15,8 @@ POINT, NORMAL, TANGENT = 0, 3, 6
 RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE, EXCESS = 9, 10, 11, 12, 13, 14, 15
 N_STATION = 16
 
+# rows of work.core
+PSI_COLUMN, PSI_ROW, PSI_PSI = 0, 1, 2
 
 FIELDS = {
     "frame_w": (3, 3),  # angular velocity of I, C, F in their own axes
@@ -41,7 +43,7 @@ FIELDS = {
     "psi_arm": (4, 6),  # row psi
     "pin_psi": (4, 6),  # fill-in
     "psi_pin": (4, 6),  # fill-in
-    "core": (1, 7, 7),  # hub and psi after elimination
+    "core": (1, 3, 6),  # psi: its column in the rows of the hub, its row, itself; after elimination their factors
     "vectors": (2, 12),  # n and m of a contact station as displacements of pin and arm
     "left": (2, 12),  # scratch of contact_tangent
     "right": (2, 12),

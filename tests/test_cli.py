@@ -23,8 +23,8 @@ from tolstat.tables import BUSHINGS, ERROR_COLUMNS, RESULT_COLUMNS, Simulation, 
 
 COMMANDS = (
     *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
-    *("worst", "replay", "export", "fatigue", "report"),
-    *("capability", "causes", "reweight", "compare", "allocate", "time-above"),
+    *("worst", "replay", "export", "fatigue", "time-above", "report"),
+    *("capability", "causes", "reweight", "compare", "allocate"),
     *("rare", "multifidelity"),
     *("work-precision", "bench"),
 )

@@ -7,9 +7,10 @@ and signs are left out. A lane does the same for its joint, and more where a nei
 
 from __future__ import annotations
 
+import io
+import json
 import math
 import os
-import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -159,11 +160,18 @@ def count_apart(snapshots: Sequence[Snapshot]) -> list[dict[str, int]]:
     """`count` of each, in a process without compilation."""
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-m", "tolstat.bench.flops"]
-    told = pickle.dumps([snapshot._asdict() for snapshot in snapshots])
-    done = subprocess.run(command, input=told, stdout=subprocess.PIPE, env=environment, check=True)
-    counts: list[dict[str, int]] = pickle.loads(done.stdout)
+    told = io.BytesIO()
+    np.savez(told, *(np.array(column) for column in zip(*snapshots, strict=True)))
+    done = subprocess.run(command, input=told.getvalue(), stdout=subprocess.PIPE, env=environment, check=True)
+    counts: list[dict[str, int]] = json.loads(done.stdout)
     return counts
 
 
+def _main() -> None:
+    told = np.load(io.BytesIO(sys.stdin.buffer.read()))
+    columns = [told[name] for name in told.files]
+    json.dump([count(Snapshot(*values)) for values in zip(*columns, strict=True)], sys.stdout)
+
+
 if __name__ == "__main__":
-    sys.stdout.buffer.write(pickle.dumps([count(Snapshot(**fields)) for fields in pickle.load(sys.stdin.buffer)]))
+    _main()

@@ -30,8 +30,8 @@ __all__ = ["app", "main"]
 
 COMMANDS = (
     *(simulate.simulate, plan.plan, run.run, extend.extend, merge.merge, status.status, verify.verify),
-    *(worst.worst, replay.replay, export.export, fatigue.fatigue, report.report),
-    *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate, time_above.time_above),
+    *(worst.worst, replay.replay, export.export, fatigue.fatigue, time_above.time_above, report.report),
+    *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate),
     *(rare.rare, multifidelity.multifidelity),
     *(work_precision.work_precision, bench.bench),
 )

@@ -19,7 +19,7 @@ from tests.test_reweight import campaign
 ROOT = Path(__file__).parent.parent
 ON_ARRAYS = (
     *("exceedance", "quantile", "capability", "reweight", "difference", "pick_freeze", "sensitivity"),
-    *("cycles", "allocation"),
+    *("cycles", "allocation", "weighted", "subset", "multifidelity"),
 )
 
 

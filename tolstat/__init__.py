@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tolstat.analysis.capability import at as capability
     from tolstat.analysis.exceedance import at as exceedance
     from tolstat.analysis.quantile import at as quantile
+    from tolstat.analysis.weighted import at as weighted_exceedance
     from tolstat.campaign import run
     from tolstat.causes import of_store as causes_of
     from tolstat.compare import of_stores as compared
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
     from tolstat.fatigue import read as load_cycles
     from tolstat.integration import integrate
     from tolstat.joint import perturb
+    from tolstat.multifidelity import run as two_fidelities
     from tolstat.pylife import series as pylife_series
+    from tolstat.rare import of_study as rare_event
     from tolstat.report import write as write_report
     from tolstat.report.fatigue import equivalent_loads
     from tolstat.reweight import of_store as reweighted
@@ -63,12 +66,15 @@ __all__ = [
     "perturb",
     "pylife_series",
     "quantile",
+    "rare_event",
     "reweighted",
     "run",
     "simulate_case",
     "simulate_rows",
     "statistics",
     "time_above",
+    "two_fidelities",
+    "weighted_exceedance",
     "worst_joints",
     "write_report",
 ]
@@ -93,12 +99,15 @@ _HOMES = {
     "perturb": "tolstat.joint:perturb",
     "pylife_series": "tolstat.pylife:series",
     "quantile": "tolstat.analysis.quantile:at",
+    "rare_event": "tolstat.rare:of_study",
     "reweighted": "tolstat.reweight:of_store",
     "run": "tolstat.campaign:run",
     "simulate_case": "tolstat.trace:simulate_case",
     "simulate_rows": "tolstat.simulation:simulate_rows",
     "statistics": "tolstat.summary:of_store",
     "time_above": "tolstat.duration:of_store",
+    "two_fidelities": "tolstat.multifidelity:run",
+    "weighted_exceedance": "tolstat.analysis.weighted:at",
     "worst_joints": "tolstat.tail:worst",
     "write_report": "tolstat.report:write",
 }

@@ -12,16 +12,16 @@ import pandas as pd
 
 from tolstat import campaign
 from tolstat.analysis import multifidelity
-from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.multifidelity import Allocation, Pairs
 from tolstat.combine import grow
-from tolstat.errors import Fault, InputError, StoreError
+from tolstat.errors import Fault, InputError, StoreError, gather
 from tolstat.execution import Execution
 from tolstat.joint import perturb
 from tolstat.plan import simulate_timed
 from tolstat.progress import note
 from tolstat.recorded import perturbed
 from tolstat.report import source
+from tolstat.report.source import Campaign
 from tolstat.sampling import draw, draw_blocks
 from tolstat.schema import did_you_mean, validate
 from tolstat.store import ResultStore
@@ -79,8 +79,8 @@ def solver_of(study: Study, text: str, place: str) -> Solver:
 
 def run(
     study: Study,
-    low: Solver,
-    high: Solver,
+    low: str,
+    high: str,
     folder: Path,
     budget: float,
     pilot: int = 128,
@@ -94,11 +94,11 @@ def run(
     ----------
     study : Study
         Of independent joints; its number of joints is of no account.
-    low, high : Solver
-        Cheap settings, and those that statistics are asked of.
+    low, high : str
+        Cheap fidelity, and the one that statistics are asked of: ``"quasistatic:36"``, see `solver_of`.
     folder : Path
-        Where ``STUDY_high.h5`` and ``STUDY_low.h5`` are, or are made. Files with more joints than the pilot are
-        finished and evaluated, as after an interruption; they are not made larger again.
+        Existing folder where ``STUDY_high.h5`` and ``STUDY_low.h5`` are, or are made. Files with more joints than the
+        pilot are finished and evaluated, as after an interruption; they are not made larger again.
     budget : float
         Time of one core for all joints together, seconds.
     pilot : int
@@ -117,10 +117,14 @@ def run(
     Raises
     ------
     InputError
-        When the joints are not independent samples, or the study does not keep the load.
+        When the fidelities cannot be or are the same, the joints are not independent samples, or the study does not
+        ask for the load.
     StoreError
-        When a file is of another study, or the two are not of the same joints.
+        When a file is of another study, or that of the high fidelity has more joints.
+    Interrupted, WorkerDied
+        As `campaign.run`; the same call goes on.
     """
+    solvers = _solvers(study, low, high)
     asked = study.asked or list(source.LOADS)
     by = asked[0] if by is None else by
     if study.sampling.method != "random":
@@ -129,34 +133,54 @@ def run(
     if by not in asked:
         raise InputError([Fault("--by", f"{by!r} is no load that the study asks for", did_you_mean(by, asked))])
     output = study.output.model_copy(update={"histories": "none"})
-    plans = [replace(study, solver=solver, output=output) for solver in (high, low)]
+    plans = [replace(study, solver=solver, output=output) for solver in solvers]
     paths = folder / f"{study.name}_high.h5", folder / f"{study.name}_low.h5"
     held = [_simulate(plan, path, pilot, workers) for plan, path in zip(plans, paths, strict=True)]
-    cost_high, cost_low = (_cost(plan, pilot) for plan in plans)
-    pairs = _pairs(paths, by, cost_high, cost_low)
+    costs = _cost(plans[0], pilot), _cost(plans[1], pilot)
+    pairs = _pairs(_read(paths), by, costs)
     both = np.isfinite(pairs.high[:pilot]) & np.isfinite(pairs.low[:pilot])
-    allocation = multifidelity.allocate(pairs.high[:pilot][both], pairs.low[:pilot][both], cost_high, cost_low)
-    tell(_sentence(allocation, by, cost_high, cost_low))
+    allocation = multifidelity.allocate(pairs.high[:pilot][both], pairs.low[:pilot][both], *costs)
+    tell(_sentence(allocation, by, *costs))
     if allocation.gain > 1.0 and max(held) == pilot:
-        wanted = allocation.joints(budget, cost_high, cost_low, pilot)
-        for plan, path, n in zip(plans, paths, wanted, strict=True):
-            _simulate(plan, path, n, workers)
-    table = _table(paths, asked, study.limits, cost_high, cost_low)
-    counted = _pairs(paths, by, cost_high, cost_low)
-    return Found(table, allocation, cost_high, cost_low, counted.high.size, counted.low.size, paths)
+        # both first: a run that is stopped goes on with the numbers of joints that it had chosen
+        for plan, path, n in zip(plans, paths, allocation.joints(budget, *costs, pilot), strict=True):
+            _extend(plan, path, n)
+        for plan, path in zip(plans, paths, strict=True):
+            _simulate(plan, path, pilot, workers)
+    whole = _read(paths)
+    joints = len(whole[0].results), len(whole[1].results)
+    return Found(_table(whole, asked, study.limits, costs), allocation, *costs, *joints, paths)
+
+
+def _solvers(study: Study, low: str, high: str) -> tuple[Solver, Solver]:
+    """Settings of the high and of the low fidelity."""
+    faults: list[Fault] = []
+    found = []
+    for place, text in (("high", high), ("low", low)):
+        with gather(faults):
+            found.append(solver_of(study, text, place))
+    if len(found) == 2 and found[0] == found[1]:
+        faults.append(Fault("low", f"{low!r} is the same as {high!r}", "give a cheaper one"))
+    if faults:
+        raise InputError(faults)
+    return found[0], found[1]
 
 
 def _simulate(plan: Study, path: Path, n: int, workers: int | None) -> int:
-    """Give a file `n` joints at least, and simulate those that are pending; how many it has."""
-    first = int(plan.sampling.nominal_first)
+    """Simulate the joints of a file that are pending, `n` of a new one; how many it has."""
     if path.exists():
-        with ResultStore.open(path, "r+") as store:
-            held = store.n
-            if held < n + first:
-                grow(store, _sized(plan, n), draw_blocks(plan, range(held, n + first)))
-            n = max(n, held - first)
+        with ResultStore.open(path) as store:
+            n = store.n - int(plan.sampling.nominal_first)
     campaign.run(_sized(plan, n), path, execution=Execution(workers=workers), check=False)
     return n
+
+
+def _extend(plan: Study, path: Path, n: int) -> None:
+    """Give a file `n` joints, those that it does not have pending."""
+    with ResultStore.open(path, "r+") as store:
+        more = range(store.n, n + int(plan.sampling.nominal_first))
+        if more:
+            grow(store, _sized(plan, n), draw_blocks(plan, more))
 
 
 def _sized(plan: Study, n: int) -> Study:
@@ -178,28 +202,31 @@ def _sentence(allocation: Allocation, by: str, cost_high: float, cost_low: float
     return f"{costs}: {allocation.ratio:.3g} joints of the low fidelity for one of the high; gain {allocation.gain:.3g}"
 
 
-def _load(path: Path, name: str) -> tuple[FloatArray, np.ndarray[tuple[int], np.dtype[np.void]]]:
-    """Load of each joint, NaN where it is not valid, and the joints' errors."""
-    with ResultStore.open(path) as store:
-        held = source.read(store)
-    values = source.load(held.results, name)[0]
-    return np.where(held.results["status"] == Status.OK, values, np.nan), held.errors
+def _read(paths: tuple[Path, Path]) -> tuple[Campaign, Campaign]:
+    """Loads of the joints of both files, the high fidelity first."""
+    found = []
+    for path in paths:
+        with ResultStore.open(path) as store:
+            found.append(source.read(store, source.LOAD_FIELDS, ()))
+    if len(found[0].results) > len(found[1].results):
+        raise StoreError(str(Fault(str(paths[1]), f"has fewer joints than {paths[0]}", "make both anew")))
+    return found[0], found[1]
 
 
-def _pairs(paths: tuple[Path, Path], name: str, cost_high: float, cost_low: float) -> Pairs:
-    (high, errors), (low, others) = (_load(path, name) for path in paths)
-    if high.size > low.size or (errors != others[: len(errors)]).any():
-        found = f"{paths[0]} has other joints"
-        raise StoreError(str(Fault(str(paths[1]), found, "make both anew with one command")))
-    return Pairs(high, low, cost_high, cost_low)
+def _pairs(campaigns: tuple[Campaign, Campaign], name: str, costs: tuple[float, float]) -> Pairs:
+    """A load of each joint, NaN where it is not valid. Both files are of one study and seed: row i is one joint."""
+    high, low = (
+        np.where(held.results["status"] == Status.OK, source.load(held.results, name)[0], np.nan) for held in campaigns
+    )
+    return Pairs(high, low, *costs)
 
 
 def _table(
-    paths: tuple[Path, Path], asked: list[str], limits: dict[str, float], cost_high: float, cost_low: float
+    campaigns: tuple[Campaign, Campaign], asked: list[str], limits: dict[str, float], costs: tuple[float, float]
 ) -> pd.DataFrame:
     rows = []
     for name in asked:
-        pairs = _pairs(paths, name, cost_high, cost_low)
+        pairs = _pairs(campaigns, name, costs)
         found = [("mean", np.nan, multifidelity.mean(pairs))]
         found += [("quantile", share, multifidelity.quantile(pairs, share)) for share in SHARES]
         if name in limits:

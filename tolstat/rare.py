@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from tolstat.origins import SUBSET
 from tolstat.progress import note
 from tolstat.report.source import load
 from tolstat.store import ResultStore
-from tolstat.study import Study
+from tolstat.study import Study, subset_of
 from tolstat.study.model import Subset
 from tolstat.study.selection import limit_of
 from tolstat.tables import Status
@@ -91,13 +91,90 @@ def parse(text: str) -> tuple[str, float]:
     return found["load"], limit_of(found["load"], found["level"], "--limit")
 
 
+def asked(
+    study: Study,
+    limit: str,
+    n: int = 1000,
+    p0: float = 0.1,
+    seed: int | None = None,
+    unresolved: Literal["above", "below"] = "below",
+) -> Study:
+    """Make the study of a subset simulation.
+
+    Parameters
+    ----------
+    study : Study
+        Its tolerances hold; its number of joints and its limits are of no account.
+    limit : str
+        Load and level, ``"cross1.F > 15 kN"``.
+    n : int
+        Joints a level.
+    p0 : float
+        Share of them that is carried to the next level; ``n * p0`` is a whole number.
+    seed : int, optional
+        Instead of the study's.
+    unresolved : {"above", "below"}
+        Where joints without a valid load are counted.
+
+    Returns
+    -------
+    Study
+        For `run`.
+
+    Raises
+    ------
+    InputError
+        With every fault of the question.
+    """
+    load, above = parse(limit)
+    own = {} if seed is None else {"seed": seed}
+    fields = {"load": load, "above": above, "per_level": n, "p0": p0, "unresolved": unresolved}
+    return subset_of(study, fields | own)
+
+
+def of_study(study: Study, limit: str, out: str | Path, workers: int | None = None, **question: Any) -> Found:
+    """Estimate the probability of a rare load by subset simulation.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    limit : str
+        Load and level, ``"cross1.F > 15 kN"``.
+    out : str or Path
+        Result file; one of the same question is gone on with.
+    workers : int, optional
+        As in `run`.
+    **question
+        ``n``, ``p0``, ``seed`` and ``unresolved`` of `asked`.
+
+    Returns
+    -------
+    Found
+
+    Raises
+    ------
+    InputError
+        With every fault of the question.
+    StoreError, Interrupted, WorkerDied
+        As `run`.
+
+    Examples
+    --------
+    >>> found = tolstat.rare_event(study, "cross1.F > 850 N", path, n=100, p0=0.5)
+    >>> found.estimate.lower < 0.0668 < found.estimate.upper  # the load is normal: 700 N, standard deviation 100 N
+    True
+    """
+    return run(asked(study, limit, **question), Path(out), workers)
+
+
 def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> Found:
     """Carry a subset simulation through, or on.
 
     Parameters
     ----------
     plan : Study
-        As `study.subset_of` makes it.
+        As `asked` makes it.
     out : Path
         Result file; made if it does not exist, otherwise gone on with.
     workers : int, optional
@@ -117,12 +194,12 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     Interrupted, WorkerDied
         As `campaign.run`; the same call goes on.
     """
-    asked = plan.sampling
-    assert isinstance(asked, Subset)
-    walk = Walk(Settings(asked.per_level, asked.p0, asked.above), lambda *which: _noise(plan, *which))
+    question = plan.sampling
+    assert isinstance(question, Subset)
+    walk = Walk(Settings(question.per_level, question.p0, question.above), lambda *which: _noise(plan, *which))
     unresolved: list[int] = []
-    first, told = int(asked.nominal_first), 0
-    held = _rows(out) or first + asked.per_level
+    first, told = int(question.nominal_first), 0
+    held = _rows(out) or first + question.per_level
     _simulate(plan, out, held, held, workers, tell)  # which also finds out that the file is of another question
     while not walk.done:
         stage = range(first, first + walk.next.parent.size)
@@ -130,15 +207,15 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
             held = stage.stop
             _append(plan, out, stage, walk.next)
             _simulate(plan, out, held, len(stage), workers, tell)
-        loads, lost = _loads(asked, out, stage, walk.next)
+        loads, lost = _loads(question, out, stage, walk.next)
         unresolved.append(lost)
         walk.take(loads)
         first = stage.stop
         for number, level in enumerate(walk.levels[told:], told):
             tell(f"level {number}: {level.joints} joints, {level.share:.3g} of them beyond the next threshold")
         told = len(walk.levels)
-    joints = first - int(asked.nominal_first)
-    return Found(asked, walk.levels, walk.reached, walk.estimate(), joints, sum(unresolved), unresolved[0])
+    joints = first - int(question.nominal_first)
+    return Found(question, walk.levels, walk.reached, walk.estimate(), joints, sum(unresolved), unresolved[0])
 
 
 def _noise(plan: Study, level: int, first: int, count: int) -> FloatArray:
@@ -177,16 +254,16 @@ def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
         grow(store, _sized(plan, stage.stop), [sampling.from_scores(plan, joints.scores)], [origin])
 
 
-def _loads(asked: Subset, out: Path, stage: range, joints: Candidates) -> tuple[FloatArray, int]:
+def _loads(question: Subset, out: Path, stage: range, joints: Candidates) -> tuple[FloatArray, int]:
     """Loads of a stage, those that are not valid beyond every level or below, and how many these are."""
     rows = slice(stage.start, stage.stop)
     with ResultStore.open(out) as store:
         results, origin = store.results(rows), store.origin(rows)
-    parent = np.where(joints.parent < 0, -1, joints.parent + int(asked.nominal_first))
+    parent = np.where(joints.parent < 0, -1, joints.parent + int(question.nominal_first))
     if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():
         found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
         raise StoreError(str(Fault(str(out), found, "run it anew with another --out")))
-    values = load(results, asked.load)[0].copy()
+    values = load(results, question.load)[0].copy()
     lost = (results["status"] != Status.OK) | ~np.isfinite(values)
-    values[lost] = math.inf if asked.unresolved == "above" else -math.inf
+    values[lost] = math.inf if question.unresolved == "above" else -math.inf
     return values, int(lost.sum())

@@ -154,6 +154,15 @@ def mean(pairs: Pairs, confidence: float = 0.95) -> Estimate:
     ------
     ValueError
         When fewer than four joints have both loads.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> low = rng.normal(10.0, 2.0, 4000)
+    >>> high = 1.1 * low[:100] + rng.normal(0.0, 0.2, 100)
+    >>> found = mean(Pairs(high, low, cost_high=1.0, cost_low=0.02))
+    >>> found.lower < 11.0 < found.upper, found.upper - found.lower < 0.3 * (found.alone_upper - found.alone_lower)
+    (True, True)
     """
     from scipy.special import stdtrit
 

@@ -157,6 +157,18 @@ class Walk:
     reached : bool
         Whether it ends at the limit. Otherwise no joint went beyond the threshold any more, or the probability is
         below `LEAST`.
+
+    Examples
+    --------
+    How often is the sum of four standard normal numbers above 8, four standard deviations?
+
+    >>> streams = [np.random.default_rng([1, level]) for level in range(9)]
+    >>> walk = Walk(Settings(1000, 0.1, 8.0), lambda level, first, m: streams[level].standard_normal((m, 4)))
+    >>> while not walk.done:
+    ...     walk.take(walk.next.scores.sum(axis=1))
+    >>> found = walk.estimate()
+    >>> found.lower < 3.167e-5 < found.upper, len(walk.levels)
+    (True, 5)
     """
 
     def __init__(self, settings: Settings, noise: Noise) -> None:

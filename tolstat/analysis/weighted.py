@@ -142,7 +142,24 @@ def curve(
 
 
 def at(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, confidence: float = 0.95) -> Exceedance:
-    """Share of the joints above one level; see `curve`."""
+    """Share of the joints above one level; see `curve` for parameters and what is raised.
+
+    Returns
+    -------
+    Exceedance
+        Estimate, interval and bounds.
+
+    Examples
+    --------
+    Normal loads drawn about 4, half of them: which share is above 4 under the standard normal distribution?
+
+    >>> rng = np.random.default_rng(1)
+    >>> loads = rng.standard_normal(4000) + 4.0 * (np.arange(4000) % 2)
+    >>> weights = 1.0 / (0.5 + 0.5 * np.exp(4.0 * loads - 8.0))
+    >>> found = at(loads, np.ones(4000, int), weights, 4.0)
+    >>> found.lower < 3.167e-5 < found.upper, f"{found.estimate:.1e}"
+    (True, '3.2e-05')
+    """
     return Exceedance(*curve(values, status, weights, [level], confidence)[0].tolist())
 
 

@@ -47,18 +47,12 @@ def multifidelity(
         seconds = seconds_of(budget, "--budget")
     with gather(faults):
         plan = study.load(study_file)
-        with gather(faults):
-            cheap = fidelities.solver_of(plan, low, "--low")
-        with gather(faults):
-            dear = fidelities.solver_of(plan, high, "--high")
-    if not faults and cheap == dear:
-        faults.append(Fault("--low", "is the same as --high", "give a cheaper one"))
     if faults:
         raise InputError(faults)
     make_folder(out)
     announce_compilation()
     try:
-        found = fidelities.run(plan, cheap, dear, out, seconds, pilot, by, workers, say)
+        found = fidelities.run(plan, low, high, out, seconds, pilot, by, workers, say)
     except campaign.Interrupted as stop:
         say(str(stop))
         raise typer.Exit(stop.exit_code) from stop

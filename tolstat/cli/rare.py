@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from tolstat.rare import Found
     from tolstat.study import Study
 
-DEFAULTS: dict[str, Any] = {"per_level": 1000, "p0": 0.1, "unresolved": "below"}
-
 
 class Side(StrEnum):
     """Where a joint without a valid load is counted."""
@@ -61,7 +59,7 @@ def rare(
     from tolstat.report import rare as tables
     from tolstat.report import text
 
-    given = {"per_level": n, "p0": p0, "seed": seed, "unresolved": None if unresolved is None else unresolved.value}
+    given = {"n": n, "p0": p0, "seed": seed, "unresolved": None if unresolved is None else unresolved.value}
     given = {name: value for name, value in given.items() if value is not None}
     if source.suffix == ".toml":
         plan, path = _plan(source, limit, given), out or Path(f"{source.stem}_rare.h5")
@@ -88,18 +86,19 @@ def rare(
 
 def _plan(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
     from tolstat import study
-    from tolstat.rare import parse
+    from tolstat.rare import asked, parse
 
     faults: list[Fault] = []
     if limit is None:
         faults.append(Fault("--limit", "is missing", 'write --limit "cross1.F > 900 N"'))
-    with gather(faults):
-        load, above = parse(limit or "cross1.F > 1 N")
+    else:
+        with gather(faults):
+            parse(limit)
     with gather(faults):
         plan = study.load(source)
-    if faults:
+    if faults or limit is None:
         raise InputError(faults)
-    return study.subset_of(plan, DEFAULTS | given | {"load": load, "above": above})
+    return asked(plan, limit, **given)
 
 
 def _recalled(source: Path, study_file: Path | None, given: list[Any]) -> Study:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import exceedance, overrepresentation, pick_freeze, quantile, regression, sensitivity
@@ -109,17 +110,39 @@ def of_store(
     if study.groups:
         return _frozen(store, study, by, confidence, log)
     campaign = source.read(store, source.LOAD_FIELDS, [c for name in study.tolerances for c in columns_of(name)])
+    return of_campaign(campaign, study, by, confidence, log, str(store.path))
+
+
+def of_campaign(
+    campaign: source.Campaign,
+    study: Study,
+    by: str,
+    confidence: float = 0.95,
+    log: bool = False,
+    place: str = "the campaign",
+) -> Causes:
+    """Find the causes of a load among joints that are in memory already; parameters and errors as `of_store`.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The joints, or some of them, each counting the same.
+    study : Study
+        Their study.
+    place : str
+        What to call them in a message.
+    """
     values, unit = source.load(campaign.results, by)
     status = campaign.results["status"]
     valid = (status == Status.OK) & np.isfinite(values)
     needed = max(JOINTS, len(study.tolerances) + 2 * regression.GROUPS)
     if valid.sum() < needed or np.ptp(values[valid]) == 0:
         found = f"has {valid.sum()} joints with a valid load that scatters"
-        raise StoreError(str(Fault(str(store.path), found, f"run {needed} joints or more")))
+        raise StoreError(str(Fault(place, found, f"run {needed} joints or more")))
     if log and values[valid].min() <= 0:
         raise InputError([Fault("--log", f"{by} is not positive in all joints", "leave it out")])
     load, errors, iid = values[valid], campaign.errors[valid], campaign.iid
-    names = [name for name in study.tolerances if np.ptp(sampling.values(errors, name)) > 0]
+    names = scattering(study, errors)
     x = np.column_stack([sampling.values(errors, name) for name in names])
     y = np.log(load) if log else load
     first = sensitivity.first_order(x, y, confidence, iid)
@@ -165,6 +188,11 @@ def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: b
     lost = exceedance.sort_out(values, status).n_unresolved
     counts = (level, int((values[valid] > level).sum()), unit, float(np.sqrt(found.variance)))
     return Causes(by, int(valid.sum()), lost, *counts, float(found.first.estimate.sum()), np.nan, table)
+
+
+def scattering(study: Study, errors: NDArray[np.void]) -> list[str]:
+    """Names of the tolerances of a study whose errors differ in the joints of a table ERROR."""
+    return [name for name in study.tolerances if np.ptp(sampling.values(errors, name)) > 0]
 
 
 def _table(names: list[str], parts: dict[str, NamedTuple]) -> pd.DataFrame:

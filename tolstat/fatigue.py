@@ -72,7 +72,7 @@ def channels(patterns: Sequence[str] = ("*.*",)) -> tuple[str, ...]:
     return tuple(name for name in CHANNELS if any(name in names for names in found.values()))
 
 
-def cycles(store: ResultStore, names: Sequence[str] | None = None) -> Cycles:
+def cycles(store: ResultStore, names: Sequence[str] | None = None, most: int | None = None) -> Cycles:
     """Rainflow cycles of every joint of a campaign.
 
     As the workers counted them (``histories = "cycles"``), else counted now from the histories. From harmonics they are
@@ -84,6 +84,8 @@ def cycles(store: ResultStore, names: Sequence[str] | None = None) -> Cycles:
         The campaign.
     names : sequence of str, optional
         Channels to keep, all 64 without it: some 8 kB a joint.
+    most : int, optional
+        Rows to read, the first ones; all without it.
 
     Returns
     -------
@@ -97,10 +99,11 @@ def cycles(store: ResultStore, names: Sequence[str] | None = None) -> Cycles:
     """
     names = tuple(CHANNELS) if names is None else tuple(names)
     place = [list(CHANNELS).index(name) for name in names]
-    table = np.empty((store.n, len(names), rainflow.KEPT, 2), np.float32)
-    number = np.empty((store.n, len(names)))
-    simulated = np.isin(store.status(), SIMULATED)
-    for rows, counted in _counted(store):
+    n = store.n if most is None else min(most, store.n)
+    table = np.empty((n, len(names), rainflow.KEPT, 2), np.float32)
+    number = np.empty((n, len(names)))
+    simulated = np.isin(store.status(slice(n)), SIMULATED)
+    for rows, counted in _counted(store, n):
         table[rows], number[rows] = counted["cycles"][:, place], counted["cycle_count"][:, place]
     table[~simulated], number[~simulated] = np.nan, np.nan
     used = max(1, int(np.max(number, initial=0.0, where=np.isfinite(number))))
@@ -108,7 +111,12 @@ def cycles(store: ResultStore, names: Sequence[str] | None = None) -> Cycles:
     return Cycles(names, table[..., 0], table[..., 1], number, np.ones(table.shape[2]))
 
 
-def read(paths: Sequence[str | Path], shares: Sequence[float] = (1.0,), names: Sequence[str] | None = None) -> Loading:
+def read(
+    paths: Sequence[str | Path],
+    shares: Sequence[float] = (1.0,),
+    names: Sequence[str] | None = None,
+    most: int | None = None,
+) -> Loading:
     """Read the cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
 
     Parameters
@@ -119,6 +127,8 @@ def read(paths: Sequence[str | Path], shares: Sequence[float] = (1.0,), names: S
         Share of the revolutions at each operating point; the sum is 1.
     names : sequence of str, optional
         Channels to keep.
+    most : int, optional
+        Rows of each file to read, the first ones; all without it.
 
     Raises
     ------
@@ -139,7 +149,7 @@ def read(paths: Sequence[str | Path], shares: Sequence[float] = (1.0,), names: S
             if store.sampling["method"] in ("cases", "sweep"):
                 remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
                 raise StoreError(str(Fault(str(path), "holds joints that are no sample of a production", remedy)))
-            errors, own = store.errors(), store.status()
+            errors, own = store.errors(slice(most)), store.status(slice(most))
             if not parts:
                 first, status, sampling = errors, own, store.sampling
                 name, judged = store.study_name, of_text(store.study_text, str(path))
@@ -147,7 +157,7 @@ def read(paths: Sequence[str | Path], shares: Sequence[float] = (1.0,), names: S
                 _check_same_joints(path, errors, paths[0], first)
                 status = np.where(status == Status.OK, own, status)
                 name += f" + {store.study_name}"
-            parts.append(cycles(store, names))
+            parts.append(cycles(store, names, most))
     whole = mix(parts, [share / total for share in shares])
     skip = int(sampling["nominal_first"])
     has_nominal = skip and status[0] == Status.OK
@@ -168,14 +178,14 @@ def _check_same_joints(path: str | Path, errors: NDArray[np.void], other: str | 
         raise InputError([Fault(str(path), f"does not hold the joints of {other}", remedy)])
 
 
-def _counted(store: ResultStore) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
-    """Rows, and their cycles by name of `rainflow.SPECS`, a block at a time."""
+def _counted(store: ResultStore, n: int) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
+    """Rows below `n`, and their cycles by name of `rainflow.SPECS`, a block at a time."""
     held = store.history_specs
     if not held:
         remedy = 'set histories = "cycles" in [output] of the study and run it anew'
         raise StoreError(str(Fault(str(store.path), "holds neither cycles nor load histories", remedy)))
-    for first in range(0, store.n, BLOCK):
-        rows = np.arange(first, min(first + BLOCK, store.n))
+    for first in range(0, n, BLOCK):
+        rows = np.arange(first, min(first + BLOCK, n))
         if "cycles" in held:
             yield rows, {name: store.histories(name, rows) for name in rainflow.SPECS}
             continue

@@ -14,6 +14,7 @@ from tolstat.recall import recall
 from tolstat.report.source import load
 from tolstat.schema import did_you_mean
 from tolstat.store import ResultStore
+from tolstat.study import Study
 from tolstat.study.selection import LIMIT_UNITS
 from tolstat.tables import RESULT_COLUMNS, SIMULATED, Status
 from tolstat.tolerance import score
@@ -83,14 +84,33 @@ def worst(store: ResultStore, by: str, n: int = 10, study_path: Path | None = No
         counts[0] = False
     rows = np.flatnonzero(counts)
     rows = rows[np.argsort(-values[rows], kind="stable")][:n]
+    return Tail(describe(store, study, rows, values[rows], results["status"][rows]), unit)
+
+
+def describe(
+    store: ResultStore, study: Study, rows: NDArray[np.intp], values: NDArray[np.float64], status: NDArray[np.uint8]
+) -> list[TailJoint]:
+    """Put the errors of joints beside their loads.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The result file.
+    study : Study
+        Its study.
+    rows : ndarray of int, shape (m,)
+        Rows of the file.
+    values, status : ndarray, shape (m,)
+        Their load and `tables.Status`.
+    """
     errors = np.concatenate([store.errors(slice(0, 0)), *(store.errors(slice(row, row + 1)) for row in rows)])
     scores = {name: score(d, sampling.values(errors, name)) for name, d in study.tolerances.items()}
     joints = []
     for i, row in enumerate(rows):
         own = {name: float(z[i]) for name, z in scores.items()}
         ordered = dict(sorted(own.items(), key=lambda item: -abs(item[1])))
-        joints.append(TailJoint(store.rows[row], float(values[row]), Status(results["status"][row]), ordered))
-    return Tail(joints, unit)
+        joints.append(TailJoint(store.rows[row], float(values[i]), Status(status[i]), ordered))
+    return joints
 
 
 def _values(results: NDArray[np.void], by: str) -> tuple[NDArray[np.float64], str]:

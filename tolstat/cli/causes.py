@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import Workers, as_text, say
+from tolstat.cli._app import Workers, announce_compilation, as_text, say, writing
 from tolstat.cli.extend import StudyFile
 from tolstat.errors import Fault, InputError
 
@@ -36,6 +36,17 @@ def causes(
         Path | None, typer.Option("--out", metavar="OUT", help="Of the design: result file; default STUDY_causes.h5.")
     ] = None,
     workers: Workers = None,
+    against_angle: Annotated[
+        Path | None,
+        typer.Option(
+            "--against-angle",
+            metavar="OUT.csv",
+            help="Shares of the variance at each shaft angle instead: CSV file, and OUT.png beside it.",
+        ),
+    ] = None,
+    joints: Annotated[
+        int, typer.Option("--joints", metavar="N", min=100, help="With --against-angle: joints looked at.")
+    ] = 1000,
     study_file: StudyFile = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with all errors, instead of a table.")] = False,
 ) -> None:
@@ -48,7 +59,15 @@ def causes(
     With --pick-freeze the indices come from joints simulated for them: no fit, and intervals in place of bounds. Each
     point takes two joints and one for each group of errors. Stopped, the same command goes on where it was; the joints
     are in OUT, which this command takes as FILE too.
+
+    With --against-angle the shares that each error explains alone of the force or torque at each angle, and over the
+    revolution; joints without histories in FILE are simulated again.
     """
+    if against_angle is not None:
+        if points is not None or out is not None:
+            raise InputError([Fault("--against-angle", "does not go with --pick-freeze", "give one of the two")])
+        _against_angle(file, by, n, log, against_angle, joints, study_file)
+        return
     from tolstat import causes as source
     from tolstat.report import causes as report
     from tolstat.report import text
@@ -81,3 +100,26 @@ def _run_design(path: Path, points: int, groups: Groups, out: Path | None, worke
     target = out if out is not None else Path(f"{path.stem}_causes.h5")
     carry_out(plan, target, False, execution=Execution("processes", workers))
     return target
+
+
+def _against_angle(file: Path, by: str, n: int, log: bool, out: Path, joints: int, study_file: Path | None) -> None:
+    from tolstat import angles, revolutions
+    from tolstat.files import check_target
+    from tolstat.recall import recall
+    from tolstat.report import angles as report
+    from tolstat.store import ResultStore
+
+    picture = out.with_suffix(".png")
+    for path in (out, picture):
+        check_target(path, file)
+    with ResultStore.open(file) as store:
+        study = recall(store, path=study_file)
+        if not revolutions.held(store):
+            announce_compilation()
+        found = angles.of_store(store, study, [by], joints, (by,) if log else ())[0]
+    typer.echo(report.text(found, n))
+    say(report.note(found, log))
+    with writing(out) as temporary:
+        found.table().to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+    for path in (out, *report.save(found, log, picture)):
+        say(f"wrote {path}")

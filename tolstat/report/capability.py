@@ -9,10 +9,12 @@ import numpy as np
 import pandas as pd
 
 from tolstat.analysis import capability, extreme
+from tolstat.analysis.exceedance import FloatArray
 from tolstat.report.source import Campaign, load
 from tolstat.report.text import align
 
 TOGETHER = "all limits"
+BLOCK = 1 << 16
 
 
 def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
@@ -36,8 +38,7 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
     status = campaign.results["status"]
     columns = {name: load(campaign.results, name) for name in campaign.limits}
     asked = [(name, unit, values, campaign.limits[name]) for name, (values, unit) in columns.items()]
-    values = np.column_stack([values for values, _ in columns.values()])
-    asked.append((TOGETHER, "1", capability.utilization(values, list(campaign.limits.values())), 1.0))
+    asked.append((TOGETHER, "1", _utilization([values for values, _ in columns.values()], campaign), 1.0))
     rows = []
     for name, unit, loads, limit in asked:
         c = capability.at(loads, status, limit, confidence, campaign.iid)
@@ -49,6 +50,13 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
         row |= {key: getattr(c, key) for key in (*ends, "normal_p", "needed")}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _utilization(columns: Sequence[FloatArray], campaign: Campaign) -> FloatArray:
+    """Largest of each joint's loads over their limits; by blocks, since all loads of a million joints are large."""
+    levels, blocks = list(campaign.limits.values()), range(0, len(campaign.results), BLOCK)
+    parts = (np.column_stack([values[first : first + BLOCK] for values in columns]) for first in blocks)
+    return np.concatenate([np.empty(0), *(capability.utilization(part, levels) for part in parts)])
 
 
 def returns(

@@ -15,24 +15,29 @@ SIGNIFICANT = 0.05
 
 
 def text(causes: Causes, shown: int = 12) -> str:
+    """Text of `rows`."""
+    return align(rows(causes, shown))
+
+
+def rows(causes: Causes, shown: int = 12) -> list[list[str]]:
     """Table of the `shown` errors with the largest first-order indices, and those that play a part in the tail.
 
     Returns
     -------
-    str
-        Shares of the variance in per cent, rank coefficients, and the probability that a joint of the tail has the
-        larger error (``direction``) and the error farther from the middle (``size``), each with its interval; ``*``
-        marks what chance does not explain. Columns that are not known are left out.
+    list of list of str
+        Headings, then a row an error: shares of the variance in per cent, rank coefficients, and the probability that
+        a joint of the tail has the larger error (``direction``) and the error farther from the middle (``size``), each
+        with its interval; ``*`` marks what chance does not explain. Columns that are not known are left out.
     """
     table = causes.table
     marked = (table["direction_p"] < SIGNIFICANT) | (table["size_p"] < SIGNIFICANT)
     total = _interval if math.isnan(causes.r2) else _ends  # from given data there are but bounds
-    rows = [["error", "alone, %", "in all, %", "rank coefficient", "tail: larger", "tail: farther out"]]
+    lines = [["error", "alone, %", "in all, %", "rank coefficient", "tail: larger", "tail: farther out"]]
     for row in table[(table.index < shown) | marked].to_dict("records"):
         line = [row["error"], _interval(row, "first", 100), total(row, "total", 100), _interval(row, "srrc")]
-        rows.append([*line, _tail(row, "direction"), _tail(row, "size")])
-    columns = [column for column in zip(*rows, strict=True) if set(column[1:]) != {"-"}]
-    return align([list(row) for row in zip(*columns, strict=True)])
+        lines.append([*line, _tail(row, "direction"), _tail(row, "size")])
+    columns = [column for column in zip(*lines, strict=True) if set(column[1:]) != {"-"}]
+    return [list(row) for row in zip(*columns, strict=True)]
 
 
 def note(causes: Causes, log: bool = False) -> str:

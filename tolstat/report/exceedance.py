@@ -7,6 +7,7 @@ from dataclasses import asdict
 
 import numpy as np
 import pandas as pd
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +16,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, weighted
-from tolstat.analysis.accuracy import KIND_OF, KINDS, OBSERVABLES, sizes
+from tolstat.analysis.accuracy import KIND_OF, KINDS, OBSERVABLES, size
 from tolstat.report import accuracy, style
 from tolstat.report.source import Campaign, load
 from tolstat.tables import Status
@@ -49,7 +50,7 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
     for name, level in campaign.limits.items():
         values, unit = load(campaign.results, name)
         share = campaign.above(values, level, confidence)
-        head = {"load": name, "unit": unit, "nominal": _nominal(campaign, name)}
+        head = {"load": name, "unit": unit, "nominal": nominal(campaign, name)}
         budget = _budget(campaign, name, level, confidence, numerical)
         rows.append({**head, **asdict(share), "confidence": confidence, **budget})
     return pd.DataFrame(rows)
@@ -70,7 +71,7 @@ def _budget(
     kind = KINDS[KIND_OF[OBSERVABLES.index(name)]]
     error = numerical.get(kind, np.nan)
     values = load(campaign.results, name)[0]
-    shift = error * sizes(campaign.results)[:, OBSERVABLES.index(name)]
+    shift = error * size(campaign.results, name)
     if np.isnan(error):
         return {"numerical_error": error} | dict.fromkeys(BUDGET, np.nan)
     low, high = (campaign.above(values + s, level, confidence) for s in (-shift, shift))
@@ -92,7 +93,7 @@ def quantiles(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
         values, unit = load(campaign.results, name)
         for share in SHARES:
             q = campaign.quantile(values, share, confidence)
-            head = {"load": name, "unit": unit, "nominal": _nominal(campaign, name)}
+            head = {"load": name, "unit": unit, "nominal": nominal(campaign, name)}
             rows.append({**head, **q._asdict(), "confidence": confidence})
     return pd.DataFrame(rows)
 
@@ -108,7 +109,7 @@ def curves(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
     """
     parts = []
     for name in campaign.listed:
-        table, unit = _curve(campaign, name, confidence, MAX_LEVELS)
+        table, unit = curve(campaign, name, confidence, MAX_LEVELS)
         part = pd.DataFrame({field: table[field] for field in exceedance.CURVE.names or ()})
         part.insert(0, "load", name)
         part.insert(1, "unit", unit)
@@ -163,17 +164,18 @@ def figure(campaign: Campaign, confidence: float = 0.95) -> Figure:
         title = f"{campaign.name}: share of joints whose largest load exceeds x"
         page, panels = style.panels(title, f"{campaign.head()}\n{note(campaign)}")
         for group, letter, ax in panels:
-            _panel(ax, campaign, group, letter, confidence)
+            panel(ax, campaign, group, letter, confidence)
         _legend(page, campaign)
     return page
 
 
-def _nominal(campaign: Campaign, name: str) -> float:
+def nominal(campaign: Campaign, name: str) -> float:
+    """Load of the joint without errors, SI; NaN where there is none."""
     return float(load(campaign.nominal, name)[0][0]) if len(campaign.nominal) else np.nan
 
 
-def _curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple[NDArray[np.void], str]:
-    """Step curve of a load, thinned to `most` levels: every one at the highest loads, evenly spread below."""
+def curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple[NDArray[np.void], str]:
+    """Step curve of a load and its unit, thinned to `most` levels: all of the highest, evenly spread below."""
     values, unit = load(campaign.results, name)
     levels = np.unique(exceedance.sort_out(values, campaign.results["status"]).valid)
     if levels.size > most:
@@ -184,10 +186,11 @@ def _curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple
     return campaign.curve(values, np.concatenate([below, levels]), confidence), unit
 
 
-def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: float) -> None:
+def panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: float = 0.95) -> None:
+    """Draw the curves of four bushings: ``cross`` or ``fork``, ``F`` or ``T``."""
     names = [f"{group}{i}.{letter}" for i in (1, 2, 3, 4)]
     tables = [
-        _curve(campaign, name, confidence, DRAWN_LEVELS)[0] if name in campaign.drawn else np.empty(0, exceedance.CURVE)
+        curve(campaign, name, confidence, DRAWN_LEVELS)[0] if name in campaign.drawn else np.empty(0, exceedance.CURVE)
         for name in names
     ]
     unit = "N" if letter == "F" else "N m"
@@ -202,29 +205,29 @@ def _panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: fl
         ax.set(xticks=[], yticks=[])
         return
     marked = _limit_levels(campaign, group, letter)
-    low, high = _range(levels, list(marked))
+    low, high = axis_range(levels, list(marked))
     ax.set_xlim(low, high)
-    floor = 0.5 * min(_least(campaign, table) for table in tables if table.size)
+    floor = 0.5 * min(least(campaign, table) for table in tables if table.size)
     style.share_axis(ax, floor)
     for i, table in enumerate(tables):
         if table.size:
-            _steps(ax, table, i, low, floor)
-        nominal = _nominal(campaign, names[i])
-        if low <= nominal <= high:
-            style.mark(ax, nominal, 1.0, style.COLOURS[i])
+            steps(ax, table, i, low, floor)
+        ideal = nominal(campaign, names[i])
+        if low <= ideal <= high:
+            style.mark(ax, ideal, 1.0, style.COLOURS[i])
     if campaign.iid:
         ends = [table["outer_upper"][-1] for table in tables if table.size]
         ax.axhline(max(ends), color=style.FAINT, lw=1.1, ls=ZERO_DASH, zorder=1.5)
-    _limit_lines(ax, marked, unit)
+    limit_lines(ax, marked, unit)
 
 
-def _least(campaign: Campaign, table: NDArray[np.void]) -> float:
+def least(campaign: Campaign, table: NDArray[np.void]) -> float:
     """Least share that a curve can show: one joint, or what the joints with weights come down to."""
     shares = table["estimate"][table["estimate"] > 0]
     return 1.0 / float(table["n"][0]) if campaign.weights is None else float(shares.min(initial=1.0))
 
 
-def _range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, float]:
+def axis_range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, float]:
     """Range of the x axis: the loads, and the limits unless they lie far off."""
     low, high = float(levels.min()), float(levels.max())
     reach = max(high - low, 0.02 * abs(high), 1e-12)
@@ -234,26 +237,26 @@ def _range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, flo
     return low - margin, high + margin
 
 
-def _steps(ax: Axes, table: NDArray[np.void], i: int, low: float, floor: float) -> None:
+def steps(ax: Axes, table: NDArray[np.void], i: int, low: float, floor: float) -> None:
     """Draw one curve with its bands as steps; its first row is drawn from the left edge `low` on."""
     if not table.size:
         return
     x = np.concatenate([[low], table["level"][1:]])
     colour = style.COLOURS[i]
 
-    def steps(field: str) -> NDArray[np.float64]:
+    def shown(field: str) -> NDArray[np.float64]:
         shares: NDArray[np.float64] = table[field].clip(1e-3 * floor, 1.0)
         return shares
 
     def band(lower: str, upper: str, alpha: float) -> None:
-        ax.fill_between(x, steps(lower), steps(upper), step="post", color=colour, alpha=alpha, lw=0)
+        ax.fill_between(x, shown(lower), shown(upper), step="post", color=colour, alpha=alpha, lw=0)
 
     iid = np.isfinite(table["lower"]).all()
     if iid:
         band("lower", "upper", 0.2)
     if table["n_failed"][0] + table["n_unsettled"][0]:
         band("outer_lower" if iid else "bound_lower", "outer_upper" if iid else "bound_upper", 0.1)
-    ax.step(x, steps("estimate"), where="post", color=colour, ls=style.DASHES[i], zorder=3)
+    ax.step(x, shown("estimate"), where="post", color=colour, ls=style.DASHES[i], zorder=3)
 
 
 def _limit_levels(campaign: Campaign, group: str, letter: str) -> dict[float, list[int]]:
@@ -266,7 +269,7 @@ def _limit_levels(campaign: Campaign, group: str, letter: str) -> dict[float, li
     return dict(sorted(found.items()))
 
 
-def _limit_lines(ax: Axes, marked: dict[float, list[int]], unit: str) -> None:
+def limit_lines(ax: Axes, marked: dict[float, list[int]], unit: str) -> None:
     """Mark limits by vertical lines, labelled above the panel; one far off is an arrow at the edge."""
     labels: list[tuple[float, str, str]] = []
     low, high = ax.get_xlim()
@@ -281,7 +284,16 @@ def _limit_lines(ax: Axes, marked: dict[float, list[int]], unit: str) -> None:
         labels = _without_overlap(labels, (place, text, colour))
     for place, text, colour in labels:
         side = "left" if place < 0.12 else "right" if place > 0.88 else "center"
-        ax.text(place, 1.015, text, transform=ax.transAxes, ha=side, va="bottom", fontsize=9, color=colour)
+        ax.text(
+            place,
+            1.015,
+            text,
+            transform=ax.transAxes,
+            ha=side,
+            va="bottom",
+            size=0.9 * rcParams["font.size"],
+            color=colour,
+        )
 
 
 def _without_overlap(labels: list[tuple[float, str, str]], new: tuple[float, str, str]) -> list[tuple[float, str, str]]:

@@ -7,6 +7,7 @@ from dataclasses import asdict
 
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -166,31 +167,48 @@ def figure(loading: Loading, confidence: float = 0.95) -> Figure:
     Figure
         Four panels, each with the channel that has the largest damage-equivalent load among the four bushings.
     """
-    table = equivalent_loads(loading, SHARES[-1:], confidence)
-    candidates = table[table["channel"].isin(worst(table))]
+    channels = leading(loading)
     with style.settings():
         small = f"{_valid(loading)}; in each panel the bushing and direction with the largest equivalent load"
         if loading.iid:
             small += f"\nbands: pointwise {100 * confidence:g} % intervals of order statistics"
         page, panels = style.panels(f"{loading.name}: load spectra over the joints", small)
         for group, letter, ax in panels:
-            here = candidates[candidates["channel"].str.match(rf"{group}\d\.{letter}")]
-            if len(here):
-                channel = str(here.sort_values("estimate")["channel"].iloc[-1])
-                _panel(ax, spectra(loading, [channel], SHARES, confidence), loading.judged.revolutions)
-                ax.set_xlabel("cycles a revolution with at least this range")
-                ax.set_ylabel(f"range of {channel} [{'N' if letter == 'F' else 'N m'}]")
+            here = [name for name in channels if name.startswith(group) and f".{letter}" in name]
+            if here:
+                panel(ax, loading, here[0], confidence)
             else:
                 ax.text(0.5, 0.5, "no joint with a valid result", ha="center", transform=ax.transAxes)
                 ax.set(xticks=[], yticks=[])
-        labels = [f"{100 * share:g} % of the joints stay below" for share in SHARES]
-        handles = [Line2D([], [], color=style.COLOURS[i], ls=style.DASHES[i]) for i in range(len(SHARES))]
-        style.legend(page, [*handles, Line2D([], [], color=style.INK, lw=1)], [*labels, "nominal joint"])
+        style.legend(page, *key())
     return page
 
 
-def _panel(ax: Axes, table: pd.DataFrame, revolutions: float) -> None:
+def key() -> tuple[list[Artist], list[str]]:
+    """Legend of a panel: its lines and their meaning."""
+    labels = [f"{100 * share:g} % of the joints stay below" for share in SHARES]
+    handles: list[Artist] = [Line2D([], [], color=style.COLOURS[i], ls=style.DASHES[i]) for i in range(len(SHARES))]
+    return [*handles, Line2D([], [], color=style.INK, lw=1)], [*labels, "nominal joint"]
+
+
+def leading(loading: Loading) -> list[str]:
+    """Of force and torque of the cross and of the fork bushings the channel with the largest equivalent load."""
+    table = equivalent_loads(loading, SHARES[-1:])
+    candidates = table[table["channel"].isin(worst(table))].sort_values("estimate")
+    found = []
+    for group in ("cross", "fork"):
+        for letter in "FT":
+            here = candidates[candidates["channel"].str.match(rf"{group}\d\.{letter}")]
+            found += [str(here["channel"].iloc[-1])] if len(here) else []
+    return found
+
+
+def panel(ax: Axes, loading: Loading, channel: str, confidence: float = 0.95) -> None:
     """Draw the spectra of one channel: steps down to the right, and their bands."""
+    revolutions = loading.judged.revolutions
+    table = spectra(loading, [channel], SHARES, confidence)
+    ax.set_xlabel("cycles a revolution with at least this range")
+    ax.set_ylabel(f"range of {channel} [{'N' if CHANNELS[channel] == 'N' else 'N m'}]")
     ceiling = float(table["estimate"].max())
     floor = SMALLEST * ceiling if ceiling > 0 else 1.0
     numbers = table["cycles"].unique() / revolutions

@@ -7,7 +7,6 @@ import io
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jinja2
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -15,7 +14,7 @@ from matplotlib.figure import Figure
 import tolstat
 from tolstat.analysis import paper, paper_choices, paper_distances
 from tolstat.files import writing
-from tolstat.report import paper_checks, paper_choices_figures, paper_curves, paper_equations, style, text
+from tolstat.report import paper_checks, paper_choices_figures, paper_curves, paper_equations, style, templates, text
 from tolstat.report.paper_main import revolutions
 from tolstat.report.paper_source import PaperStudy
 from tolstat.tables import BUSHINGS
@@ -74,8 +73,7 @@ def write(study: PaperStudy, path: Path) -> None:
     path : Path
         HTML file.
     """
-    loader = jinja2.PackageLoader("tolstat.report", "templates")
-    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment = templates.environment()
     environment.filters["picture"] = _picture
     environment.filters["number"] = _number
     page = environment.get_template("paper.html.j2").render(context(study))

@@ -198,7 +198,6 @@ def read(
         nominal = results[:1][results["status"][:1] == Status.OK]
         errors, results = errors[1:], results[1:]
         weights = None if weights is None else weights[1:]
-    patterns = tuple(_patterns(tomllib.loads(store.study_text).get("sweep", {})))
     method = str(store.sampling["method"])
     return Campaign(
         store.study_name,
@@ -207,11 +206,16 @@ def read(
         errors,
         results,
         nominal,
-        patterns,
+        patterns(store.study_text),
         verification.read(store),
         store.columns,
         weights,
     )
+
+
+def patterns(text: str) -> tuple[str, ...]:
+    """Key paths of what the text of a study sweeps; empty for one that does not."""
+    return tuple(_patterns(tomllib.loads(text).get("sweep", {})))
 
 
 def _patterns(table: Mapping[str, Any], before: str = "") -> Iterator[str]:

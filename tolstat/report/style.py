@@ -87,6 +87,16 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, str, Axes
     return figure, page
 
 
+def share_axis(ax: Axes, low: float, which: str = "y") -> None:
+    """Logarithmic axis in per cent, from `low` to a little above 100 % so that a curve there can be seen."""
+    upright = which == "y"
+    (ax.set_yscale if upright else ax.set_xscale)("log")
+    (ax.set_ylim if upright else ax.set_xlim)(low, low**-0.04)
+    axis = ax.yaxis if upright else ax.xaxis
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:
     """Mark the nominal joint by a small triangle."""
     ax.plot(x, y, marker="v", ms=7.5, mec="white", mew=0.7, color=colour, clip_on=False, zorder=5)
@@ -103,14 +113,6 @@ def note(ax: Axes, text: str, y: float) -> None:
         ha="right",
         fontsize=9,
     )
-
-
-def share_axis(ax: Axes, floor: float) -> None:
-    """Logarithmic axis in per cent from `floor` on, a little above 100 % so that a curve there can be seen."""
-    ax.set_yscale("log")
-    ax.set_ylim(floor, floor**-0.04)
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100.0 * y:g} %"))
-    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def legend(figure: Figure, handles: list[Artist], labels: list[str]) -> None:

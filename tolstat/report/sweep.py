@@ -83,14 +83,20 @@ def figure(campaign: Campaign) -> Figure:
     with style.settings():
         title = f"{campaign.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
         page, panels = style.panels(title, f"{campaign.head()}\n{_note(axes)}")
-        first = axes[0] if axes else Axis("joint", "", np.arange(1, len(campaign.results) + 1, dtype=np.float64))
         for group, letter, ax in panels:
-            ax.set_xlabel(_head(first))
-            ax.xaxis.set_major_locator(MaxNLocator(6))
-            ax.set_ylabel(f"largest |{letter}| [{'N' if letter == 'F' else 'N m'}]")
-            _panel(ax, campaign, [first, *axes[1:]], group, letter)
+            panel(ax, campaign, group, letter)
         _legend(page, campaign, axes)
     return page
+
+
+def panel(ax: Axes, campaign: Campaign, group: str, letter: str) -> None:
+    """Draw the loads of four bushings: ``cross`` or ``fork``, ``F`` or ``T``."""
+    axes = swept_axes(campaign)
+    first = axes[0] if axes else Axis("joint", "", np.arange(1, len(campaign.results) + 1, dtype=np.float64))
+    ax.set_xlabel(_head(first))
+    ax.xaxis.set_major_locator(MaxNLocator(6))
+    ax.set_ylabel(f"largest |{letter}| [{'N' if letter == 'F' else 'N m'}]")
+    _lines(ax, campaign, [first, *axes[1:]], group, letter)
 
 
 def _head(axis: Axis) -> str:
@@ -105,7 +111,7 @@ def _note(axes: list[Axis]) -> str:
     return text + (f"; one line for each {others}" if others else "")
 
 
-def _panel(ax: Axes, campaign: Campaign, axes: list[Axis], group: str, letter: str) -> None:
+def _lines(ax: Axes, campaign: Campaign, axes: list[Axis], group: str, letter: str) -> None:
     names = [name for i in (1, 2, 3, 4) if (name := f"{group}{i}.{letter}") in campaign.drawn]
     if not names:
         ax.text(0.5, 0.5, "not kept by the study", ha="center", transform=ax.transAxes)

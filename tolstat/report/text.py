@@ -35,16 +35,16 @@ def limits(table: pd.DataFrame) -> str:
     verified = bool(table["numerical_error"].notna().any())
     rows[0] += ["numerical error both ways", "all together"] if verified else []
     for row in table.to_dict("records"):
-        line = [row["load"], _value(row["nominal"], row["unit"]), _value(row["level"], row["unit"])]
-        line += [str(row["n"]), str(row["count"]), _percent(row["estimate"])]
-        line.append(_range(row["lower"], row["upper"]))
+        line = [row["load"], value(row["nominal"], row["unit"]), value(row["level"], row["unit"])]
+        line += [str(row["n"]), str(row["count"]), percent(row["estimate"])]
+        line.append(span(row["lower"], row["upper"]))
         if unresolved:
             iid = not math.isnan(row["outer_lower"])
             ends = ("outer_lower", "outer_upper") if iid else ("bound_lower", "bound_upper")
-            line.append(_range(row[ends[0]], row[ends[1]]))
+            line.append(span(row[ends[0]], row[ends[1]]))
         if verified:
-            line.append(_range(row["numerical_lower"], row["numerical_upper"]))
-            line.append(_range(row["total_lower"], row["total_upper"]))
+            line.append(span(row["numerical_lower"], row["numerical_upper"]))
+            line.append(span(row["total_lower"], row["total_upper"]))
         rows.append(line)
     return align(rows)
 
@@ -63,12 +63,12 @@ def quantiles(table: pd.DataFrame) -> str:
     for name, part in table.groupby("load", sort=False):
         lines = part.sort_values("share").to_dict("records")
         last, unit = lines[-1], lines[-1]["unit"]
-        interval = "-" if math.isnan(last["lower"]) else f"{last['lower']:.4g} .. {_value(last['upper'], unit)}"
+        interval = "-" if math.isnan(last["lower"]) else f"{last['lower']:.4g} .. {value(last['upper'], unit)}"
         rows.append(
             [
                 str(name),
-                _value(last["nominal"], unit),
-                *(_value(q["estimate"], unit) for q in lines),
+                value(last["nominal"], unit),
+                *(value(q["estimate"], unit) for q in lines),
                 interval,
             ]
         )
@@ -121,17 +121,39 @@ def align(rows: list[list[str]], text_last: bool = False) -> str:
     return "\n".join(lines)
 
 
-def _value(x: float, unit: str) -> str:
-    return "-" if math.isnan(x) else f"{x:.4g} {UNITS.get(unit, unit)}".strip()
+def value(x: float, unit: str) -> str:
+    """A load with its unit, four digits; a dash where there is none."""
+    return f"{number(x)} {UNITS.get(unit, unit)}".strip() if not math.isnan(x) else "-"
+
+
+def number(x: float) -> str:
+    """Four digits, without an exponent as far as one reads it more easily so: ``13030``, not ``1.303e+04``."""
+    short = f"{x:.4g}"
+    return f"{float(short):.0f}" if "e+" in short and abs(x) < 1e7 else short
+
+
+def span_of(low: float, high: float, unit: str) -> str:
+    """An interval of loads with its unit; a dash where there is none."""
+    if math.isnan(low):
+        return "-"
+    return f"{number(low)} .. {'needs more joints' if math.isinf(high) else value(high, unit)}"
+
+
+def sentence(words: str) -> str:
+    """Words as a sentence; a load's name at their beginning stays as it is."""
+    first = words.partition(" ")[0]
+    return (words if any(letter.isdigit() for letter in first) else words[:1].upper() + words[1:]) + "."
 
 
 def _small(x: float) -> str:
     return "-" if math.isnan(x) else f"{x:.1e}"
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """A share in per cent, three digits; a dash where there is none."""
     return "-" if math.isnan(share) else f"{100.0 * share:.3g} %"
 
 
-def _range(low: float, high: float) -> str:
-    return "-" if math.isnan(low) else f"{100.0 * low:.3g} .. {_percent(high)}"
+def span(low: float, high: float) -> str:
+    """An interval of shares in per cent; a dash where there is none."""
+    return "-" if math.isnan(low) else f"{100.0 * low:.3g} .. {percent(high)}"

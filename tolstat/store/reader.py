@@ -301,7 +301,8 @@ class Reader:
 
     def _status_if_intact(self, rows: slice) -> NDArray[np.uint8]:
         found = self._status(rows)
-        return np.asarray(self.results(rows)["status"]) if found.any() else found  # PENDING is 0
+        # PENDING is 0; a copy, since a view would keep the table of the block
+        return self.results(rows)["status"].copy() if found.any() else found
 
     def _check_status(self, found: NDArray[np.uint8]) -> None:
         if found.size and found.max() > max(Status):

@@ -29,7 +29,7 @@ def test_tasks_take_turns_and_the_first_round_does_not_count():
 
     done = timing.in_turn({"a": lambda: task("a", 1.0), "b": lambda: task("b", 3.0)}, 3, lambda: now[0])
     assert order == ["a", "b"] * 4
-    assert (done.typical("a"), done.ratio("b", "a")) == (1.0, 3.0)
+    assert (done.typical("a"), done.least("b"), done.ratio("b", "a")) == (1.0, 3.0, 3.0)
     assert len(done.seconds["a"]) == 3
 
 

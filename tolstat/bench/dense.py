@@ -93,7 +93,7 @@ def against(times: Times, once: dict[str, Once], count: int, per_iteration: NDAr
     -------
     Dense
     """
-    lapack, lapack_solve = times.typical("lapack") / count, times.typical("lapack solve") / count
+    lapack, lapack_solve = times.least("lapack") / count, times.least("lapack solve") / count
     alone, lanes = once["alone"], once["lanes"]
 
     def fresh(of: Once) -> float:

@@ -154,8 +154,8 @@ def measure(these: Sample, rounds: int) -> Iteration:
     lanes = WIDTH / len(params) * np.array([rounds_done, renewals, rounds_done])
     operations = _operations(snaps)
     peak = 2 * WIDTH * CHAINS * PEAK_TIMES / float(times.seconds["peak"].min())
-    start = times.typical("start") / len(params)
-    whole = {name: times.typical(name) / len(params) for name in ("lanes", "alone")}
+    start = times.least("start") / len(params)
+    whole = {name: times.least(name) / len(params) for name in ("lanes", "alone")}
     splits = {
         name: split(whole[name], start, once[name], counts, one, mean["newton_iterations"], operations, peak)
         for name, counts in (("lanes", lanes), ("alone", one))
@@ -209,7 +209,7 @@ def _tasks(these: Sample, snaps: list[Snapshot]) -> dict[str, Callable[[], objec
 
 
 def _once(times: Times, name: str, count: int) -> Once:
-    return Once(*(times.typical(f"{name} {part}") / count for part in Once._fields))
+    return Once(*(times.least(f"{name} {part}") / count for part in Once._fields))
 
 
 def _operations(snaps: list[Snapshot]) -> dict[str, float]:

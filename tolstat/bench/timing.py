@@ -25,6 +25,10 @@ class Times(NamedTuple):
         """Median over the rounds, s."""
         return float(np.median(self.seconds[name]))
 
+    def least(self, name: str) -> float:
+        """Least of the rounds, s: what else the machine does only adds to a time."""
+        return float(self.seconds[name].min())
+
     def ratio(self, name: str, to: str) -> float:
         """Median over the rounds of the ratio of two times."""
         return float(np.median(self.seconds[name] / self.seconds[to]))

@@ -9,6 +9,7 @@ and a step that must be halved. What a lane does depends on its own joint only; 
 from tolstat.kernel import bdf2
 from tolstat.kernel._jit import njit
 from tolstat.kernel.batch import get_counters, get_motion, put_joint, put_motion
+from tolstat.kernel.borrow import borrowed
 from tolstat.kernel.integrate import MAX_RATIO, ROUNDOFF, SLOW, START_LEVEL, scaled_size
 from tolstat.kernel.lane import WIDTH, any_of, bits_of, count_of, where
 from tolstat.kernel.lane_memory import as_lanes
@@ -269,6 +270,8 @@ def lockstep(rows, words, options, patience, alone, batch, samples, results, tal
     tally : ndarray of int, shape (3,)
         Added to: rounds, lanes with a joint in them, rounds with new tangents.
     """
+    rows, words, samples, results = borrowed(rows), borrowed(words), borrowed(samples), borrowed(results)
+    alone, batch = borrowed(alone), borrowed(batch)
     par, work, kept = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.kept)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
     queued = 0

@@ -66,6 +66,23 @@ def test_coverage_through_the_public_function():
     assert covered / 500 >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 500)
 
 
+def test_simultaneous_band_holds_the_whole_curve_and_the_pointwise_one_does_not():
+    rng, n, whole, pointwise = np.random.default_rng(1990), 200, 0, 0
+    for _ in range(500):
+        u = np.sort(rng.random(n))  # exceedance of a uniform load is 1 - u: largest distance at the steps
+        above = 1.0 - np.arange(n) / n
+        far = max(np.abs(above - (1.0 - u)).max(), np.abs(above - 1.0 / n - (1.0 - u)).max())
+        whole += far <= exceedance.simultaneous(n)
+        lower, upper = exceedance.clopper_pearson(n - 1 - np.arange(n), n)
+        pointwise += bool(np.all((lower <= 1.0 - u) & (1.0 - u <= upper)))
+    least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 500)
+    assert whole / 500 >= least
+    assert pointwise / 500 < least
+    assert exceedance.simultaneous(0) == 1.0
+    with pytest.raises(ValueError, match="confidence"):
+        exceedance.simultaneous(10, 95)
+
+
 def test_hand_counted_case():
     values = [1.0, 2.0, 3.0, 4.0, np.nan, 9.0, 9.0]
     status = [1, 1, 1, 1, Status.NEWTON_FAILED, Status.NOT_SETTLED, Status.PENDING]

@@ -109,6 +109,27 @@ def test_contributions_against_shaft_angle_are_those_of_each_angle():
     assert np.isnan(sensitivity.first_order(x, np.zeros((800, 2))).estimate).all()
 
 
+def test_shares_over_the_revolution_cover_and_their_plain_mean_does_not():
+    theta = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    slopes = np.stack([1.0 + 0.5 * np.sin(theta), 0.7 * np.cos(theta), 0.0 * theta])
+    share = slopes**2 / (slopes**2).sum(axis=0)
+    truth = (slopes**2).sum(axis=1) / (slopes**2).sum()
+    rng, covered, plain = np.random.default_rng(2011), np.zeros(3), np.zeros(3)
+    for _ in range(SEEDS):
+        x = rng.standard_normal((800, 3))
+        at_angles, overall = sensitivity.over_revolution(x, x @ slopes)
+        half = 0.5 * (overall.upper - overall.lower)
+        covered += np.abs(overall.estimate - truth) <= half + 1e-12
+        plain += np.abs(at_angles.estimate.mean(axis=1) - truth) <= half
+    assert np.all(covered[:2] / SEEDS >= LEAST)
+    assert np.all(covered[:2] / SEEDS < 0.985)  # not by being wide
+    assert np.all(plain[:2] / SEEDS < LEAST)
+    assert at_angles.estimate == pytest.approx(share, abs=0.15)
+    single = sensitivity.first_order(x, x @ slopes)
+    for mine, theirs in zip(at_angles, single, strict=True):
+        assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-12)
+
+
 def test_rank_coefficients_cover_over_seeds_and_without_the_groups_number_they_do_not():
     rng, covered, narrow = np.random.default_rng(77), [], []
     rho = SLOPES / np.sqrt(SLOPES @ SLOPES)

@@ -62,6 +62,15 @@ def sizes(results: NDArray[np.void]) -> FloatArray:
     return np.asarray(_largest(loads(results))[:, KIND_OF])
 
 
+def size(results: NDArray[np.void], observable: str) -> FloatArray:
+    """Largest load of the kind of one observable in each joint, (m,), SI: a column of `sizes`."""
+    kind = KINDS[KIND_OF[OBSERVABLES.index(observable)]]
+    fields = {"F": "F_max", "T": "T_max", "contact": "contact_max", "psi": "psi_max"}
+    values = results[fields[kind]].reshape(len(results), -1)
+    held = ~np.isnan(values).all(axis=0)
+    return values[:, held].max(axis=1) if held.any() else np.full(len(results), np.nan)
+
+
 def _largest(values: FloatArray) -> FloatArray:
     """Largest of each kind, (m, 21) -> (m, 4); NaN is kept, but for an observable that no joint has."""
     known = ~np.isnan(values).all(axis=0)

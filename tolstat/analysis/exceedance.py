@@ -148,6 +148,33 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) ->
     return lower, upper
 
 
+def simultaneous(n: int, confidence: float = 0.95) -> float:
+    """Half width of the band that holds the whole exceedance curve at once (Dvoretzky, Kiefer and Wolfowitz 1956).
+
+    With the constant of Massart (1990): P(sup |estimate - truth| > e) <= 2 exp(-2 n e^2), for every distribution.
+
+    Parameters
+    ----------
+    n : int
+        Independent joints.
+    confidence : float
+        Coverage guaranteed for all levels together.
+
+    Returns
+    -------
+    float
+        Largest distance e of the curve from its estimate, a share of the joints; 1 at most.
+
+    Raises
+    ------
+    ValueError
+        When the confidence is not between 0 and 1.
+    """
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence {confidence} must lie between 0 and 1")
+    return min(1.0, float(np.sqrt(0.5 * np.log(2.0 / (1.0 - confidence)) / max(n, 1))))
+
+
 def at(values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0.95, iid: bool = True) -> Exceedance:
     """Share of the joints whose load is above one level.
 

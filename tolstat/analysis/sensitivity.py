@@ -108,9 +108,57 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
             found[0, i] = share
             found[1, i] = _error(influence, _chance(share, degrees, len(loads)))
     estimate, error = found.reshape(2, errors.shape[1], *loads.shape[1:])
-    half = normal_half(confidence) * error if iid else np.full(estimate.shape, np.nan)
-    return FirstOrder(
-        estimate, np.clip(estimate - half, 0, 1), np.clip(estimate + half, 0, 1), variance.reshape(loads.shape[1:])
+    return _with_ends(estimate, error, variance.reshape(loads.shape[1:]), confidence, iid)
+
+
+def over_revolution(
+    x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
+) -> tuple[FirstOrder, FirstOrder]:
+    """First-order indices of a load at each shaft angle, and over the whole revolution.
+
+    The latter are shares of the sum of the variances at all angles (Lamboni, Monod and Makowski 2011): an angle counts
+    as much as the load scatters there.
+
+    Parameters
+    ----------
+    x : array_like, shape (n, d)
+        Errors of the joints.
+    y : array_like, shape (n, m)
+        Load of each joint at m shaft angles.
+    confidence, iid
+        As in `first_order`.
+
+    Returns
+    -------
+    at_angles : FirstOrder
+        As of `first_order`, (d, m) and (m,).
+    overall : FirstOrder
+        Shares over the revolution, (d,); `variance` is the mean over the angles, ().
+
+    Raises
+    ------
+    ValueError
+        As `first_order`.
+    """
+    errors, loads = _checked(x, y)
+    n, centred = len(loads), (loads - loads.mean(axis=0)).reshape(len(loads), -1)
+    variance, square = centred.var(axis=0), centred**2
+    whole = variance.sum()
+    # an index that is there by chance is the same at all angles as far as their loads are correlated
+    alike = ((centred.T @ centred / n) ** 2).sum() / whole**2 if whole > 0 else np.nan
+    local = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
+    found = np.full((2, errors.shape[1]), np.nan)
+    for i, column in enumerate(errors.T):
+        if np.ptp(column) > 0 and whole > 0:
+            _, share, influence, degrees = _fit(column, centred)
+            local[0, i], local[1, i] = share, _error(influence, _chance(share, degrees, n))
+            share, influence = np.nan_to_num(share), np.nan_to_num(influence)
+            found[0, i] = variance @ share / whole
+            own = (influence @ variance + square @ (share - found[0, i])) / whole
+            found[1, i] = _error(own, alike * _chance(found[0, i], degrees, n))
+    return (
+        _with_ends(local[0], local[1], variance, confidence, iid),
+        _with_ends(found[0], found[1], np.asarray(variance.mean()), confidence, iid),
     )
 
 
@@ -169,6 +217,13 @@ def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
     return Total(estimate, lower, upper, pairs, float(rest))
 
 
+def _with_ends(
+    estimate: FloatArray, error: FloatArray, variance: FloatArray, confidence: float, iid: bool
+) -> FirstOrder:
+    half = normal_half(confidence) * error if iid else np.full(estimate.shape, np.nan)
+    return FirstOrder(estimate, np.clip(estimate - half, 0, 1), np.clip(estimate + half, 0, 1), variance)
+
+
 def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
     errors, loads = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if errors.ndim != 2 or loads.ndim not in (1, 2) or len(errors) != len(loads):
@@ -201,8 +256,11 @@ def _pieces(column: FloatArray) -> FloatArray:
     n = len(column)
     knots = np.unique(np.quantile(column, np.linspace(0, 1, min(max(8, round(np.cbrt(n))), 32) + 1)))
     hats = np.column_stack([np.interp(column, knots, unit) for unit in np.eye(len(knots))[1:]])
-    orthogonal, triangle = np.linalg.qr(hats - hats.mean(axis=0))
-    return orthogonal[:, np.abs(np.diag(triangle)) > 1e-9 * np.sqrt(n)]
+    hats -= hats.mean(axis=0)
+    size, axes = np.linalg.eigh(hats.T @ hats)  # well conditioned: hats overlap with neighbours only
+    held = size > 1e-12 * n
+    basis: FloatArray = hats @ (axes[:, held] / np.sqrt(size[held]))
+    return basis
 
 
 def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tuple[FloatArray, FloatArray, FloatArray]:

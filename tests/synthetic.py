@@ -96,7 +96,8 @@ def store(folder, text=STUDY, name="small", simulated=None, **kwargs):
     path = folder / f"{name}.h5"
     table = results(plan.rows, **kwargs)
     rows = np.arange(plan.rows if simulated is None else simulated)
-    with ResultStore.create(path, plan, sampling.draw(plan)) as file:
+    origin = sampling.origin_blocks(plan, range(plan.rows))
+    with ResultStore.create(path, plan, sampling.draw(plan), origin=origin) as file:
         if rows.size:
             file.write(rows, Simulation(table[rows], None))
     return path

@@ -12,11 +12,13 @@ from tests import synthetic
 from tolstat import page
 from tolstat.analysis import exceedance
 from tolstat.cli import app
+from tolstat.errors import StoreError
 from tolstat.report import page as pages
 from tolstat.report.page import html as writer
 from tolstat.report.page import loads, pdf, verdict
 from tolstat.report.source import load
 from tolstat.store import ResultStore
+from tolstat.tables import Status
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
 TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
@@ -243,3 +245,40 @@ def test_wrong_options_write_nothing(path, tmp_path, monkeypatch, arguments, sai
     assert said in done.stderr
     assert "hint:" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
+    proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
+    text = synthetic.STUDY.replace("n = 60", 'method = "importance"\nn = 300') + proposal
+    path = synthetic.store(tmp_path, text, failed=3)
+    with ResultStore.open(path) as store:
+        found = page.gather(store, 0.05, 0)
+    page.write(path, tmp_path / "page.html", accepted=0.05, again=0)
+    html = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert Reading(html).sections == ["verdict", "exceedance", "worst", "modes", "lost", "provenance"]
+    campaign = found.campaign
+    valid = campaign.results["status"] == Status.OK
+    above = (campaign.results["F_max"][:, 0] > 700.0) & valid
+    share = campaign.weights[above].sum() / campaign.weights[valid].sum()
+    assert abs(share - above.sum() / valid.sum()) > 1e-3
+    assert f"{100 * share:.3g} %" in html
+    assert "counted by their weights" in html
+    assert "Causes are left out" in html
+
+
+def test_a_design_for_indices_has_its_causes_and_no_shares(tmp_path):
+    text = synthetic.STUDY.replace("n = 60", 'method = "pick_freeze"\ngroups = "error"\nn = 100')
+    path = synthetic.store(tmp_path, text)
+    page.write(path, tmp_path / "page.html", again=0)
+    sections = Reading((tmp_path / "page.html").read_text(encoding="utf-8")).sections
+    assert "causes" in sections
+    assert "capability" not in sections
+
+
+def test_what_is_no_sample_has_no_page(tmp_path):
+    cases = "[joint]" + synthetic.STUDY.partition("[joint]")[2].partition("[tolerances]")[0]
+    cases += '[sampling]\nmethod = "cases"\n\n[[case]]\nname = "one"\nerrors = { pin1.offset_t = "0.1 mm" }\n'
+    path = synthetic.store(tmp_path, cases)
+    with pytest.raises(StoreError, match="lists its joints one by one"):
+        page.write(path, tmp_path / "page.html")
+    assert not (tmp_path / "page.html").exists()

@@ -106,7 +106,7 @@ def gather(store: ResultStore, accepted: float = np.nan, again: int = angles.JOI
     found: tuple[list[Causes], list[AgainstAngle], list[Worst]] = ([], [], [])
     lost_errors = None
     if campaign.method != "sweep" and campaign.count(Status.OK):
-        with _noting(notes, "causes and worst joints are left out"):
+        with _noting(notes, "causes and worst joints are left out", store.path):
             study = recall(store)
             if campaign.weights is None and not study.groups:
                 lost_errors = _errors_of_lost(store, study, campaign)
@@ -132,12 +132,15 @@ def gather(store: ResultStore, accepted: float = np.nan, again: int = angles.JOI
 
 
 @contextmanager
-def _noting(notes: list[str], what: str) -> Iterator[None]:
-    """Turn an error that a user could mend into a note: a report of what there is comes first."""
+def _noting(notes: list[str], what: str, path: Path) -> Iterator[None]:
+    """Turn an error that a user could mend into a note: a report of what there is comes first.
+
+    The page of a file does not depend on the folder in which it lies.
+    """
     try:
         yield
     except TolstatError as error:
-        notes.append(f"{what}: {str(error).splitlines()[0]}")
+        notes.append(f"{what}: {str(error).splitlines()[0].replace(str(path), path.name)}")
 
 
 def read(store: ResultStore) -> tuple[Campaign, NDArray[np.float64]]:
@@ -223,19 +226,19 @@ def _of_leading(
     """Causes, contribution against the angle, and worst joints of the leading loads."""
     found, at_angles, worst = [], list[AgainstAngle](), []
     bushings = [name for name in names if name.endswith((".F", ".T"))]
-    with _noting(notes, "causes are left out"):
+    with _noting(notes, "causes are left out", store.path):
         check_counted(store.sampling, store.path)
         part = _some(store, campaign)
         for name in names:
             log = name in logarithmic
-            with _noting(notes, f"no causes of {name}"):
+            with _noting(notes, f"no causes of {name}", store.path):
                 found.append(
                     causes.of_store(store, name, log=log)
                     if study.groups
                     else causes.of_campaign(part, study, name, log=log, place=campaign.name)
                 )
         if again and bushings and not study.groups:
-            with _noting(notes, "nothing against the shaft angle"):
+            with _noting(notes, "nothing against the shaft angle", store.path):
                 at_angles = angles.of_store(store, study, bushings, again, logarithmic)
     for name in names:
         worst.append(_worst(store, study, campaign, name, bool(again) and name in bushings))
@@ -263,7 +266,7 @@ def _cycles(store: ResultStore, campaign: Campaign, notes: list[str]) -> Loading
     """Load cycles of the first joints, where the file holds what they are counted from."""
     if not store.history_specs or campaign.method == "sweep" or not campaign.count(Status.OK):
         return None
-    with _noting(notes, "load cycles are left out"):
+    with _noting(notes, "load cycles are left out", store.path):
         return fatigue.read([store.path], most=JOINTS // 4)
     return None
 

@@ -85,7 +85,7 @@ def figure(campaign: Campaign) -> Figure:
         page, panels = style.panels(title, f"{campaign.head()}\n{_note(axes)}")
         for group, letter, ax in panels:
             panel(ax, campaign, group, letter)
-        _legend(page, campaign, axes)
+        style.legend(page, *key(campaign))
     return page
 
 
@@ -172,7 +172,9 @@ def _shades(count: int) -> list[str]:
     return [to_hex(colormaps["viridis"](x)) for x in np.linspace(0.0, 0.88, count)]
 
 
-def _legend(page: Figure, campaign: Campaign, axes: list[Axis]) -> None:
+def key(campaign: Campaign) -> tuple[list[Artist], list[str]]:
+    """Legend of a panel: its lines and marks, and their meaning."""
+    axes = swept_axes(campaign)
     handles: list[Artist]
     if len(axes) < 2:
         handles = [
@@ -194,4 +196,4 @@ def _legend(page: Figure, campaign: Campaign, axes: list[Axis]) -> None:
     if campaign.count(*FAILED):
         handles.append(Line2D([], [], ls="", marker="x", color=style.INK))
         labels.append("no result")
-    style.legend(page, handles, labels)
+    return handles, labels

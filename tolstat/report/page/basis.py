@@ -119,6 +119,7 @@ def sweep_section(found: Findings) -> Section:
 
 def _sweep(ax: Axes, found: Findings, group: str, letter: str) -> None:
     sweep.panel(ax, found.campaign, group, letter)
+    ax.legend(*sweep.key(found.campaign), loc="best", handlelength=2.6)
 
 
 def provenance_section(found: Findings) -> Section:

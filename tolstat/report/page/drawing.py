@@ -47,7 +47,9 @@ def settings(scale: float = 1.0) -> Iterator[None]:
         "axes.linewidth": 0.8,
         "grid.linewidth": 0.7,
     }
-    with style.settings(), mpl.rc_context({name: scale * size for name, size in sizes.items()}):
+    legend: dict[Any, Any] = {"frameon": True, "framealpha": 0.8, "facecolor": "white", "edgecolor": "none"}
+    given = {name: scale * size for name, size in sizes.items()} | {f"legend.{k}": value for k, value in legend.items()}
+    with style.settings(), mpl.rc_context(given):
         mpl.rcParams["svg.fonttype"] = "none"  # text stays text: small, sharp, to be searched and read aloud
         yield
 

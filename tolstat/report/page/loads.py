@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from tolstat.analysis import exceedance as shares
 from tolstat.report import capability, exceedance, style, text
@@ -123,6 +124,7 @@ def _bands(ax: Axes, campaign: Campaign, name: str) -> None:
     if low <= nominal <= high:
         style.mark(ax, nominal, 1.0, style.COLOURS[0])
     ax.legend(handles, labels, loc="upper right")
+    ax.xaxis.set_major_locator(MaxNLocator(5 if unit != "1" else 3))
     ax.set_xlabel(f"x: {name} [{text.UNITS.get(unit, unit) or '1'}], largest over the revolution")
     ax.set_ylabel("share of joints above x")
 
@@ -195,22 +197,23 @@ def _quantiles(campaign: Campaign) -> Table:
 
 def _rare(found: Findings) -> list[Block]:
     campaign = found.campaign
-    rows, said = [], []
+    rows, said = [], dict[str, list[str]]()
     for name in found.leading:
         try:
             table = capability.returns(campaign, [name], ONE_IN)
         except ValueError as error:
-            said.append(f"{name}: {error}")
+            said.setdefault(str(error), []).append(name)
             continue
         rows += [_rare_row(row) for row in table.to_dict("records")]
         if (table["p"] < 0.05).any():
-            said.append(f"{name}: the tail is not generalised Pareto (p < 0.05): do not extrapolate it")
+            said.setdefault("the tail is not generalised Pareto (p < 0.05): do not extrapolate it", []).append(name)
     blocks: list[Block] = []
     if rows:
         head = ["load", "one joint in", "exceeds", "95 % interval", "median of the largest of so many", "fit, p"]
         blocks.append(Table("Rare loads, from a generalised Pareto tail", head, rows))
     if said:
-        blocks.append(Text("Rare loads: " + "; ".join(said) + ".", small=True))
+        words = [f"{', '.join(names)}: {found}" for found, names in said.items()]
+        blocks.append(Text(f"Rare loads. {'; '.join(words)}.", small=True))
     return blocks
 
 

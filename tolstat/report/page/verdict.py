@@ -127,7 +127,7 @@ def _limits(found: Findings, table: pd.DataFrame, judged: list[str]) -> list[Blo
         "; ".join(f"{row[0]} above {row[1]}: {row[4]}, 95 % interval {row[5]}" for row in rows),
         lambda ax: _forest(ax, table, found.accepted),
         (4.9, drawing.rows_height(len(table))),
-        1.25,
+        1.4,
     )
     blocks: list[Block] = [Panels([panel])]
     blocks.append(Table("Limits", head, rows, verdicts=judged if found.judged else ()))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tolstat.analysis.exceedance import at as exceedance
     from tolstat.analysis.quantile import at as quantile
     from tolstat.analysis.weighted import at as weighted_exceedance
+    from tolstat.angles import of_store as against_angle
     from tolstat.campaign import run
     from tolstat.causes import of_store as causes_of
     from tolstat.compare import of_stores as compared
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from tolstat.integration import integrate
     from tolstat.joint import perturb
     from tolstat.multifidelity import run as two_fidelities
+    from tolstat.page import write as write_page
     from tolstat.pylife import series as pylife_series
     from tolstat.rare import of_study as rare_event
     from tolstat.report import write as write_report
@@ -51,6 +53,7 @@ __all__ = [
     "Status",
     "StoreError",
     "TolstatError",
+    "against_angle",
     "allocated",
     "capability",
     "causes_of",
@@ -76,6 +79,7 @@ __all__ = [
     "two_fidelities",
     "weighted_exceedance",
     "worst_joints",
+    "write_page",
     "write_report",
 ]
 
@@ -84,6 +88,7 @@ _HOMES = {
     "Status": "tolstat.tables:Status",
     "StoreError": "tolstat.errors:StoreError",
     "TolstatError": "tolstat.errors:TolstatError",
+    "against_angle": "tolstat.angles:of_store",
     "allocated": "tolstat.allocate:of_store",
     "capability": "tolstat.analysis.capability:at",
     "causes_of": "tolstat.causes:of_store",
@@ -109,6 +114,7 @@ _HOMES = {
     "two_fidelities": "tolstat.multifidelity:run",
     "weighted_exceedance": "tolstat.analysis.weighted:at",
     "worst_joints": "tolstat.tail:worst",
+    "write_page": "tolstat.page:write",
     "write_report": "tolstat.report:write",
 }
 

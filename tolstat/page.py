@@ -47,15 +47,19 @@ NAMED = 12
 
 
 def write(
-    path: Path, out: Path | None, pdf_out: Path | None = None, accepted: float = np.nan, again: int = angles.JOINTS
+    path: str | Path,
+    out: str | Path | None,
+    pdf_out: str | Path | None = None,
+    accepted: float = np.nan,
+    again: int = angles.JOINTS,
 ) -> list[Path]:
     """Write the report of a result file as one page, in whatever state the campaign is.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         The result file of a study that draws its joints, or sweeps.
-    out, pdf_out : Path, optional
+    out, pdf_out : str or Path, optional
         HTML and PDF file to write.
     accepted : float
         Share of the joints that may be above a limit; NaN where nothing is asked.
@@ -71,17 +75,24 @@ def write(
     Raises
     ------
     StoreError
-        When the file cannot be read, or lists its joints.
+        When the file cannot be read, lists its joints, or holds levels of a subset simulation.
+
+    Examples
+    --------
+    >>> tolstat.write_page("iso2768_f.h5", "iso2768_f.html", accepted=0.01)  # doctest: +SKIP
+    [PosixPath('iso2768_f.html')]
     """
     with ResultStore.open(path) as store:
         if store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table, and the paper's page"
             raise StoreError(str(Fault(str(path), "lists its joints one by one", remedy)))
         made = pages.compose(gather(store, accepted, again))
-    files = [(write, target) for write, target in ((html.write, out), (pdf.write, pdf_out)) if target is not None]
-    for write_page, target in files:
-        write_page(made, target)
-    return [target for _, target in files]
+    written = []
+    for form, target in ((html, out), (pdf, pdf_out)):
+        if target is not None:
+            form.write(made, Path(target))
+            written.append(Path(target))
+    return written
 
 
 def simulates(store: ResultStore) -> bool:

@@ -169,6 +169,11 @@ def simultaneous(n: int, confidence: float = 0.95) -> float:
     ------
     ValueError
         When the confidence is not between 0 and 1.
+
+    Examples
+    --------
+    >>> round(simultaneous(1024), 4)
+    0.0424
     """
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence {confidence} must lie between 0 and 1")

@@ -83,6 +83,19 @@ def test_simultaneous_band_holds_the_whole_curve_and_the_pointwise_one_does_not(
         exceedance.simultaneous(10, 95)
 
 
+@pytest.mark.parametrize(("share", "accepted"), [(0.0, 0.001), (0.03, 0.05), (0.08, 0.05), (0.0484, 0.05), (1.0, 0.5)])
+def test_joints_needed_are_the_first_whose_interval_tells(share, accepted):
+    n = exceedance.needed(share, accepted)
+    told = []
+    for number in (n - 1, n):
+        lower, upper = exceedance.clopper_pearson(share * number, number)
+        told.append(bool(upper <= accepted or lower > accepted))
+    assert told == [False, True]
+    assert exceedance.needed(accepted, accepted) == np.inf
+    with pytest.raises(ValueError, match="between 0 and 1"):
+        exceedance.needed(share, 1.5)
+
+
 def test_hand_counted_case():
     values = [1.0, 2.0, 3.0, 4.0, np.nan, 9.0, 9.0]
     status = [1, 1, 1, 1, Status.NEWTON_FAILED, Status.NOT_SETTLED, Status.PENDING]

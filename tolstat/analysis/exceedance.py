@@ -180,6 +180,53 @@ def simultaneous(n: int, confidence: float = 0.95) -> float:
     return min(1.0, float(np.sqrt(0.5 * np.log(2.0 / (1.0 - confidence)) / max(n, 1))))
 
 
+def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
+    """Joints from which a Clopper–Pearson interval tells on which side of an accepted share another one lies.
+
+    Parameters
+    ----------
+    share : float
+        Share of the joints that is taken to be above the level, as an earlier campaign estimates it.
+    accepted : float
+        Share that it is compared with, between 0 and 1.
+    confidence : float
+        Of the interval.
+
+    Returns
+    -------
+    float
+        Least number of independent joints whose interval, with that very share of them above the level, leaves
+        `accepted` out; infinite where both are equal.
+
+    Raises
+    ------
+    ValueError
+        When `accepted` or the confidence is not between 0 and 1, or the share is none.
+
+    Examples
+    --------
+    >>> needed(0.0, 0.01)  # none of 368 joints
+    368.0
+    """
+    if not (0.0 < accepted < 1.0 and 0.0 <= share <= 1.0):
+        raise ValueError(f"share {share} and accepted share {accepted} must lie between 0 and 1")
+    if share == accepted:
+        return np.inf
+
+    def tells(n: float) -> bool:
+        lower, upper = clopper_pearson(share * n, n, confidence)
+        return bool(upper <= accepted or lower > accepted)
+
+    high = 1.0
+    while not tells(high) and high < 1e15:
+        high *= 2.0
+    low = 0.5 * high
+    while high - low > 1.0:  # the share kept, more joints make the interval narrower
+        middle = np.floor(0.5 * (low + high))
+        low, high = (low, middle) if tells(middle) else (middle, high)
+    return float(high)
+
+
 def at(values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0.95, iid: bool = True) -> Exceedance:
     """Share of the joints whose load is above one level.
 

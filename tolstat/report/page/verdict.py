@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from tolstat.analysis import exceedance as shares
 from tolstat.report import accuracy, capability, exceedance, style, text
 from tolstat.report.page import drawing
 from tolstat.report.page.blocks import Block, Card, Cards, Panel, Panels, Section, Table, Text
@@ -131,8 +132,20 @@ def _limits(found: Findings, table: pd.DataFrame, judged: list[str]) -> list[Blo
     )
     blocks: list[Block] = [Panels([panel])]
     blocks.append(Table("Limits", head, rows, verdicts=judged if found.judged else ()))
+    if "open" in judged and found.campaign.iid and found.alike:
+        blocks.append(Text(_open(records, judged, found.accepted)))
     blocks.append(Text(_how(found), small=True))
     return blocks
+
+
+def _open(records: list[dict[Any, Any]], judged: list[str], accepted: float) -> str:
+    """Joints that would tell of each open limit, did the share stay what it is."""
+    said = []
+    for row, answer in zip(records, judged, strict=True):
+        if answer == "open":
+            joints = np.inf if np.isnan(row["estimate"]) else shares.needed(row["estimate"], accepted)
+            said.append(f"{row['load']} {text.number(joints) if joints < 1e7 else 'more than can be told'}")
+    return f"Open limits. Valid joints that would tell, if the shares stay as they are: {', '.join(said)}."
 
 
 def _how(found: Findings) -> str:

@@ -9,9 +9,10 @@ from typer.testing import CliRunner
 
 from tests import synthetic
 from tolstat import causes
-from tolstat.analysis import exceedance
+from tolstat.analysis import exceedance, sensitivity
 from tolstat.cli import app
 from tolstat.report import capability, source
+from tolstat.report import causes as report
 from tolstat.store import ResultStore
 from tolstat.tables import Simulation, Status
 
@@ -60,6 +61,22 @@ def test_known_causes_are_found_with_their_shares(path):
     others = table.drop(["pin1.offset_t", "pin2.offset_z"])
     assert others[["direction_p", "size_p"]].min(axis=None) > 0.05
     assert others["first"].max() < 0.02
+
+
+def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):
+    monkeypatch.setattr(causes, "MOST", 1000)
+    monkeypatch.setattr(causes, "BLOCK", 700)
+    with ResultStore.open(path) as store:
+        found = causes.of_store(store, "cross1.F")
+        errors, loads = store.errors()[1:1001], store.results()["F_max"][1:-5, 0]
+    assert (found.joints, found.used) == (N - 5, 1000)
+    row = found.table.set_index("error").loc["pin1.offset_t"]
+    x = np.column_stack([errors[name] for name in found.table["error"]])
+    here = list(found.table["error"]).index("pin1.offset_t")
+    assert row["first"] == pytest.approx(sensitivity.first_order(x, loads[:1000]).estimate[here])
+    assert found.above == np.sum(found.level < loads)
+    assert row["direction_p"] < 1e-6
+    assert "first 1000 joints" in report.note(found)
 
 
 def test_command_prints_the_first_errors_and_json_has_all(path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +18,7 @@ from tolstat.recall import recall
 from tolstat.report import source
 from tolstat.schema import did_you_mean
 from tolstat.store import ResultStore
+from tolstat.store.reader import BLOCK
 from tolstat.study import Study
 from tolstat.study.selection import LIMIT_UNITS, columns_of
 from tolstat.tables import Status
@@ -23,6 +26,9 @@ from tolstat.tolerance import score
 
 TAIL = 0.9
 """Share of the joints below the tail of a load that has no limit."""
+MOST = sensitivity.MOST
+"""Joints that shares, ranks and either side of the tail are read from at most, the first ones: more tell little more,
+and a million joints with fifty errors do not fit into a gigabyte."""
 JOINTS = 200
 """Valid joints that causes are asked of at least."""
 
@@ -34,8 +40,9 @@ class Causes(NamedTuple):
     ----------
     load : str
         Its name.
-    joints, lost : int
-        Valid joints, and those without a valid load, of which the causes are not known.
+    joints, used, lost : int
+        Valid joints; those of them, `MOST` at most, that shares and ranks are read from; and joints without a valid
+        load, of which the causes are not known.
     level, above : float, int
         Level that the tail begins at, SI, and joints above it: the study's limit, or the 90 % quantile where there is
         none.
@@ -54,6 +61,7 @@ class Causes(NamedTuple):
 
     load: str
     joints: int
+    used: int
     lost: int
     level: float
     above: int
@@ -109,8 +117,9 @@ def of_store(
         raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
     if study.groups:
         return _frozen(store, study, by, confidence, log)
-    campaign = source.read(store, source.LOAD_FIELDS, [c for name in study.tolerances for c in columns_of(name)])
-    return of_campaign(campaign, study, by, confidence, log, str(store.path))
+    campaign = source.read(store, source.LOAD_FIELDS, ())
+    errors = partial(_errors_at, store, study, len(campaign.results))
+    return _of_joints(campaign, study, by, confidence, log, str(store.path), errors)
 
 
 def of_campaign(
@@ -132,34 +141,61 @@ def of_campaign(
     place : str
         What to call them in a message.
     """
+    return _of_joints(campaign, study, by, confidence, log, place, lambda rows: campaign.errors[rows])
+
+
+def _of_joints(
+    campaign: source.Campaign,
+    study: Study,
+    by: str,
+    confidence: float,
+    log: bool,
+    place: str,
+    errors: Callable[[NDArray[np.intp]], NDArray[np.void]],
+) -> Causes:
+    """Causes, with the errors of the joints that are looked at from a function of their places."""
     values, unit = source.load(campaign.results, by)
     status = campaign.results["status"]
-    valid = (status == Status.OK) & np.isfinite(values)
+    rows = np.flatnonzero((status == Status.OK) & np.isfinite(values))
     needed = max(JOINTS, len(study.tolerances) + 2 * regression.GROUPS)
-    if valid.sum() < needed or np.ptp(values[valid]) == 0:
-        found = f"has {valid.sum()} joints with a valid load that scatters"
+    if rows.size < needed or np.ptp(values[rows]) == 0:
+        found = f"has {rows.size} joints with a valid load that scatters"
         raise StoreError(str(Fault(place, found, f"run {needed} joints or more")))
-    if log and values[valid].min() <= 0:
+    if log and values[rows].min() <= 0:
         raise InputError([Fault("--log", f"{by} is not positive in all joints", "leave it out")])
-    load, errors, iid = values[valid], campaign.errors[valid], campaign.iid
-    names = scattering(study, errors)
-    x = np.column_stack([sampling.values(errors, name) for name in names])
-    y = np.log(load) if log else load
-    first = sensitivity.first_order(x, y, confidence, iid)
-    ranks = regression.ranks(x, load, confidence, iid)
+    level = campaign.limits.get(by, quantile.at(values[rows], status[rows], TAIL).estimate)
+    above = values[rows] > level
+    body, tail = rows[:MOST], np.sort(np.concatenate([rows[above][:MOST], rows[~above][:MOST]]))
+    table = errors(body)
+    names = scattering(study, table)
+    x = np.column_stack([sampling.values(table, name) for name in names])
+    y = np.log(values[body]) if log else values[body]
+    first = sensitivity.first_order(x, y, confidence, campaign.iid)
+    ranks = regression.ranks(x, values[body], confidence, campaign.iid)
     parts: dict[str, NamedTuple] = {"first": first, "srrc": ranks}
     if not study.copula.names:
-        parts["total"] = sensitivity.total(x, y, confidence, iid)
-    level = campaign.limits.get(by, quantile.at(load, status[valid], TAIL).estimate)
-    above = load > level
+        parts["total"] = sensitivity.total(x, y, confidence, campaign.iid)
     if overrepresentation.FEWEST <= above.sum() <= above.size - overrepresentation.FEWEST:
-        z = np.column_stack([score(study.tolerances[n], x[:, i]) for i, n in enumerate(names)])
-        parts |= overrepresentation.tail(z, above, confidence, iid)._asdict()
-    table = _table(names, parts).sort_values("first", ascending=False, ignore_index=True)
+        table = errors(tail) if rows.size > MOST else table
+        z = np.column_stack([score(study.tolerances[name], sampling.values(table, name)) for name in names])
+        parts |= overrepresentation.tail(z, values[tail] > level, confidence, campaign.iid)._asdict()
+    found_causes = _table(names, parts).sort_values("first", ascending=False, ignore_index=True)
     lost = exceedance.sort_out(values, status).n_unresolved
     std = float(np.sqrt(first.variance))
     counts = (level, int(above.sum()), unit, std, float(first.estimate.sum()), ranks.r2)
-    return Causes(by, int(valid.sum()), lost, *counts, table)
+    return Causes(by, rows.size, body.size, lost, *counts, found_causes)
+
+
+def _errors_at(store: ResultStore, study: Study, n: int, samples: NDArray[np.intp]) -> NDArray[np.void]:
+    """Errors that scatter of some of the n joints of a file, the nominal one not counted, read a block at a time."""
+    first = store.n - n
+    columns = [column for name in study.tolerances for column in columns_of(name)]
+    parts = []
+    for begin in range(0, store.n, BLOCK):
+        here = samples[(samples >= begin - first) & (samples < begin - first + BLOCK)]
+        if here.size:
+            parts.append(store.errors(slice(begin, begin + BLOCK), columns)[here + first - begin])
+    return np.concatenate(parts)
 
 
 def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: bool) -> Causes:
@@ -187,7 +223,9 @@ def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: b
     level = campaign.limits.get(by, quantile.at(values, status, TAIL).estimate)
     lost = exceedance.sort_out(values, status).n_unresolved
     counts = (level, int((values[valid] > level).sum()), unit, float(np.sqrt(found.variance)))
-    return Causes(by, int(valid.sum()), lost, *counts, float(found.first.estimate.sum()), np.nan, table)
+    return Causes(
+        by, int(valid.sum()), int(valid.sum()), lost, *counts, float(found.first.estimate.sum()), np.nan, table
+    )
 
 
 def scattering(study: Study, errors: NDArray[np.void]) -> list[str]:

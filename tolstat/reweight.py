@@ -19,6 +19,7 @@ from tolstat.report import source
 from tolstat.store import ResultStore
 from tolstat.study import Study
 from tolstat.study.change import changed
+from tolstat.study.selection import columns_of
 from tolstat.tables import Status
 from tolstat.tolerance import Distribution, score
 
@@ -99,7 +100,8 @@ def of_store(
     faults = [f for name in names for f in _unreachable(name, study.tolerances[name], new[name])]
     if faults:
         raise InputError(faults)
-    campaign = source.read(store, weighted=True).done()
+    columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
+    campaign = source.read(store, source.LOAD_FIELDS, columns, weighted=True).done()
     logs = _log_ratios(study, new, names, campaign.errors)
     weights = reweight.smooth(logs if campaign.weights is None else logs + np.log(campaign.weights))
     rows = [_row(campaign, weights, name, level, confidence) for name, level in campaign.limits.items()]

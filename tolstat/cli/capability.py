@@ -25,11 +25,11 @@ def capability(
     """
     from tolstat.report import capability as tables
     from tolstat.report import text
-    from tolstat.report.source import read
+    from tolstat.report.source import LOAD_FIELDS, read
     from tolstat.store import ResultStore
 
     with ResultStore.open(file) as store:
-        campaign = read(store)
+        campaign = read(store, LOAD_FIELDS, ())
     if not campaign.limits or campaign.method in ("sweep", "cases"):
         remedy = 'give the file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(file), "has no joints judged by limits", remedy)))

@@ -13,7 +13,7 @@ from tolstat import fidelity
 from tolstat.errors import Fault, InputError
 from tolstat.files import writing
 from tolstat.report import text
-from tolstat.report.source import Campaign, read
+from tolstat.report.source import LOAD_FIELDS, Campaign, read
 from tolstat.store import ResultStore
 
 
@@ -82,7 +82,8 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
             stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
                 return _noted(_cases(store, stem), stands_on)
-            campaign = read(store, weighted=True)
+            errors = None if store.sampling["method"] == "sweep" else ()
+            campaign = read(store, LOAD_FIELDS, errors, weighted=True)
             stop = _stopped(store.stop) if store.stop else ""
         report = _sweep(campaign, stem) if campaign.method == "sweep" else _exceedance(campaign, stem)
         for note in (campaign.missing(), stop, stands_on):

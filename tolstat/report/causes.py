@@ -54,6 +54,8 @@ def note(causes: Causes, log: bool = False) -> str:
         f"{causes.load}: {causes.joints} joints, {causes.lost} without a valid load left out; standard deviation {std}",
         f"{alone} alone explain {100 * causes.additive:.0f} % of the variance{ranks}; {tail}",
     ]
+    if causes.used < causes.joints:
+        lines.append(f"shares and ranks are of the first {causes.used} joints, the tail of no more on either side")
     if causes.table["total"].isna().all():
         lines.append("errors are correlated: shares overlap, and there is no share in all")
     if causes.table["first_lower"].isna().all():

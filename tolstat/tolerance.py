@@ -18,7 +18,6 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv, betaln, ndtr, ndtri, xlog1py, xlogy
 
 Array = NDArray[np.float64]
 
@@ -98,6 +97,8 @@ class Normal(_Described):
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
+        from scipy.special import ndtri
+
         return self.mean + self.sigma * ndtri(u)
 
     def logpdf(self, x: Array) -> Array:
@@ -119,6 +120,8 @@ class TruncatedNormal(_Described):
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
+        from scipy.special import ndtr, ndtri
+
         a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
         # each half from its own tail: probabilities near 1 have lost the digits that those near 0 still have
         low = ndtri(ndtr(a) + u * (ndtr(b) - ndtr(a)))
@@ -128,6 +131,8 @@ class TruncatedNormal(_Described):
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
+        from scipy.special import ndtr
+
         a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
         share = float(ndtr(b) - ndtr(a) if a <= 0 else ndtr(-a) - ndtr(-b))
         return _within(self, x, Normal(self.mean, self.sigma).logpdf(x) - math.log(share))
@@ -201,10 +206,14 @@ class Beta(_Described):
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
+        from scipy.special import betaincinv
+
         return self.lower + (self.upper - self.lower) * betaincinv(self.a, self.b, u)
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
+        from scipy.special import betaln, xlog1py, xlogy
+
         width = self.upper - self.lower
         t = np.clip((x - self.lower) / width, 0.0, 1.0)
         density = xlogy(self.a - 1, t) + xlog1py(self.b - 1, -t) - betaln(self.a, self.b) - math.log(width)
@@ -297,6 +306,8 @@ def score(distribution: Distribution, values: Array) -> Array:
         z with ``ppf(Phi(z)) = value``; for a normal distribution (value - mean) / sigma. Where a range of probabilities
         has one value (`Measured`), their middle. Beyond +-9 it is not told apart.
     """
+    from scipy.special import ndtr, ndtri
+
     if isinstance(distribution, Normal):
         return np.clip((values - distribution.mean) / distribution.sigma, -9.0, 9.0)
     ends = []

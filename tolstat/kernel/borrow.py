@@ -1,4 +1,4 @@
-"""Arrays without an owner: passing them on counts no references, which took an eighth of the time in lanes."""
+"""Arrays without an owner: to pass them on counts no reference, which took an eighth of the time in lanes."""
 
 from numba.core import cgutils, types
 from numba.extending import intrinsic

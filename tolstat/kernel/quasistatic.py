@@ -1,26 +1,34 @@
 """Equilibrium at each input angle under the inertial loads of the ideal motion: one revolution without transients.
 
 The joint's own residual with the deviations' velocities and accelerations zero; the frames' angular velocities and
-accelerations stay, and with them centrifugal loads, the output shaft's inertia and the drag of pins that turn in their
-holes. Continuation in the angle: the solution is extrapolated through the last three angles and corrected by Newton's
-iteration, with a tangent kept from angle to angle. Where that fails, pseudo-transient continuation finds the
-equilibrium at that angle from the one before.
+accelerations stay, and with them centrifugal loads, the output shaft's inertia and the drag of pins that turn in
+their holes. Continuation in the angle: the solution is extrapolated through the last four angles, or through three
+where that foretold the last angle better (a contact has switched), and corrected by Newton's iteration, with a
+tangent kept from angle to angle. Where that fails it begins at the angle before; where that fails too, pseudo-
+transient continuation finds the equilibrium from there.
 """
 
 import math
 
 from tolstat.kernel._jit import closure, njit
 from tolstat.kernel.motion import speed_ratio
-from tolstat.kernel.state import HALVINGS, STEPS
+from tolstat.kernel.state import AHEAD, HALVINGS, STEPS
 from tolstat.kernel.topology import PSI
 from tolstat.kernel.vector import larger
 
 
 @njit
-def extrapolate(state):
-    """Trial point: the parabola through the last three angles, equally spaced; ``state.aux`` is the third last."""
+def extrapolate(known, state):
+    """Trial point: through the last four equally spaced angles, or three if no more are `known` or that was better.
+
+    ``state.aux`` and ``state.a1`` are the third and fourth last.
+    """
+    cubic = known > 3 and state.memory[AHEAD] > 0
     for i in range(state.q.size):
-        state.q[i] = 3 * (state.q0[i] - state.q1[i]) + state.aux[i]
+        if cubic:
+            state.q[i] = 4 * (state.q0[i] + state.aux[i]) - 6 * state.q1[i] - state.a1[i]
+        else:
+            state.q[i] = 3 * (state.q0[i] - state.q1[i]) + state.aux[i]
 
 
 @njit
@@ -32,9 +40,16 @@ def stay(state):
 
 @njit
 def keep(state):
-    """Make the trial point the last angle's solution."""
+    """Make the trial point the last angle's solution; ``state.memory[AHEAD]``: whether four angles foretold it best."""
+    by_three = by_four = 0.0
     for i in range(state.q.size):
-        state.aux[i], state.q1[i], state.q0[i] = state.q1[i], state.q0[i], state.q[i]
+        third = state.q[i] - 3 * (state.q0[i] - state.q1[i]) - state.aux[i]
+        by_three += abs(third)
+        by_four += abs(third - (state.q0[i] - 3 * (state.q1[i] - state.aux[i]) - state.a1[i]))
+    state.memory[AHEAD] = 1.0 if by_four < by_three else 0.0
+    for i in range(state.q.size):
+        state.a1[i], state.aux[i] = state.aux[i], state.q1[i]
+        state.q1[i], state.q0[i] = state.q0[i], state.q[i]
     state.counters[STEPS] += 1
 
 
@@ -96,13 +111,15 @@ def build_quasistatic(hold, relax, record):
             if first and k < 3:
                 stay(state)
             else:
-                extrapolate(state)
+                extrapolate(k if first else n, state)
             if not hold(t, par, options, work, state):
                 state.counters[HALVINGS] += 1
-                relax(t, par, options, work, state)
                 stay(state)
                 if not hold(t, par, options, work, state):
-                    return False
+                    relax(t, par, options, work, state)
+                    stay(state)
+                    if not hold(t, par, options, work, state):
+                        return False
             keep(state)
             record(k, 0, par, work, state, ring.samples)
             ring.samples[k % n].tau = state.q0[PSI]

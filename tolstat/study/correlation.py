@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from tolstat.errors import Fault, InputError, gather
 from tolstat.study.model import Correlation
@@ -48,6 +47,8 @@ class Copula:
         ndarray, (n, m)
             Uniform in each column, correlated across; the first column is unchanged but for rounding.
         """
+        from scipy.special import ndtr, ndtri
+
         scores, factor = ndtri(u), np.linalg.cholesky(self.matrix)
         # term by term: a matrix product rounds a row by the number of rows that are multiplied with it
         mixed = np.zeros_like(scores)

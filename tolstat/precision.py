@@ -164,7 +164,8 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
         When the joints are not independent samples, or the study does not keep the load.
     """
     if study.sampling.method != "random":
-        found = f"sampling.method is {study.sampling.method!r}: only independent samples have such an interval"
+        own = study.sampling.method
+        found = f"sampling.method is {own!r}: only independent samples, alike in weight, have such an interval"
         raise InputError([Fault("--until", found, 'use sampling.method = "random"')])
     if not kept.holds(study.output.columns, rule.load):
         remedy = f"add {', '.join(kept.needed(rule.load))}"

@@ -73,8 +73,9 @@ def _headline(found: Findings, table: pd.DataFrame) -> list[Card]:
         cards.append(
             Card(text.percent(together["good"]), f"of the joints keep {keep} (yield)", f"95 %: {ends_of_yield}")
         )
-    if table["estimate"].notna().any():
-        worst = table.sort_values("estimate", ascending=False, kind="stable").iloc[0]
+    first = table[table["load"].isin(found.leading)].sort_values("estimate", ascending=False, kind="stable")
+    if first["estimate"].notna().any():
+        worst = first.iloc[0]
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"
         ends_of_share = text.span(worst["outer_lower"], worst["outer_upper"])
         cards.append(Card(text.percent(worst["estimate"]), label, f"95 %: {ends_of_share}"))

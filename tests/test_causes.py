@@ -65,7 +65,7 @@ def test_known_causes_are_found_with_their_shares(path):
 
 def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):
     monkeypatch.setattr(causes, "MOST", 1000)
-    monkeypatch.setattr(causes, "BLOCK", 700)
+    monkeypatch.setattr(source, "BLOCK", 700)
     with ResultStore.open(path) as store:
         found = causes.of_store(store, "cross1.F")
         errors, loads = store.errors()[1:1001], store.results()["F_max"][1:-5, 0]

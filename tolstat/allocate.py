@@ -146,16 +146,16 @@ def of_store(
         raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
     statements, free, prices = _asked(store, study, limits, cost_file, keep)
     names = [name for t in free for name in t.names]
-    campaign = source.read(store, source.LOAD_FIELDS, [c for name in names for c in selection.columns_of(name)])
-    done = campaign.results["status"] != Status.PENDING
-    above = np.column_stack([_above(campaign.results[done], s) for s in statements])
+    columns = [column for name in names for column in selection.columns_of(name)]
+    campaign = source.read(store, source.LOAD_FIELDS, ())
+    done = np.flatnonzero(campaign.results["status"] != Status.PENDING)
+    above = np.column_stack([_above(campaign.results, s) for s in statements])[done]
     chosen, judges = allocation.halves(len(above), MOST)
     if len(judges) < 4 * reweight.LEAST_ESS:
         found = f"has {len(above)} joints simulated"
         raise StoreError(str(Fault(str(store.path), found, f"run {8 * reweight.LEAST_ESS} joints or more")))
-    errors = campaign.errors[done]
     price = np.array([cost.reach for cost in prices])
-    ratios = _Ratios(free, errors[chosen])
+    ratios = _Ratios(free, source.errors_at(store, columns, done[chosen]))
     problem = allocation.Problem(
         ratios.at,
         ratios.log_spread,
@@ -171,7 +171,8 @@ def of_store(
     entries = {
         t.pattern: t.scaled(float(f), DIGITS) for t, f in zip(free, choice.factors, strict=True) if abs(f - 1) > 5e-3
     }
-    weights = reweight.smooth(_Ratios(free, errors[judges]).of(entries))
+    logs = np.concatenate([_Ratios(free, errors).of(entries) for errors in source.error_blocks(store, columns)])
+    weights = reweight.smooth(logs[done[judges]])
     table = _judged(statements, above, above[judges], weights, campaign.iid, confidence)
     more = [
         allocation.joints_needed(share, ess, target, confidence)

@@ -18,7 +18,6 @@ from tolstat.recall import recall
 from tolstat.report import source
 from tolstat.schema import did_you_mean
 from tolstat.store import ResultStore
-from tolstat.store.reader import BLOCK
 from tolstat.study import Study
 from tolstat.study.selection import LIMIT_UNITS, columns_of
 from tolstat.tables import Status
@@ -118,7 +117,8 @@ def of_store(
     if study.groups:
         return _frozen(store, study, by, confidence, log)
     campaign = source.read(store, source.LOAD_FIELDS, ())
-    errors = partial(_errors_at, store, study, len(campaign.results))
+    columns = [column for name in study.tolerances for column in columns_of(name)]
+    errors = partial(source.errors_at, store, columns)
     return _of_joints(campaign, study, by, confidence, log, str(store.path), errors)
 
 
@@ -184,18 +184,6 @@ def _of_joints(
     std = float(np.sqrt(first.variance))
     counts = (level, int(above.sum()), unit, std, float(first.estimate.sum()), ranks.r2)
     return Causes(by, rows.size, body.size, lost, *counts, found_causes)
-
-
-def _errors_at(store: ResultStore, study: Study, n: int, samples: NDArray[np.intp]) -> NDArray[np.void]:
-    """Errors that scatter of some of the n joints of a file, the nominal one not counted, read a block at a time."""
-    first = store.n - n
-    columns = [column for name in study.tolerances for column in columns_of(name)]
-    parts = []
-    for begin in range(0, store.n, BLOCK):
-        here = samples[(samples >= begin - first) & (samples < begin - first + BLOCK)]
-        if here.size:
-            parts.append(store.errors(slice(begin, begin + BLOCK), columns)[here + first - begin])
-    return np.concatenate(parts)
 
 
 def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: bool) -> Causes:

@@ -101,8 +101,10 @@ def of_store(
     if faults:
         raise InputError(faults)
     columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
-    campaign = source.read(store, source.LOAD_FIELDS, columns, weighted=True).done()
-    logs = _log_ratios(study, new, names, campaign.errors)
+    campaign = source.read(store, source.LOAD_FIELDS, (), weighted=True)
+    blocks = source.error_blocks(store, columns)  # the errors of a million joints would be half a gigabyte
+    logs = np.concatenate([_log_ratios(study, new, names, errors) for errors in blocks])
+    logs, campaign = logs[campaign.results["status"] != Status.PENDING], campaign.done()
     weights = reweight.smooth(logs if campaign.weights is None else logs + np.log(campaign.weights))
     rows = [_row(campaign, weights, name, level, confidence) for name, level in campaign.limits.items()]
     table = pd.DataFrame(rows) if rows else _quantiles(campaign, weights, confidence)

@@ -18,6 +18,7 @@ from tolstat.analysis.quantile import Quantile
 from tolstat.errors import Fault, InputError
 from tolstat.origins import check_counted
 from tolstat.store import verification
+from tolstat.store.reader import BLOCK
 from tolstat.store.verification import Verification
 from tolstat.study.selection import LIMIT_UNITS
 from tolstat.tables import BUSHINGS, ERROR_FIELDS, FAILED, PINS, RESULT_COLUMNS, UNSETTLED, Column, Status
@@ -124,6 +125,8 @@ class Campaign:
     def done(self) -> Campaign:
         """The same without the joints that are still pending."""
         here = self.results["status"] != Status.PENDING
+        if here.all():
+            return self  # tables of a million joints are not copied
         weights = None if self.weights is None else self.weights[here]
         return replace(self, errors=self.errors[here], results=self.results[here], weights=weights)
 
@@ -216,6 +219,30 @@ def read(
 def patterns(text: str) -> tuple[str, ...]:
     """Key paths of what the text of a study sweeps; empty for one that does not."""
     return tuple(_patterns(tomllib.loads(text).get("sweep", {})))
+
+
+def error_blocks(store: ResultStore, columns: Sequence[str]) -> Iterator[NDArray[np.void]]:
+    """Errors of the joints that `read` gives, without the nominal one: tables of a part of the joints, in their order.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The file.
+    columns : sequence of str
+        Columns of the errors that the tables have.
+    """
+    begin = int(store.sampling["nominal_first"] and store.rows.start == 0)
+    for first in range(begin, store.n, BLOCK):
+        yield store.errors(slice(first, first + BLOCK), columns)
+
+
+def errors_at(store: ResultStore, columns: Sequence[str], samples: NDArray[np.intp]) -> NDArray[np.void]:
+    """Errors of some of the joints that `read` gives, by their places in ascending order; see `error_blocks`."""
+    parts, first = [], 0
+    for block in error_blocks(store, columns):
+        parts.append(block[samples[(samples >= first) & (samples < first + len(block))] - first])
+        first += len(block)
+    return np.concatenate(parts)
 
 
 def _patterns(table: Mapping[str, Any], before: str = "") -> Iterator[str]:

@@ -33,7 +33,8 @@ def truth(share=None, level=None):
     return norm.sf(np.log(level / 1.1)) - norm.sf(np.log(level))
 
 
-def test_paired_differences_cover_over_seeds_and_a_walds_interval_of_rare_shares_does_not():
+def test_paired_differences_cover_over_seeds_and_a_walds_interval_of_rare_shares_does_not(monkeypatch):
+    monkeypatch.setattr(difference, "RESAMPLES", 200)
     level, covered, wald = 16.0, [], []  # one in some 300 joints
     for a, b in pairs(200):
         share, q = difference.shares(a, b, [level], True), difference.quantiles(a, b, 0.7, True)

@@ -13,6 +13,7 @@ from tests.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
 from tolstat import campaign, causes, cli, combine, joint, sampling, study
 from tolstat.analysis import pick_freeze
 from tolstat.errors import InputError
+from tolstat.execution import Execution
 from tolstat.store import ResultStore
 from tolstat.study.rewriting import with_keys
 from tolstat.tables import RESULT, Simulation, Status
@@ -135,13 +136,14 @@ STAGES = campaign.Stages(
 
 def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(campaign, "run", partial(campaign.run, stages=STAGES))
+    run = partial(campaign.run, stages=STAGES)
+    monkeypatch.setattr(campaign, "run", lambda *a, **k: run(*a, **k | {"execution": Execution("serial", 1)}))
     load(tmp_path, TEXT.replace('\nmethod = "pick_freeze"', ""))
-    command = ["causes", "design.toml", "--pick-freeze", "500", "--workers", "1"]
+    command = ["causes", "design.toml", "--pick-freeze", "150", "--workers", "1"]
     done = CliRunner().invoke(cli.app, command)
     assert done.exit_code == 0, done.stderr
     lines = [line.split() for line in done.stdout.splitlines()]
-    assert "2001 joints" in done.stderr
+    assert "601 joints" in done.stderr
     assert "from a pick-freeze design" in done.stderr
     assert "in all" in done.stdout
     assert "rank" not in done.stdout
@@ -160,12 +162,12 @@ def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, mo
         row = table.loc[name]
         for index, truth in (("first", first), ("total", total)):  # within four standard errors
             assert abs(row[index] - truth) < row[f"{index}_upper"] - row[f"{index}_lower"]
-        assert row["first_upper"] - row["first_lower"] < 0.3
+        assert row["first_upper"] - row["first_lower"] < 0.6
     found = json.loads(CliRunner().invoke(cli.app, ["causes", "design_causes.h5", "--json"]).stdout)
     assert found["r2"] is None
     assert len(found["table"]) == 2
-    wider = combine.extend(tmp_path / "design_causes.h5", 600)
-    assert wider.rows == 1 + 600 * 4
+    wider = combine.extend(tmp_path / "design_causes.h5", 160)
+    assert wider.rows == 1 + 160 * 4
 
 
 def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):

@@ -15,7 +15,7 @@ from tolstat.kernel.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, 
 from tolstat.kernel.lane_memory import aligned_zeros, as_lanes, lane_dtype
 from tolstat.tables import PARAM, Law, Options, Start, Status
 
-FAST = Options(steps_per_rev=45, max_revs=6)
+FAST = Options(steps_per_rev=45, max_revs=6, max_refinements=0)
 
 
 @closure

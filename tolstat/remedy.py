@@ -1,4 +1,4 @@
-"""What a user can do about a joint that did not settle, in one sentence."""
+"""What a user can do about a joint that is not ok, in one sentence."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tolstat.refinement import FACTOR, GROWN
 from tolstat.tables import MAX_ITERATIONS, STATUS_TEXT, Motion, Status
 
 ALLOWED_REVS, ALLOWED_STEPS = 1000, 20_000
@@ -27,13 +28,15 @@ def remedy(row: np.void, options: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        Empty for a joint that settled.
+        Empty for a joint that is ok.
     """
     status, motion = Status(int(row["status"])), Motion(int(row["motion"]))
     if status in (Status.OK, Status.PENDING):
         return ""
     if status == Status.NEWTON_FAILED:
         return _of_failure(row, options)
+    if status == Status.NOT_RESOLVED:
+        return _of_steps(row, options)
     if motion == Motion.SLOW:
         return _of_slow(row, options)
     if motion == Motion.SUBHARMONIC:
@@ -52,6 +55,19 @@ def _of_failure(row: np.void, options: Mapping[str, Any]) -> str:
     if row["newton_iterations"] > MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
         return f"{MAX_ITERATIONS} iterations a step were spent at {place}: try solver.steps_per_rev = {steps}"
     return f"failed at {place}: try solver.steps_per_rev = {steps}, or solver.max_halvings = 20"
+
+
+def _of_steps(row: np.void, options: Mapping[str, Any]) -> str:
+    steps, change = int(row["steps_per_rev"]), float(row["refinement_change"])
+    if row["flutter"] > GROWN:
+        grown = float(row["flutter"])
+        return f'a disturbance of the contacts grows by a factor e^{grown:.0f}: contact.law = "sliced" does not flutter'
+    if not math.isfinite(change):
+        return f"fails at {FACTOR * steps} steps a revolution: try solver.max_halvings = 20"
+    found = f"largest loads change by {change:.1%} up to {steps} steps a revolution"
+    if FACTOR * steps > ALLOWED_STEPS:
+        return f"{found}: no setting resolves them"
+    return f"{found}: try solver.max_refinements = {int(options['max_refinements']) + 1}"
 
 
 def _of_slow(row: np.void, options: Mapping[str, Any]) -> str:

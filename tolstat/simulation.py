@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import rainflow
-from tolstat.tables import PARAM, RESULT, SIMULATED, Fidelity, HistorySpec, Method, Options, Simulation
+from tolstat import flutter, rainflow, refinement
+from tolstat.tables import PARAM, RESULT, SIMULATED, Fidelity, HistorySpec, Method, Options, Simulation, Status
 
 if TYPE_CHECKING:
     from tolstat.kernel.batch import Batch
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
-MOST_KEPT = 64
-"""Joints whose last revolution is in memory at a time, some 200 kB each."""
+MOST_KEPT = 12_000
+"""Samples that are in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
 
 
 def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
@@ -137,15 +137,33 @@ def simulate_rows(
     Simulation
         Results, and histories; NaN (mode: 0) where a joint has none.
     """
-    results = np.zeros(len(params), RESULT).view(np.recarray)
     specs = history_specs(options, histories, n_harmonics)
     kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
-    simulate = _together if in_lanes(options) else _alone
-    for i, samples in simulate(params, options, bool(specs), results):
-        if results[i].status in SIMULATED:
-            for name, values in _sample(samples, histories, specs).items():
-                kept[name][i] = values
-    return Simulation(results.view(np.ndarray), kept)
+
+    def simulate(rows: NDArray[np.intp], settings: Options) -> NDArray[np.void]:
+        found = np.zeros(len(rows), RESULT).view(np.recarray)
+        run = _together if in_lanes(settings) else _alone
+        for i, samples in run(params[rows], settings, bool(specs), found):
+            if found[i].status in SIMULATED:
+                grid = samples[:: settings.steps_per_rev // options.steps_per_rev]
+                for name, values in _sample(grid, histories, specs).items():
+                    kept[name][rows[i]] = values
+        return found.view(np.ndarray)
+
+    results = simulate(np.arange(len(params)), options)
+    refinement.refine(results, options, simulate)
+    if options.max_refinements > 0 and options.fidelity == Fidelity.DYNAMIC:
+        _look_for_flutter(params, options, results)
+    return Simulation(results, kept)
+
+
+def _look_for_flutter(params: NDArray[np.void], options: Options, results: NDArray[np.void]) -> None:
+    """Write ``flutter`` of settled joints that may, and the status of those that do."""
+    rows = np.flatnonzero((results["status"] == Status.OK) & flutter.may_flutter(params, results))
+    run = _together if in_lanes(options) else _alone
+    for i, samples in run(params[rows], options, True, np.zeros(len(rows), RESULT).view(np.recarray)):
+        results["flutter"][rows[i]] = flutter.exponent(params[rows[i : i + 1]], options, samples)
+    results["status"][rows[results["flutter"][rows] > refinement.GROWN]] = Status.NOT_RESOLVED
 
 
 def _alone(
@@ -170,7 +188,8 @@ def _together(
     from tolstat.kernel.settle import make_samples
 
     batch, tally = lanes(options), np.zeros(3, np.int64)
-    for here in _groups(params, MOST_KEPT if keep else len(params)):
+    most = max(1, MOST_KEPT // options.steps_per_rev) if keep else len(params)
+    for here in _groups(params, most):
         part = np.ascontiguousarray(params[here])
         batch.par.law, batch.par.n_stations = part["law"][0], part["n_stations"][0]
         words = part.view(np.float64).reshape(len(part), -1)
@@ -217,4 +236,5 @@ def warm_up(options: Options | None = None) -> None:
     params = np.zeros(1, PARAM)
     params["clearance"] = -1.0
     simulate_rows(params, options or Options())
+    flutter.warm_up(options or Options())
     rainflow.count(np.zeros((2, 8, 6)))

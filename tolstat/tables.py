@@ -41,6 +41,7 @@ class Status(IntEnum):
     TIMEOUT = 7
     CRASHED = 8
     INVALID_INPUT = 9
+    NOT_RESOLVED = 10
 
     @property
     def label(self) -> str:
@@ -48,8 +49,8 @@ class Status(IntEnum):
         return self.name.lower()
 
 
-UNSETTLED = (Status.NOT_SETTLED, Status.NOT_PERIODIC)
-"""States of a joint whose results are those of the revolutions recorded, which others would not repeat."""
+UNSETTLED = (Status.NOT_SETTLED, Status.NOT_PERIODIC, Status.NOT_RESOLVED)
+"""States of a joint whose results others would not repeat: other revolutions, or finer steps."""
 
 SIMULATED = (Status.OK, *UNSETTLED)
 """States of a joint that has results."""
@@ -64,6 +65,8 @@ STATUS_TEXT = {
     "last revolution",
     Status.NOT_PERIODIC: "steady, but not the same in each revolution: sub-harmonic, quasi-periodic or chaotic, "
     "see motion; results are those of the whole period, or of up to the last 16 revolutions",
+    Status.NOT_RESOLVED: "settled, but not at all steps: largest loads change with them (refinement_change), or its "
+    "contacts flutter (flutter); results are those of the finest steps taken",
     Status.TIMEOUT: "took longer than the time allowed to a joint; results are NaN",
     Status.CRASHED: "its process died with it twice; results are NaN",
     Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
@@ -184,6 +187,8 @@ class Options(NamedTuple):
     rtol: float = 0.0
     atol: float = 0.0
     fidelity: int = int(Fidelity.DYNAMIC)
+    peak_substeps: int = 8
+    max_refinements: int = 2
 
 
 class HistorySpec(NamedTuple):
@@ -325,6 +330,11 @@ RESULT_FIELDS = (
     Field("failed_step", "1", "step of the output grid at which the joint failed, from 1; -1 if it did not", "i4"),
     Field("failed_theta", "rad", "input angle at the start of that step, less whole revolutions"),
     Field("revolutions", "1", "revolutions integrated, the recorded one included"),
+    Field("steps_per_rev", "1", "steps a revolution of the results: more than solver.steps_per_rev if refined", "i4"),
+    Field("roughness", "1", "largest bend of a load between three samples, relative to the largest load of the kind"),
+    Field("skew", "1", "antisymmetric stiffness of the contacts over what their damping holds; of settled joints"),
+    Field("flutter", "1", "exponent by which flutter of the contacts grows in a revolution; of settled joints"),
+    Field("refinement_change", "1", "largest change of a largest load by the last refinement, relative to its kind's"),
     Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),
     Field("newton_iterations", "1", "Newton iterations", "i4"),
     Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),

@@ -28,7 +28,9 @@ from tolstat.kernel.simulate import (
     inside_model,
     is_finite,
     judge,
+    look_closer,
     residual,
+    set_weight,
     simulate_joint,
     solve,
     substeps,
@@ -65,9 +67,12 @@ def leave(lane, settled, rows, options, alone, batch, samples, results):
     if settled:
         summarise(own, out)
     if settled and is_finite(out):
-        conclude(batch.notes[lane], out)
+        conclude(rows[joint], own, batch.notes[lane], out)
         get_counters(lane, batch, state.counters)
-        describe(OK, state.counters, out)
+        if options.peak_substeps > 1:
+            set_weight(rows[joint], state)
+            look_closer(rows[joint], options, work, state, own, ring.fine, out)
+        describe(OK, options, state.counters, out)
     else:
         simulate_joint(rows[joint], options, work, state, ring, out)
         for s in range(own.size):
@@ -90,7 +95,7 @@ def walk(lane, k, level, rows, options, alone, batch, samples, results):
         if not substeps((k - 1) * h, h, level, par, options, work, state):
             break
         record(k, 0, par, work, state, own)
-        state.memory[AHEAD] = foresee(k, state.q0, state.ahead, own)
+        state.memory[AHEAD] = foresee(k, state.q0, state.v0, state.ahead, own)
         status = judge(k, state.counters[ITERATIONS], options, own, notes, results[joint])
         k, level = k + 1, 0
         if status == NOT_SETTLED and h <= 1.0001 * MAX_RATIO * state.memory[H_OLD]:
@@ -132,7 +137,7 @@ def arrive(lane, par, work, motion, rows, options, alone, batch, samples, result
     control, own = batch.control, batch.motion
     k, here = control.k[lane], samples_of(lane, batch, samples)
     record(k, lane, par, work, motion, here)
-    own.memory[AHEAD, lane] = foresee(k, own.q0[:, lane], own.ahead[:, lane], here)
+    own.memory[AHEAD, lane] = foresee(k, own.q0[:, lane], own.v0[:, lane], own.ahead[:, lane], here)
     status = judge(k, int(control.iterations[lane]), options, here, batch.notes[lane], results[control.joint[lane]])
     if status != NOT_SETTLED or k == options.max_revs * options.steps_per_rev:
         leave(lane, status == OK, rows, options, alone, batch, samples, results)

@@ -11,6 +11,7 @@ from tolstat.kernel.state import make_state_record
 from tolstat.kernel.topology import N_DOF, PSI
 from tolstat.kernel.trail import Trail, make_trail
 from tolstat.kernel.vector import larger
+from tolstat.kernel.work import EXCESS
 
 SAMPLE = np.dtype(
     [
@@ -21,7 +22,9 @@ SAMPLE = np.dtype(
         ("tau", "f8"),
         ("psi", "f8"),  # Psi, eq. (13)
         ("mode", "u1", (4,)),
+        ("skew", "f8"),  # largest antisymmetric part of a pin's contact stiffness, N/m
         ("q", "f8", (N_DOF,)),  # m, rad
+        ("v", "f8", (N_DOF,)),  # per s
     ],
     align=True,
 )
@@ -43,11 +46,24 @@ class Ring(NamedTuple):
     samples: np.recarray  # (steps_per_rev,) SAMPLE
     trail: Trail  # of the revolutions before
     shadow: np.record  # State of a neighbour of the joint, see `classify`
+    fine: np.recarray  # (3,) SAMPLE, see `closeup`
 
 
 def make_ring(steps_per_rev: int, max_revs: int) -> Ring:
     """Allocate, filled with NaN."""
-    return Ring(make_samples(1, steps_per_rev)[0], make_trail(steps_per_rev, max_revs), make_state_record(N_DOF))
+    samples, fine = make_samples(1, steps_per_rev)[0], make_samples(1, 3)[0]
+    return Ring(samples, make_trail(steps_per_rev, max_revs), make_state_record(N_DOF), fine)
+
+
+@njit
+def skew(lane, work):
+    """Largest |df_a / d(delta_b) - df_b / d(delta_a)| of a pin's two stations: the law `mode` has no potential."""
+    worst = 0.0
+    for pin in range(4):
+        a = pick(work.mode_weight[pin, 3], lane) * pick(work.station[pin, 0, EXCESS], lane)
+        b = pick(work.mode_weight[pin, 1], lane) * pick(work.station[pin, 1, EXCESS], lane)
+        worst = abs(a - b) if abs(a - b) > worst else worst  # NaN where no law was asked
+    return worst
 
 
 @njit
@@ -70,14 +86,15 @@ def record(k, lane, par, work, state, samples):
         for side in (0, 1):
             sample.contact[pin, side] = pick(work.contact[pin, side], lane)
         sample.mode[pin] = int(pick(work.mode[pin], lane))
+    sample.skew = skew(lane, work)
     omega, rate = pick(par.omega, lane), pick(state.v0[PSI], lane)
     sample.tau = (pick(work.shaft[0], lane) + rate) / omega
     sample.psi = rate / (omega * sample.tau)
 
 
 @njit
-def foresee(k, q, ahead, samples):
-    """Keep the unknowns of grid point `k`; expect of the next step the change that it brought a revolution ago.
+def foresee(k, q, v, ahead, samples):
+    """Keep the motion at grid point `k`; expect of the next step the change that it brought a revolution ago.
 
     Returns
     -------
@@ -87,7 +104,7 @@ def foresee(k, q, ahead, samples):
     here, following = samples[k % samples.size], samples[(k + 1) % samples.size]
     for i in range(N_DOF):
         ahead[i] = following.q[i] - here.q[i]
-        here.q[i] = q[i]
+        here.q[i], here.v[i] = q[i], v[i]
     return 1.0 if k > samples.size else 0.0
 
 
@@ -145,6 +162,22 @@ def extremes(values):
 
 
 @njit
+def roughness(samples):
+    """Largest bend of a load's curve between three samples, relative to the largest load of the kind."""
+    bend = (0.0, 0.0)
+    largest = (0.0, 0.0)
+    for s in range(samples.size):
+        before, here, ahead = samples[s - 2].modulus, samples[s - 1].modulus, samples[s].modulus
+        for b in range(8):
+            of_force = abs(before[b, 0] + ahead[b, 0] - 2 * here[b, 0])
+            of_torque = abs(before[b, 1] + ahead[b, 1] - 2 * here[b, 1])
+            bend = (max(bend[0], of_force), max(bend[1], of_torque))
+            largest = (max(largest[0], ahead[b, 0]), max(largest[1], ahead[b, 1]))
+    force = bend[0] / largest[0] if largest[0] > 0 else 0.0
+    return max(force, bend[1] / largest[1] if largest[1] > 0 else 0.0)
+
+
+@njit
 def summarise(samples, out):
     """Write the statistics of the recorded revolution to a row of RESULT."""
     n = samples.size
@@ -159,7 +192,7 @@ def summarise(samples, out):
                 out.F_max[b], out.F_mean[b], out.F_range[b] = top, total / n, top - low
             else:
                 out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / n, top - low
-    out.psi_max = 0.0
+    out.psi_max, out.roughness = 0.0, roughness(samples)
     for pin in range(4):
         for side in (0, 1):
             out.contact_max[pin, side], _ = extremes(samples.contact[:, pin, side])

@@ -8,6 +8,7 @@ import numpy as np
 from tolstat.kernel import dynamics, integrate, linsolve, tangent
 from tolstat.kernel._jit import njit
 from tolstat.kernel.classify import build_classify
+from tolstat.kernel.closeup import build_closeup
 from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium
 from tolstat.kernel.guess import rigid_guess
 from tolstat.kernel.ideal_loads import ideal_loads
@@ -26,6 +27,8 @@ RAMP = int(Start.RAMP)
 DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)
 CHECKS_PER_REV = 12
 """How often a revolution the closure error is looked at, once two revolutions are recorded."""
+LEAST_DAMPING = 1e-3
+"""Of a contact, in units of the root of its stiffness times the pin's mass, where it has none."""
 SMALLEST_FORCE = 1e-3
 """Scale (N) of the stopping test of a joint that neither turns nor carries."""
 
@@ -53,6 +56,7 @@ static_newton = integrate.build_newton(residual, factorise_static, solve)
 hold, relax, equilibrium = build_equilibrium(residual, newton, static_newton, integrate.scaled_size, rigid_guess)
 revolution = build_quasistatic(hold, relax, record)
 classify = build_classify(advance)
+look_closer = build_closeup(advance, acceleration)
 reset = integrate.reset
 
 
@@ -84,6 +88,7 @@ def clear_results(out):
     out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
     out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
     out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = out.psi_max = nan
+    out.roughness = out.refinement_change = out.skew = out.flutter = nan
     for b in range(8):
         out.F_max[b] = out.F_mean[b] = out.F_range[b] = nan
         out.T_max[b] = out.T_mean[b] = out.T_range[b] = nan
@@ -194,7 +199,7 @@ def run_dynamic(par, options, work, state, ring, out):
             out.failed_step = k
             return NEWTON_FAILED
         record(k, 0, par, work, state, ring.samples)
-        state.memory[AHEAD] = foresee(k, state.q0, state.ahead, ring.samples)
+        state.memory[AHEAD] = foresee(k, state.q0, state.v0, state.ahead, ring.samples)
         if k > half:
             keep(k, ring)
         status = judge(k, state.counters[ITERATIONS], options, ring.samples, ring.trail.notes, out)
@@ -215,17 +220,28 @@ def is_finite(out):
 
 
 @njit
-def describe(status, counters, out):
+def describe(status, options, counters, out):
     """Write how a joint ended."""
     out.status = status
-    out.settled = status == OK
+    out.settled, out.steps_per_rev = status == OK, options.steps_per_rev
     out.steps, out.newton_iterations = counters[STEPS], counters[ITERATIONS]
     out.halvings, out.factorisations = counters[HALVINGS], counters[FACTORISATIONS]
 
 
 @njit
-def conclude(notes, out):
+def skewness(par, samples):
+    """Antisymmetric stiffness of the contacts, in units of what their damping holds at a pin's frequency."""
+    worst = 0.0
+    for s in range(samples.size):
+        worst = max(worst, samples[s].skew)
+    size = math.sqrt(par.k2u * par.pin_mass)
+    return worst / (2 * max(par.c_d, LEAST_DAMPING * size) * size / par.pin_mass)
+
+
+@njit
+def conclude(par, samples, notes, out):
     """Write what only a joint that has settled has."""
+    out.skew, out.flutter = skewness(par, samples), 0.0
     out.closure_trend, _ = closure_trend(0.0, notes)
     out.motion, out.period = PERIODIC, 1
 
@@ -256,7 +272,9 @@ def simulate_joint(par, options, work, state, ring, out):
         if not is_finite(out):
             status, failed = NOT_FINITE, state.counters[STEPS]
     if status == OK:
-        conclude(ring.trail.notes, out)
+        conclude(par, ring.samples, ring.trail.notes, out)
+        if options.fidelity == DYNAMIC and options.peak_substeps > 1:
+            look_closer(par, options, work, state, ring.samples, ring.fine, out)
     elif status == NOT_SETTLED:
         if options.fidelity == DYNAMIC:
             status = classify(par, options, work, state, ring, out)
@@ -265,7 +283,7 @@ def simulate_joint(par, options, work, state, ring, out):
         if failed > 0:
             out.failed_step = failed
             out.failed_theta = 2 * math.pi * ((failed - 1) % options.steps_per_rev) / options.steps_per_rev
-    describe(status, state.counters, out)
+    describe(status, options, state.counters, out)
 
 
 class Scratch(NamedTuple):

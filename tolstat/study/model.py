@@ -34,6 +34,10 @@ class Solver(Strict):
         the joint without errors; ``auto``: the cheapest of them, and of steps a revolution, that meets the budget.
     error_budget : float
         Largest error of a load that ``auto`` allows, relative to the joint's largest load of the kind.
+    peak_substeps : int
+        Parts of a step where a contact switches on a load's peak, see `kernel.closeup`; 1 looks no closer.
+    max_refinements : int
+        Times that the steps of a joint may be divided by four, see `refinement`; 0 leaves them as they are.
     """
 
     fidelity: Literal["dynamic", "quasistatic", "ideal", "auto"] = "dynamic"
@@ -47,6 +51,8 @@ class Solver(Strict):
     newton_max_iter: Annotated[int, Field(strict=True, ge=2, le=100)] = _DEFAULTS.newton_max_iter
     max_halvings: Annotated[int, Field(strict=True, ge=0, le=20)] = _DEFAULTS.max_halvings
     rho_inf: Annotated[Number, Field(ge=0, le=1)] = _DEFAULTS.rho_inf
+    peak_substeps: Annotated[int, Field(strict=True, ge=1, le=64)] = _DEFAULTS.peak_substeps
+    max_refinements: Annotated[int, Field(strict=True, ge=0, le=4)] = _DEFAULTS.max_refinements
 
     @model_validator(mode="after")
     def _auto(self) -> Self:
@@ -69,6 +75,8 @@ class Solver(Strict):
             newton_max_iter=self.newton_max_iter,
             max_halvings=self.max_halvings,
             rho_inf=self.rho_inf,
+            peak_substeps=self.peak_substeps,
+            max_refinements=self.max_refinements,
             fidelity=int(Fidelity.DYNAMIC if self.fidelity == "auto" else Fidelity[self.fidelity.upper()]),
         )
 

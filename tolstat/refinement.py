@@ -1,0 +1,75 @@
+"""Joints whose loads have bends that the steps do not resolve, once more with finer steps.
+
+A joint whose largest loads still change at the finest steps is unresolved, and is said to be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.tables import SIMULATED, Fidelity, Options, Status
+
+FACTOR = 4
+"""Steps of a refinement in one of those before."""
+MOST_STEPS = 20_000
+"""No refinement has more steps a revolution."""
+ROUGH, AT_STEPS = 0.02, 180
+"""Roughness above which a joint is refined, and the steps a revolution up to which the bends of smooth loads decide it:
+they go with the square of a step."""
+RESOLVED = 2e-3
+"""Change of the largest loads at which a refinement is the last if it leaves no roughness, relative to their kind's."""
+UNRESOLVED = 5e-3
+"""Change in the last refinement allowed that a joint may not exceed."""
+GROWN = 3.0
+"""Exponent of growth (`flutter`) above which a motion is not resolved: a disturbance becomes 20 times as large."""
+COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")
+"""What a joint has cost: all its runs together."""
+
+Simulate = Callable[[NDArray[np.intp], Options], NDArray[np.void]]
+
+
+def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> None:
+    """Simulate rough joints again with finer steps, until they change no more.
+
+    Parameters
+    ----------
+    results : ndarray of RESULT, shape (n,)
+        Joints as simulated with `options`; refined ones are overwritten.
+    options : Options
+        Numerical settings, with at most ``max_refinements``.
+    simulate : callable
+        Indices (m,) of joints, Options -> their results, (m,) table RESULT.
+    """
+    if options.fidelity != Fidelity.DYNAMIC:
+        return
+    rough = ROUGH * max(1.0, AT_STEPS / options.steps_per_rev) ** 2
+    rows = np.flatnonzero((results["status"] == Status.OK) & (results["roughness"] > rough))
+    for _ in range(options.max_refinements):
+        finer = options._replace(steps_per_rev=FACTOR * options.steps_per_rev)
+        if not rows.size or finer.steps_per_rev > MOST_STEPS:
+            break
+        found, options = simulate(rows, finer), finer
+        known = np.isin(found["status"], SIMULATED)
+        change = changes(results[rows], found)
+        for name in COUNTS:
+            found[name] += results[name][rows]
+        results["status"][rows[~known]] = Status.NOT_RESOLVED
+        results[rows[known]] = found[known]
+        results["refinement_change"][rows] = change
+        still = (change > RESOLVED) | (found["roughness"] > rough)
+        rows = rows[known & (found["status"] == Status.OK) & still]
+    far = rows[results["refinement_change"][rows] > UNRESOLVED]
+    results["status"][far] = Status.NOT_RESOLVED
+
+
+def changes(before: NDArray[np.void], after: NDArray[np.void]) -> NDArray[np.float64]:
+    """Largest change of any largest |F| or |T|, relative to the largest of the kind; NaN without results, (m,)."""
+    worst = np.zeros(len(after))
+    for name in ("F_max", "T_max"):
+        size = after[name].max(axis=1)
+        change = np.abs(after[name] - before[name]).max(axis=1)
+        worst = np.maximum(worst, np.divide(change, size, out=np.zeros(len(after)), where=size != 0))
+    return np.asarray(worst)

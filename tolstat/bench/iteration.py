@@ -77,11 +77,11 @@ def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
 
 
 def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
-    """Put a joint into every lane, the first again where there are fewer."""
-    from tolstat.kernel.batch import put_joint
+    """Lanes with a joint in each, the first again where there are fewer; their memory is their own."""
+    from tolstat.kernel.batch import make_batch, put_joint
     from tolstat.kernel.lane import WIDTH
 
-    batch = simulation.lanes(options)
+    batch = make_batch(options)
     for lane in range(WIDTH):
         snap = snaps[lane % len(snaps)]
         put_joint(lane, snap.params.view(np.float64), batch)
@@ -177,15 +177,15 @@ def _tasks(these: Sample, snaps: list[Snapshot]) -> dict[str, Callable[[], objec
     scratch = simulation.scratch(options)
     work, state, _ = scratch
     batch = into_lanes(snaps, options)
+    rows = [snap.params.view(np.recarray)[0] for snap in snaps]
     tangents = list(systems(snaps, options))
 
     def one_by_one(part: int) -> None:
-        for snap in snaps:
+        for snap, par in zip(snaps, rows, strict=True):
             state.q[:], state.v[:], state.a[:] = snap.q, snap.v, snap.a
-            parts.repeat(part, TIMES, snap.t, snap.cv, snap.ca, state, snap.params.view(np.recarray)[0], options, work)
+            parts.repeat(part, TIMES, snap.t, snap.cv, snap.ca, state, par, options, work)
 
     def in_lanes(part: int) -> None:
-        into_lanes(snaps, options)  # a campaign in between has used the memory
         parts.repeat_in_lanes(part, TIMES, options, batch)
 
     def lapack(factor: bool, kept: list[Any]) -> None:

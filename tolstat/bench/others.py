@@ -25,7 +25,7 @@ ERROR = 1e-3
 """Error of the largest loads at which times are compared: of the worst joint, relative to its largest load."""
 STEPS = (24, 36, 60, 90, 180, 360)
 """Steps a revolution from which the cheapest that meets it is taken."""
-RTOL = (1e-2, 1e-3, 1e-4)
+RTOL = (1e-2, 1e-3, 1e-4, 1e-5)
 FROM_REST = "from rest"
 
 

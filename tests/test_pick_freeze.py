@@ -180,5 +180,8 @@ def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):
         done = CliRunner().invoke(cli.app, ["causes", *map(str, arguments)])
         assert done.exit_code == 2, text
         assert text in done.stderr
+    done = CliRunner().invoke(cli.app, ["allocate", str(path), "--limit", "P(cross1.F > 700 N) < 0.1"])
+    assert done.exit_code == 2
+    assert "share their errors" in done.stderr
     with pytest.raises(InputError, match="cannot be changed in place"):
         with_keys("sampling = { n = 3 }\n", "sampling", {"n": 4}, "study.toml")

@@ -144,6 +144,10 @@ def of_store(
     if not study.tolerances:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
+    if study.groups:
+        remedy = 'give the file of a study with sampling.method = "random"'
+        found = "holds joints that share their errors with others: no half of them can judge the other"
+        raise StoreError(str(Fault(str(store.path), found, remedy)))
     statements, free, prices = _asked(store, study, limits, cost_file, keep)
     names = [name for t in free for name in t.names]
     columns = [column for name in names for column in selection.columns_of(name)]

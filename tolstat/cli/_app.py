@@ -119,3 +119,13 @@ def make_folder(path: Path) -> None:
     except OSError as error:
         found = f"cannot be made a folder: {error.strerror or error}"
         raise InputError([Fault(str(path), found, "name another folder with --out")]) from error
+
+
+@contextmanager
+def filling(folder: Path) -> Iterator[None]:
+    """Turn what hinders files from being written to a folder into a fault of the user's to mend."""
+    try:
+        yield
+    except OSError as error:
+        found = f"cannot be written to: {error.strerror or error}"
+        raise InputError([Fault(str(folder), found, "name another folder with --out")]) from error

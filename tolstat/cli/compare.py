@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import as_text, make_folder, say
+from tolstat.cli._app import as_text, filling, make_folder, say
 
 
 def compare(
@@ -45,5 +45,8 @@ def compare(
         make_folder(out)
     typer.echo(report.text(found, loads=bool(by)))
     say(report.note(found, str(a), str(b)))
-    for path in report.write(found, (out or b.parent) / f"{a.stem}_{b.stem}", (a.stem, b.stem)):
+    folder = b.parent if out is None else out
+    with filling(folder):
+        files = report.write(found, folder / f"{a.stem}_{b.stem}", (a.stem, b.stem))
+    for path in files:
         say(f"wrote {path}")

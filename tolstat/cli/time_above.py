@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, make_folder, say
+from tolstat.cli._app import ResultFile, as_text, filling, make_folder, say
 
 
 def time_above(
@@ -46,5 +46,7 @@ def time_above(
     say(report.note(found))
     if out is not None:
         make_folder(out)
-        for path in report.write(found, out / file.stem):
+        with filling(out):
+            files = report.write(found, out / file.stem)
+        for path in files:
             say(f"wrote {path}")

@@ -76,11 +76,6 @@ def write(found: Comparison, stem: Path, names: tuple[str, str]) -> list[Path]:
     -------
     list of Path
         The files; tables without rows are not written.
-
-    Raises
-    ------
-    InputError
-        When the folder cannot be written to.
     """
     files = style.save(figure(found, names), stem.with_name(f"{stem.name}_compare"))
     for what in ("shares", "loads", "switched"):

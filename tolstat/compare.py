@@ -191,6 +191,8 @@ def _sides(a: ResultStore, b: ResultStore) -> Sides:
 
 
 def _cut(side: source.Campaign, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> source.Campaign:
+    if len(rows) == len(side.results):
+        return side  # tables of a million joints are not copied
     return replace(side, errors=side.errors[rows], results=side.results[rows])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,7 +26,7 @@ from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
 from tolstat.tables import Status
-from tolstat.tolerance import Rayleigh
+from tolstat.tolerance import Distribution, Normal, Rayleigh
 
 EXAMPLE = 'write --limit "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3
@@ -191,6 +192,7 @@ class _Ratios:
     def __init__(self, free: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
         self._free = free
         self._values = [[sampling.values(errors, name) for name in t.names] for t in free]
+        self._old = [t.distribution(t.entry) for t in free]
         self._before = [self._density(i, t.entry) for i, t in enumerate(free)]
         self._one = lru_cache(maxsize=4 * len(free))(self._scaled)
 
@@ -200,7 +202,7 @@ class _Ratios:
 
     def log_spread(self, factors: FloatArray) -> float:
         """See `analysis.allocation.Problem`; inf where the ratio has no mean square."""
-        return float(sum(len(t.names) * _log_spread(t, float(f)) for t, f in zip(self._free, factors, strict=True)))
+        return float(sum(len(t.names) * self._spread(i, float(factors[i])) for i, t in enumerate(self._free)))
 
     def of(self, entries: dict[str, dict[str, Any]]) -> FloatArray:
         """Of other entries, by pattern, (n,)."""
@@ -208,22 +210,28 @@ class _Ratios:
         return np.asarray(sum(parts) - sum(self._before))
 
     def _scaled(self, i: int, factor: float) -> FloatArray:
-        return self._density(i, self._free[i].scaled(factor)) - self._before[i]
+        old, t = self._old[i], self._free[i]
+        if isinstance(old, (Normal, Rayleigh)) and scaling.unbounded(old) and "mean" not in t.entry:
+            # what the entry would give, without reading it anew; the judges go by the entry
+            return self._logpdf(i, replace(old, sigma=factor * old.sigma)) - self._before[i]
+        return self._density(i, t.scaled(factor)) - self._before[i]
 
     def _density(self, i: int, entry: dict[str, Any]) -> FloatArray:
-        found = self._free[i].distribution(entry)
+        return self._logpdf(i, self._free[i].distribution(entry))
+
+    def _logpdf(self, i: int, found: Distribution) -> FloatArray:
         return np.asarray(sum(found.logpdf(values) for values in self._values[i]))
 
-
-def _log_spread(t: Tolerance, factor: float) -> float:
-    """Logarithm of the mean square of new over old density of one error."""
-    old, new = t.distribution(t.entry), t.distribution(t.scaled(factor))
-    if t.widens:  # normal coordinates, two of a radius: 1 / (r sqrt(2 - r^2)) each, r the ratio of their deviations
-        square = 2.0 - factor**2
-        coordinates = 2 if isinstance(old, Rayleigh) else 1
-        return -coordinates * math.log(factor * math.sqrt(square)) if square > 0 else math.inf
-    x = new.ppf((np.arange(1000) + 0.5) / 1000)
-    return float(np.log(np.mean(np.exp(new.logpdf(x) - old.logpdf(x)))))
+    def _spread(self, i: int, factor: float) -> float:
+        """Logarithm of the mean square of new over old density of one error."""
+        old = self._old[i]
+        if scaling.unbounded(old):  # 1 / (r sqrt(2 - r^2)) for r times the deviation, twice for a radius
+            square = 2.0 - factor**2
+            coordinates = 2 if isinstance(old, Rayleigh) else 1
+            return -coordinates * math.log(factor * math.sqrt(square)) if square > 0 else math.inf
+        new = self._free[i].distribution(self._free[i].scaled(factor))
+        x = new.ppf((np.arange(1000) + 0.5) / 1000)
+        return float(np.log(np.mean(np.exp(new.logpdf(x) - old.logpdf(x)))))
 
 
 def _asked(

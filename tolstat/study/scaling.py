@@ -84,9 +84,13 @@ class Tolerance(NamedTuple):
     @property
     def widens(self) -> bool:
         """Whether joints drawn with this tolerance can tell of a wider one: a band that rejects parts cannot."""
-        found = self.distribution(self.entry)
-        unbounded = isinstance(found, tolerance.Rayleigh) and found.upper is None
-        return isinstance(found, tolerance.Normal) or unbounded
+        return unbounded(self.distribution(self.entry))
+
+
+def unbounded(found: Distribution) -> bool:
+    """Whether a distribution has values however far out, so that any wider one of its kind has no others."""
+    radius = isinstance(found, tolerance.Rayleigh) and found.upper is None
+    return isinstance(found, tolerance.Normal) or radius
 
 
 def tolerances(study: Study) -> list[Tolerance]:

@@ -19,20 +19,10 @@ import numpy as np
 
 from tests.environment import environment as environment
 from tolstat import campaign, kept
+from tolstat.columns import Column
 from tolstat.execution import Stages
 from tolstat.study.model import Sampling
-from tolstat.tables import (
-    DESIGN,
-    ERROR,
-    ERROR_FIELDS,
-    PARAM,
-    RESULT,
-    Column,
-    HistorySpec,
-    Options,
-    Simulation,
-    Status,
-)
+from tolstat.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
 
 SPECS = {
     "loads": HistorySpec((30, 8, 6), "f4", "N, N*m", "bushing loads"),

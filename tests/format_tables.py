@@ -9,11 +9,12 @@ import re
 from pathlib import Path
 
 from tolstat import origins, tables
+from tolstat.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "result_format.md"
 
 
-def field_table(columns: tuple[tables.Column, ...]) -> str:
+def field_table(columns: tuple[Column, ...]) -> str:
     """Markdown table of datasets, the columns of one field in one line."""
     lines = ["| dataset | unit | type | meaning |", "|---|---|---|---|"]
     for name in dict.fromkeys(c.field for c in columns):
@@ -38,11 +39,11 @@ def motion_table() -> str:
 def updated(text: str) -> str:
     """`text` of the document with its tables made anew."""
     content = {
-        "design": field_table(tables.DESIGN_COLUMNS),
+        "design": field_table(DESIGN_COLUMNS),
         **{f"origin {method}": field_table(origins.columns({"method": method})) for method in origins.FIELDS},
-        "errors": field_table(tables.ERROR_COLUMNS),
-        "results": field_table(tables.RESULT_COLUMNS),
-        "ledger": field_table(tables.LEDGER_COLUMNS),
+        "errors": field_table(ERROR_COLUMNS),
+        "results": field_table(RESULT_COLUMNS),
+        "ledger": field_table(LEDGER_COLUMNS),
         "status": status_table(),
         "motion": motion_table(),
     }

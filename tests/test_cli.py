@@ -17,9 +17,10 @@ from typer.testing import CliRunner
 import tolstat
 from tests import fakes, synthetic
 from tolstat import campaign, cli
+from tolstat.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.executor import WorkerDied
 from tolstat.store import ResultStore
-from tolstat.tables import BUSHINGS, ERROR_COLUMNS, RESULT_COLUMNS, Simulation, Status
+from tolstat.tables import BUSHINGS, Simulation, Status
 
 COMMANDS = (
     *("simulate", "plan", "run", "extend", "merge", "status", "verify"),

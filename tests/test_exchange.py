@@ -9,10 +9,10 @@ from typer.testing import CliRunner
 from tests import synthetic
 from tests.test_causes import made
 from tolstat import cli, summary
+from tolstat.columns import ERROR_COLUMNS
 from tolstat.errors import InputError, StoreError
 from tolstat.report import capability, exceedance, source
 from tolstat.store import ResultStore
-from tolstat.tables import ERROR_COLUMNS
 
 
 def export(*arguments):

@@ -18,7 +18,7 @@ import pytest
 from tests import fakes, make_golden
 from tests.test_campaign import datasets
 from tests.test_store import new_store, simulation
-from tolstat import tables
+from tolstat.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.errors import StoreError
 from tolstat.store import ResultStore, result_file
 
@@ -280,7 +280,7 @@ def test_no_pickle_anywhere() -> None:
 
 def test_version_1_files_lack_nothing_that_is_asked_for() -> None:
     with ResultStore.open(make_golden.FOLDER / "schema1.h5") as store:
-        assert set(store.to_pandas().columns) >= {c.name for c in tables.ERROR_COLUMNS + tables.RESULT_COLUMNS}
+        assert set(store.to_pandas().columns) >= {c.name for c in ERROR_COLUMNS + RESULT_COLUMNS}
 
 
 def test_a_copy_of_an_old_file_is_not_changed_by_reading(tmp_path: Path) -> None:

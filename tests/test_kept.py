@@ -18,11 +18,12 @@ from tests.test_report import campaign as campaign_of
 from tests.test_report import swept, texts
 from tolstat import campaign, combine, kept, precision, replay, report, study, tail, verify
 from tolstat.analysis import accuracy
+from tolstat.columns import RESULT_COLUMNS
 from tolstat.errors import InputError, StoreError
 from tolstat.report import accuracy as accuracy_tables
 from tolstat.report import exceedance, sweep
 from tolstat.store import ResultStore, integrity, result_file, verification
-from tolstat.tables import RESULT_COLUMNS, Status
+from tolstat.tables import Status
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
 COURSE = [c.name for c in RESULT_COLUMNS if c.field not in kept.CHOSEN_FROM]

@@ -15,10 +15,11 @@ from typer.testing import CliRunner
 
 from tests import synthetic
 from tolstat import campaign, cli, recorded, replay, sampling, study, tail, tolerance
+from tolstat.columns import RESULT_COLUMNS
 from tolstat.errors import InputError
 from tolstat.files import data_dir
 from tolstat.store import ResultStore, integrity
-from tolstat.tables import RESULT, RESULT_COLUMNS, Status
+from tolstat.tables import RESULT, Status
 
 HEAD = """
 [joint]

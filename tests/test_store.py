@@ -17,6 +17,7 @@ import pytest
 import tolstat
 from tests import fakes, format_tables
 from tolstat import campaign, tables
+from tolstat.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.errors import StoreError
 from tolstat.store import Counts, ResultStore, provenance
 from tolstat.store.result_file import text
@@ -83,7 +84,7 @@ def test_every_dataset_has_unit_and_description(tmp_path: Path, study: fakes.Stu
     with h5py.File(tmp_path / "a.h5") as file:
         assert file.attrs["filetype"] == b"tolstat campaign"
         assert file.attrs["schema_version"] == 2
-        for group, columns in (("errors", tables.ERROR_COLUMNS), ("results", tables.RESULT_COLUMNS)):
+        for group, columns in (("errors", ERROR_COLUMNS), ("results", RESULT_COLUMNS)):
             assert set(file[group]) == {c.name for c in columns}
             for c in columns:
                 dataset = file[group][c.name]
@@ -100,7 +101,7 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
         store.write(rows, simulation(study, rows))
         frame, with_units = store.to_pandas(), store.to_pandas(units=True)
         results = store.results()
-    columns = tables.ERROR_COLUMNS + tables.RESULT_COLUMNS
+    columns = ERROR_COLUMNS + RESULT_COLUMNS
     assert list(frame.columns) == [c.name for c in columns]
     assert list(with_units.columns) == [(c.name, c.unit) for c in columns]
     assert frame.index.name == "row"

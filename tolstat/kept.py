@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import RESULT_COLUMNS, Column
+from tolstat.columns import RESULT_COLUMNS, Column
 
 KEY = "output.results"
 """Key in the identity of a study: names of the columns selected; not there where all are kept."""

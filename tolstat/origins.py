@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from tolstat.columns import Column
 from tolstat.errors import Fault, StoreError
-from tolstat.tables import Column, Field, dtype_of
+from tolstat.tables import Field, dtype_of
 
 IMPORTANCE_FIELDS = (
     Field("component", "1", "what it was drawn from: 0 the tolerances, k proposal k; -1 the nominal joint", "i4"),

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.columns import Column
 from tolstat.errors import Fault, InputError
 from tolstat.recorded import options_of, parameters
 from tolstat.simulation import simulate_rows, warm_up
 from tolstat.store import ResultStore
 from tolstat.store.provenance import versions
-from tolstat.tables import Column, Options, Status
+from tolstat.tables import Options, Status
 from tolstat.trace import CaseResult
 
 

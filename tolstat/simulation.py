@@ -113,7 +113,7 @@ def in_lanes(options: Options) -> bool:
     from numba import config
 
     covered = options.fidelity == Fidelity.DYNAMIC and options.method == Method.BDF2 and options.rtol == 0
-    return covered and not config.DISABLE_JIT  # type: ignore[attr-defined]
+    return covered and not vars(config)["DISABLE_JIT"]
 
 
 def simulate_rows(

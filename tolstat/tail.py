@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import kept, sampling
+from tolstat.columns import RESULT_COLUMNS
 from tolstat.errors import Fault, InputError
 from tolstat.recall import recall
 from tolstat.report.source import load
@@ -16,7 +17,7 @@ from tolstat.schema import did_you_mean
 from tolstat.store import ResultStore
 from tolstat.study import Study
 from tolstat.study.selection import LIMIT_UNITS
-from tolstat.tables import RESULT_COLUMNS, SIMULATED, Status
+from tolstat.tables import SIMULATED, Status
 from tolstat.tolerance import score
 
 

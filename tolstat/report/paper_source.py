@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import paper, paper_choices, paper_laws, paper_statements, paper_statics
 from tolstat.analysis.paper_evidence import Answer
+from tolstat.columns import RESULT_COLUMNS
 from tolstat.joint import Joint, varied
 from tolstat.report import paper_main
 from tolstat.report.paper_main import Main, revolutions
 from tolstat.store import ResultStore
-from tolstat.tables import RESULT_COLUMNS, Status, Variant
+from tolstat.tables import Status, Variant
 
 Array = NDArray[np.float64]
 AS_PRINTED = 1e7

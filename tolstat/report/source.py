@@ -15,13 +15,14 @@ from tolstat import kept
 from tolstat.analysis import exceedance, quantile, weighted
 from tolstat.analysis.exceedance import Exceedance
 from tolstat.analysis.quantile import Quantile
+from tolstat.columns import RESULT_COLUMNS, Column
 from tolstat.errors import Fault, InputError
 from tolstat.origins import check_counted
 from tolstat.store import verification
 from tolstat.store.reader import BLOCK
 from tolstat.store.verification import Verification
 from tolstat.study.selection import LIMIT_UNITS
-from tolstat.tables import BUSHINGS, ERROR_FIELDS, FAILED, PINS, RESULT_COLUMNS, UNSETTLED, Column, Status
+from tolstat.tables import BUSHINGS, ERROR_FIELDS, FAILED, PINS, UNSETTLED, Status
 
 if TYPE_CHECKING:
     from tolstat.store import ResultStore

@@ -14,7 +14,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tolstat import kept, tables
+from tolstat import kept
+from tolstat.columns import ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.store import integrity
 from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, descriptions, fault, text
 from tolstat.tables import HistorySpec
@@ -130,10 +131,10 @@ def check_tables(file: h5py.File, version: int) -> int:
     n = int(status.shape[0]) if status.ndim == 1 else 0
     if n < 1:
         raise ValueError(f"/results/status has the shape {status.shape}")
-    groups = {"errors": tables.ERROR_COLUMNS, "results": kept.columns(mapping(file, "identity"))}
+    groups = {"errors": ERROR_COLUMNS, "results": kept.columns(mapping(file, "identity"))}
     if version >= CHECKED_SINCE:
         histories = tuple(check_column(name) for name in mapping(file, "histories"))
-        groups["ledger"] = (*tables.LEDGER_COLUMNS, *histories)
+        groups["ledger"] = (*LEDGER_COLUMNS, *histories)
     groups |= {name: columns for name, (columns, _) in descriptions(file).items()}
     for group, columns in groups.items():
         for c in columns:

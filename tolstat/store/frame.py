@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import origins, tables
+from tolstat import origins
+from tolstat.columns import ERROR_COLUMNS
 from tolstat.errors import Fault, InputError
 from tolstat.tables import Status
 
@@ -30,7 +31,7 @@ def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
     if drawn:
         origin = store.origin()
         data |= {(c.name, c.unit): c.of(origin) for c in drawn}
-    data |= {(c.name, c.unit): c.of(errors) for c in tables.ERROR_COLUMNS}
+    data |= {(c.name, c.unit): c.of(errors) for c in ERROR_COLUMNS}
     data |= {(c.name, c.unit): c.of(results) for c in store.columns}
     if store.retries:
         data["attempt", "1"] = store.attempt()
@@ -49,7 +50,7 @@ def to_xarray(store: Reader) -> xarray.Dataset:
         fault = Fault(str(store.path), "xarray is not installed", "pip install xarray, or take to_pandas()")
         raise InputError([fault]) from error
     frame = to_pandas(store)
-    columns = (*origins.columns(store.sampling), *tables.ERROR_COLUMNS, *store.columns)
+    columns = (*origins.columns(store.sampling), *ERROR_COLUMNS, *store.columns)
     told = {c.name: {"units": c.unit, "description": c.description} for c in columns}
     data = {name: ("row", frame[name].to_numpy(), told.get(str(name), {})) for name in frame}
     return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": store.study_name})

@@ -21,10 +21,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import tables
+from tolstat.columns import ERROR_COLUMNS, Column
 
 Hash = NDArray[np.uint64]
-Described = tuple[tuple[tables.Column, ...], NDArray[np.void]]
+Described = tuple[tuple[Column, ...], NDArray[np.void]]
 """A table and its columns."""
 
 FACTOR = np.uint64(0x9E3779B97F4A7C15)
@@ -49,12 +49,12 @@ def errors_hash(first_row: int, errors: NDArray[np.void], described: Sequence[De
     state = np.arange(first_row + 1, first_row + 1 + len(errors), dtype=np.uint64)
     for columns, table in described:
         _fold(state, columns, table)
-    _fold(state, tables.ERROR_COLUMNS, errors)
+    _fold(state, ERROR_COLUMNS, errors)
     return state
 
 
 def results_hash(
-    errors_check: Hash, attempt: NDArray[np.int32], results: NDArray[np.void], columns: tuple[tables.Column, ...]
+    errors_check: Hash, attempt: NDArray[np.int32], results: NDArray[np.void], columns: tuple[Column, ...]
 ) -> Hash:
     """Checksum of the results of each row, (m,).
 
@@ -104,7 +104,7 @@ def _plain(value: object) -> str:
     return value if isinstance(value, str) else repr(np.asarray(value).tolist())
 
 
-def _fold(state: Hash, columns: tuple[tables.Column, ...], table: NDArray[np.void]) -> None:
+def _fold(state: Hash, columns: tuple[Column, ...], table: NDArray[np.void]) -> None:
     for column in columns:
         values = np.ascontiguousarray(column.of(table))
         state ^= values.view(np.uint64) if values.dtype == np.float64 else values.astype(np.uint64)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import kept, tables
+from tolstat.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.errors import StoreError
 from tolstat.store import checks, integrity
 from tolstat.store.counts import Counts
@@ -313,7 +314,7 @@ class Reader:
         return self._read(group, *descriptions(self._file)[group], rows)
 
     def _errors(self, rows: slice) -> NDArray[np.void]:
-        return self._read("errors", tables.ERROR_COLUMNS, tables.ERROR, rows)
+        return self._read("errors", ERROR_COLUMNS, tables.ERROR, rows)
 
     def _results(self, rows: slice) -> NDArray[np.void]:
         table = self._read("results", self.columns, tables.RESULT, rows)
@@ -322,7 +323,7 @@ class Reader:
 
     def _intact(self, rows: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:
         """Whether rows are as they were written, (m,). Checksums are read last, as they are written last."""
-        attempt, errors, held = (self.column("ledger", c.name, rows) for c in tables.LEDGER_COLUMNS)
+        attempt, errors, held = (self.column("ledger", c.name, rows) for c in LEDGER_COLUMNS)
         return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
 
     def _check_errors(self, rows: slice, errors: NDArray[np.void]) -> None:
@@ -357,7 +358,7 @@ class Reader:
                 table[name][begin - first : begin - first + len(block)] = block[name]
         return table
 
-    def _read(self, group: str, columns: tuple[tables.Column, ...], dtype: Any, rows: slice) -> NDArray[np.void]:
+    def _read(self, group: str, columns: tuple[Column, ...], dtype: Any, rows: slice) -> NDArray[np.void]:
         first, last, _ = rows.indices(self.n)
         table = np.zeros(max(0, last - first), dtype)
         # The status comes first among the results: what it declares valid was written before it was.

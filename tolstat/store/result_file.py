@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import kept, origins, tables
+from tolstat.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.errors import Fault, StoreError
 from tolstat.files import check_room, writing
 from tolstat.store.integrity import errors_hash, seal
@@ -93,9 +94,9 @@ def attributes(
     return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
 
 
-def size_of_new(n: int, results: tuple[tables.Column, ...]) -> int:
+def size_of_new(n: int, results: tuple[Column, ...]) -> int:
     """About how many bytes a new file of `n` rows with these results takes at most, without long attributes."""
-    groups = (tables.DESIGN_COLUMNS, tables.ERROR_COLUMNS, results, tables.LEDGER_COLUMNS)
+    groups = (DESIGN_COLUMNS, ERROR_COLUMNS, results, LEDGER_COLUMNS)
     columns = [np.dtype(c.dtype).itemsize for group in groups for c in group]
     return n * sum(columns) + OVERHEAD * len(columns)
 
@@ -163,28 +164,28 @@ def fill(
     scale.make_scale("row")
     put_attributes(scale, {"units": "1", "description": "row of the campaign: the joint's number"})
     if design is not None:
-        create_table(file, "design", tables.DESIGN_COLUMNS, n, [design])
+        create_table(file, "design", DESIGN_COLUMNS, n, [design])
     drawn = origins.columns(json.loads(str(attrs["sampling"])))
     if bool(drawn) != (origin is not None):
         raise ValueError("how the joints were drawn must be given for the methods that have columns for it, only")
     if drawn:
         create_table(file, "origin", drawn, n, origin)
     create_table(file, "results", kept.columns(json.loads(str(attrs["identity"]))), n)
-    create_table(file, "ledger", (*tables.LEDGER_COLUMNS, *history_check_columns(attrs)), n)
+    create_table(file, "ledger", (*LEDGER_COLUMNS, *history_check_columns(attrs)), n)
     session = file.create_dataset("session", (2,), "f8", dcpl=_allocated("f8", 0.0))
     put_attributes(session, {"units": "s, 1", "description": "of the run under way: start (Unix time), joints done"})
-    create_table(file, "errors", tables.ERROR_COLUMNS, n, _checked(file, rows, errors))
+    create_table(file, "errors", ERROR_COLUMNS, n, _checked(file, rows, errors))
     seal(file)
 
 
-def history_check_columns(attrs: Mapping[str, Any]) -> tuple[tables.Column, ...]:
+def history_check_columns(attrs: Mapping[str, Any]) -> tuple[Column, ...]:
     """Columns of the ledger for the histories that are kept."""
     return tuple(check_column(name) for name in json.loads(attrs["histories"]))
 
 
-def check_column(history: str) -> tables.Column:
+def check_column(history: str) -> Column:
     """Column of the ledger with the checksums of a history."""
-    return tables.Column(f"{history}_check", "1", f"CRC-32 of the joint's {history}", "u4", f"{history}_check", ())
+    return Column(f"{history}_check", "1", f"CRC-32 of the joint's {history}", "u4", f"{history}_check", ())
 
 
 def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -> Iterator[NDArray[np.void]]:
@@ -203,12 +204,12 @@ def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -
         first = here.stop
 
 
-def descriptions(file: h5py.File) -> dict[str, tuple[tuple[tables.Column, ...], np.dtype[np.void]]]:
+def descriptions(file: h5py.File) -> dict[str, tuple[tuple[Column, ...], np.dtype[np.void]]]:
     """Tables that say what each joint is beside its errors, by group: their columns and types.
 
     Which of the joints listed it is, and how it was drawn; most campaigns have neither.
     """
-    held = {"design": (tables.DESIGN_COLUMNS, tables.DESIGN)} if "design" in file else {}
+    held = {"design": (DESIGN_COLUMNS, tables.DESIGN)} if "design" in file else {}
     if "origin" in file:
         sampling = json.loads(text(file.attrs, "sampling"))
         held["origin"] = (origins.columns(sampling), origins.dtype(sampling))
@@ -218,7 +219,7 @@ def descriptions(file: h5py.File) -> dict[str, tuple[tuple[tables.Column, ...], 
 def create_table(
     file: h5py.File,
     name: str,
-    columns: tuple[tables.Column, ...],
+    columns: tuple[Column, ...],
     n: int,
     blocks: Iterable[NDArray[np.void]] | None = None,
     scale: h5py.Dataset | None = None,

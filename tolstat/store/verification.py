@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import kept, tables
+from tolstat.columns import Column
 from tolstat.store.result_file import create_table, put_attributes, text
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def write(store: ResultStore, verification: Verification) -> None:
     store._replace(lambda file: _write(file, verification, store.columns))
 
 
-def _write(file: h5py.File, verification: Verification, columns: tuple[tables.Column, ...]) -> None:
+def _write(file: h5py.File, verification: Verification, columns: tuple[Column, ...]) -> None:
     if GROUP in file:
         del file[GROUP]
     group = file.create_group(GROUP)

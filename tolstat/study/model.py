@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tolstat import kept, units
+from tolstat.columns import Column
 from tolstat.schema import Strict, refuse
 from tolstat.study import selection
 from tolstat.study.tolerance_entry import Value
-from tolstat.tables import Column, Fidelity, Method, Options, Start
+from tolstat.tables import Fidelity, Method, Options, Start
 
 _DEFAULTS = Options()
 

@@ -16,13 +16,15 @@ from typing import Any
 
 import numba
 from numba.core import config
+from numba.core.caching import UserProvidedCacheLocator
+
+HERE = Path(__file__).parent
 
 
 def source_hash() -> str:
     """Hash of everything that compiled kernels depend on: the kernel's sources and the tables' layout."""
-    here = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in [*sorted(here.glob("*.py")), here.parent / "tables.py"]:
+    for path in [*sorted(HERE.glob("*.py")), HERE.parent / "tables.py"]:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
@@ -56,18 +58,28 @@ def _temporary_directory() -> str:
 CACHE_DIRECTORY = cache_directory()
 
 
+class Locator(UserProvidedCacheLocator):
+    """Finds compiled kernels whatever the folder of their sources: one compilation serves every environment."""
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """Folder below the cache directory, whose own name tells the sources apart."""
+        own = Path(py_file).parent == HERE
+        return HERE.name if own else str(super().get_suitable_cache_subpath(py_file))
+
+
 def njit(function: Callable[..., Any]) -> Any:
     """Compile `function` as every kernel is compiled, and keep the code on disk.
 
     No ``fastmath``: it removes the checks for NaN. No ``parallel``: processes share the work.
     """
-    before = config.CACHE_DIR
+    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
     # read when a function is decorated; other users' functions in this process keep their own directory
-    config.CACHE_DIR = CACHE_DIRECTORY
+    config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = CACHE_DIRECTORY, f"{__name__}.{Locator.__name__}"
     try:
         return numba.njit(cache=True, error_model="numpy", fastmath=False, no_cfunc_wrapper=True)(function)
     finally:
-        config.CACHE_DIR = before
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
 
 
 def closure(function: Callable[..., Any]) -> Any:

@@ -50,6 +50,11 @@ operation = { alpha = "30 deg", speed = "1000 rpm", torque = "5 N*m" }
 solver = { steps_per_rev = 180 }
 
 [[variant]]
+name = "not_resolved"
+cases = []
+operation = { alpha = "60 deg", speed = "800 rpm" }
+
+[[variant]]
 name = "newton_failed"
 cases = []
 operation = { alpha = "85 deg" }
@@ -125,7 +130,7 @@ def test_status_counts_each_state(path: Path) -> None:
     done = CliRunner().invoke(cli.app, ["status", str(path), "--json"])
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
-    assert {name: told[name] for name in ("joints", "ok", "pending")} == {"joints": 9, "ok": 3, "pending": 0}
+    assert {name: told[name] for name in ("joints", "ok", "pending")} == {"joints": 10, "ok": 3, "pending": 0}
     others = {s.label for s in Status} - {"ok", "pending"} - {s.label for s in HERE}
     assert {name: told[name] for name in others} == dict.fromkeys(others, 1)
 

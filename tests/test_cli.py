@@ -267,6 +267,14 @@ def test_run_with_fewer_joints_into_another_file_without_report(study, tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["five.h5", "small.toml"]
 
 
+@pytest.mark.parametrize(("option", "checks"), [("--verify", True), ("--no-verify", False)])
+def test_run_checks_its_numbers_unless_told_not_to(study, monkeypatch, option, checks):
+    told, run = [], campaign.run
+    monkeypatch.setattr(campaign, "run", lambda *a, check=True, **k: told.append(check) or run(*a, **k))
+    assert call("run", study, "--executor", "serial", "--no-report", option).exit_code == 0
+    assert told == [checks]
+
+
 def test_run_refuses_the_file_of_another_study(study):
     call("run", study, "--n", 5, "--executor", "serial", "--no-report")
     done = call("run", study, "--executor", "serial")

@@ -104,9 +104,9 @@ def run(
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:
-        carry_out(plan, path, report, execution=execution, rows=part, retry=again)
+        carry_out(plan, path, report, execution=execution, check=verify, rows=part, retry=again)
     else:
-        carry_out(plan, path, report, until, execution=execution)
+        carry_out(plan, path, report, until, execution=execution, check=verify)
 
 
 def seconds_of(text: str, option: str = "--joint-timeout") -> float:

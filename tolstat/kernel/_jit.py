@@ -18,7 +18,14 @@ import numba
 from numba.core import config
 from numba.core.caching import UserProvidedCacheLocator
 
+try:
+    from tolstat.kernel._unit import Kernel
+except ImportError:  # a Numba with other internals: each function by itself, which takes minutes
+    from numba.core.registry import CPUDispatcher as Kernel
+
 HERE = Path(__file__).parent
+OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
+"""No ``fastmath``: it removes the checks for NaN. No ``parallel``: processes share the work."""
 
 
 def source_hash() -> str:
@@ -69,22 +76,22 @@ class Locator(UserProvidedCacheLocator):
 
 
 def njit(function: Callable[..., Any]) -> Any:
-    """Compile `function` as every kernel is compiled, and keep the code on disk.
-
-    No ``fastmath``: it removes the checks for NaN. No ``parallel``: processes share the work.
-    """
+    """Compile `function` as every kernel is compiled, and keep what Python calls on disk."""
     before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
     # read when a function is decorated; other users' functions in this process keep their own directory
     config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = CACHE_DIRECTORY, f"{__name__}.{Locator.__name__}"
     try:
-        return numba.njit(cache=True, error_model="numpy", fastmath=False, no_cfunc_wrapper=True)(function)
+        kernel = closure(function)
+        if kernel is not function:
+            kernel.enable_caching()
+        return kernel
     finally:
         config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
 
 
 def closure(function: Callable[..., Any]) -> Any:
     """Compile a function made by a factory; it is cached with the entry point that calls it."""
-    return numba.njit(error_model="numpy", fastmath=False, no_cfunc_wrapper=True)(function)
+    return function if config.DISABLE_JIT else Kernel(function, targetoptions=OPTIONS)
 
 
 def bare(function: Any, *arguments: Any) -> Any:

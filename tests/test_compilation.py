@@ -1,0 +1,108 @@
+"""Kernels as units: what kernels call becomes machine code with what Python calls. Fails where Numba has changed."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+import pytest
+from numba import float64
+
+from tolstat.kernel._jit import closure
+
+
+@numba.njit
+def users(x):
+    return math.exp(x)
+
+
+@closure
+def square(x):
+    return x * x
+
+
+@closure
+def sum_of_squares(x):
+    total = 0.0
+    for k in range(x.size):
+        total += square(x[k])
+    return total
+
+
+@closure
+def top(x):
+    return sum_of_squares(x) + square(x[0]) + users(x[1])
+
+
+X = np.array([1.0, 2.0, 3.0])
+TOP = 14 + 1 + math.exp(2)
+
+
+def emitted(kernel):
+    """Whether each version of a kernel that other kernels call has been turned into machine code."""
+    return [version.library._finalized for version in kernel.callee.overloads.values()]
+
+
+def test_what_kernels_call_is_emitted_with_what_python_calls():
+    assert top(X) == pytest.approx(TOP, rel=1e-15)
+    assert len(top.signatures) == 1
+    for kernel in (sum_of_squares, square):
+        assert emitted(kernel) == [False]
+        assert not kernel.signatures
+
+
+def test_a_kernel_that_kernels_call_can_be_called_from_python_too():
+    assert top(X) == pytest.approx(TOP, rel=1e-15)
+    assert (sum_of_squares(X), square(3.0)) == (14.0, 9.0)
+    assert square.signatures == [(float64,)]
+
+
+def test_functions_that_are_no_kernels_call_kernels():
+    @numba.njit
+    def ordinary(x):
+        return top(x) + square(x[2])
+
+    assert ordinary(X) == pytest.approx(TOP + 9, rel=1e-15)
+    assert top(X) == pytest.approx(TOP, rel=1e-15)
+
+    @closure
+    def above(x):
+        return ordinary(x) + square(x[2])
+
+    assert above(X) == pytest.approx(TOP + 18, rel=1e-15)
+
+
+def test_two_kernels_of_one_factory_are_told_apart():
+    def build(inner):
+        @closure
+        def kernel(x):
+            return inner(x) + 1
+
+        return kernel
+
+    @closure
+    def cube(x):
+        return x * x * x
+
+    of_square, of_cube = build(square), build(cube)
+
+    @closure
+    def both(x):
+        return of_square(x), of_cube(x)
+
+    assert both(3.0) == (10.0, 28.0)
+    assert (of_square(2.0), of_cube(2.0)) == (5.0, 9.0)
+
+
+def test_an_error_in_a_part_names_it():
+    @closure
+    def wrong(x):
+        return x.no_such_thing
+
+    @closure
+    def caller(x):
+        return wrong(x)
+
+    with pytest.raises(numba.TypingError, match="no_such_thing"):
+        caller(1.0)

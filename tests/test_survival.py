@@ -26,7 +26,7 @@ from tests import fakes
 from tests.test_campaign import datasets, start
 from tolstat import campaign
 from tolstat.errors import InputError, StoreError
-from tolstat.execution import MAX_BLOCK, Execution, Pace, without_results
+from tolstat.execution import MAX_BLOCK, Execution, Pace, without_simulation
 from tolstat.retry import Retry, parse
 from tolstat.store import Counts, ResultStore
 from tolstat.study.model import Solver
@@ -143,7 +143,7 @@ def children(parent: int) -> list[int]:
 def test_states_without_results_have_none(tmp_path: Path) -> None:
     for status in Status:
         if status not in SIMULATED and status != Status.PENDING:
-            blank = without_results(2, status, fakes.SPECS)
+            blank = without_simulation(2, status, fakes.SPECS)
             assert (blank.results["status"] == status).all()
             assert np.isnan(blank.results["T_mean"]).all()
             assert np.isnan(blank.histories["loads"]).all()

@@ -56,9 +56,15 @@ def plan(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def coarse(plan):
-    """Joints at 12 steps a revolution, where the steps' error is large."""
-    return verify.check_study(plan, joints=6)
+def told():
+    """Progress of the checks of `coarse`."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def coarse(plan, told):
+    """Joints at 12 steps a revolution, where the steps' error is large; two processes share the references."""
+    return verify.check_study(plan, joints=6, workers=2, progress=told.append)
 
 
 def force_and_torque(base, other):
@@ -73,6 +79,14 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
     ratio /= force_and_torque(coarse.base, coarse.checks["reference"].results)
     assert (ratio > 1 / 2).all()
     assert (ratio < 2).all()
+
+
+def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
+    params = joint.perturb(plan.joint, sampling.draw(plan)[coarse.rows[-1:]])
+    here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
+    for name in ("F_max", "T_max"):  # with other threads LAPACK rounds otherwise, and Radau takes other steps
+        np.testing.assert_allclose(coarse.checks["reference"].results[name][-1], here[name][0], rtol=1e-6)
+    assert [(counts.done, counts.total) for counts in told] == [(k, 6) for k in range(7)]
 
 
 def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):

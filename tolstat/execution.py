@@ -17,7 +17,7 @@ from tolstat.executor import Lost
 from tolstat.recorded import perturbed, settings, variants
 from tolstat.store import ResultStore
 from tolstat.store.provenance import versions
-from tolstat.tables import PARAM, RESULT, RESULT_FIELDS, HistorySpec, Options, Simulation, Status
+from tolstat.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -202,7 +202,7 @@ def simulate_pending(
         for block, result in results:
             if isinstance(result, Lost):
                 status = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
-                blank = without_results(len(block.rows), status, store.history_specs)
+                blank = without_simulation(len(block.rows), status, store.history_specs)
                 yield Finished(block.rows, blank, result.reason)
             else:
                 begin = time.perf_counter()
@@ -215,14 +215,9 @@ def default_block(n_pending: int, workers: int) -> int:
     return max(1, min(FIRST_BLOCK, n_pending // (BLOCKS_PER_WORKER * workers)))
 
 
-def without_results(n: int, status: Status, specs: Mapping[str, HistorySpec]) -> Simulation:
+def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec]) -> Simulation:
     """Make what stands in the file for joints that have no results: NaN and a status, (n,)."""
-    results = np.zeros(n, RESULT)
-    for field in RESULT_FIELDS:
-        if np.dtype(field.dtype).kind == "f":
-            results[field.name] = np.nan
-    results["status"], results["failed_step"] = status, -1
-    return Simulation(results, {name: spec.blank(n) for name, spec in specs.items()})
+    return Simulation(without_results(n, status), {name: spec.blank(n) for name, spec in specs.items()})
 
 
 def _blocks(
@@ -274,7 +269,7 @@ def _simulate_finite(
 ) -> Simulation:
     """Simulate the joints of a block whose parameters are finite numbers."""
     good = _finite(block.params)
-    whole = without_results(len(good), Status.INVALID_INPUT, specs)
+    whole = without_simulation(len(good), Status.INVALID_INPUT, specs)
     if not good.any():
         return whole
     part = simulate(block.params[good], block.options, histories=histories, n_harmonics=n_harmonics)

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import RESULT, SIMULATED, Fidelity, Options, Start, Status
+from tolstat.tables import RESULT, SIMULATED, Fidelity, Options, Start, Status, without_results
 
 FloatArray = NDArray[np.float64]
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
@@ -189,10 +189,7 @@ def reference_rows(
         within `MAX_REVS` or `max_steps` is ``NOT_SETTLED``, and ``NEWTON_FAILED`` if that came before the second
         revolution ended.
     """
-    results = np.zeros(len(params), RESULT)
-    for name in RESULT.names or ():
-        if RESULT[name].base.kind == "f":
-            results[name] = np.nan
+    results = without_results(len(params), Status.NEWTON_FAILED)
     for i in range(len(params)):
         system = first_order(params[i : i + 1], options)
         status = Status(system.settled["status"][0])

@@ -368,3 +368,13 @@ DESIGN = dtype_of(DESIGN_FIELDS)
 ERROR = dtype_of(ERROR_FIELDS)
 PARAM = dtype_of(PARAM_FIELDS)
 RESULT = dtype_of(RESULT_FIELDS)
+
+
+def without_results(n: int, status: Status) -> NDArray[np.void]:
+    """Make what stands for joints that have no results, (n,) table RESULT: NaN, and a status."""
+    results = np.zeros(n, RESULT)
+    for field in RESULT_FIELDS:
+        if np.dtype(field.dtype).kind == "f":
+            results[field.name] = np.nan
+    results["status"], results["failed_step"] = status, -1
+    return results

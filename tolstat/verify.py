@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 
 from tolstat import kept, recorded
 from tolstat.errors import Fault, InputError, StoreError, gather
-from tolstat.store import ResultStore, verification
+from tolstat.executor import Lost, Work, map_here, map_in_processes
+from tolstat.store import Counts, ResultStore, verification
 from tolstat.store.provenance import versions
 from tolstat.store.verification import Check, Verification
-from tolstat.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status
+from tolstat.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -37,6 +39,11 @@ SMALL_SHARE, SMALL_MOST = 400, 16
 """One joint in 400 is checked at the end of a run, at least one and at most 16: some 2 % of its time."""
 
 Simulate = Callable[..., Simulation]
+Progress = Callable[[Counts], None]
+
+
+def silent(counts: Counts) -> None:
+    """Tell nobody how far it is."""
 
 
 def changed(options: Options, check: str) -> Options:
@@ -78,6 +85,8 @@ def run_checks(
     options: Sequence[Options],
     names: Iterable[str],
     simulate: Simulate | None = None,
+    workers: int = 1,
+    progress: Progress = silent,
 ) -> dict[str, Check]:
     """Simulate joints in other ways.
 
@@ -91,20 +100,56 @@ def run_checks(
         Which of `FULL`; ``fidelity`` is added where a joint is below dynamic fidelity.
     simulate : callable, optional
         In place of `simulation.simulate_rows`.
+    workers : int
+        Processes that share the references, each of which takes seconds; they are the same to their tolerance.
+    progress : callable
+        Told of the joints that have their reference.
 
     Returns
     -------
     dict of str to Check
     """
-    from tolstat.reference import reference_rows
-
     lower = any(own.fidelity != Fidelity.DYNAMIC for own in options)
     checks = {}
     for name in (*names, *(("fidelity",) if lower else ())):
         own = [changed(one, name) for one in options]
-        solve = reference_rows if name == "reference" else partial(_plain, simulate)
-        checks[name] = Check(DESCRIPTION[name], own[0]._asdict(), by_options(solve, params, own))
+        if name == "reference":
+            results = _references(params, own, workers, progress)
+        else:
+            results = by_options(partial(_plain, simulate), params, own)
+        checks[name] = Check(DESCRIPTION[name], own[0]._asdict(), results)
     return checks
+
+
+Single = tuple[int, NDArray[np.void], Options]
+"""A joint: its place, its row of PARAM, its settings."""
+
+
+def _references(
+    params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
+) -> NDArray[np.void]:
+    """Reference of each joint, (m,) table RESULT, one after the other in each process."""
+    blocks: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
+    work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
+    done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
+    workers = min(workers, len(blocks))
+    done = map_in_processes(work, blocks, workers) if workers > 1 else map_here(work, blocks)
+    results, counts = without_results(len(blocks), Status.CRASHED), Counts(len(blocks), 0, 0, 0)
+    progress(counts)
+    with closing(done):
+        for (i, _, _), result in done:
+            if not isinstance(result, Lost):
+                results[i] = result[0]
+            counts = counts.after(results["status"][i : i + 1])
+            progress(counts)
+    return results
+
+
+def _reference(joint: Single) -> NDArray[np.void]:
+    from tolstat.reference import reference_rows
+
+    _, params, options = joint
+    return reference_rows(params, options)
 
 
 def _plain(simulate: Simulate | None, params: NDArray[np.void], options: Options) -> NDArray[np.void]:
@@ -133,6 +178,8 @@ def of_campaign(
     joints: int | None,
     seed: int,
     simulate: Simulate | None = None,
+    workers: int = 1,
+    progress: Progress = silent,
 ) -> Verification | None:
     """Check settled joints of a campaign.
 
@@ -142,7 +189,7 @@ def of_campaign(
         Its file.
     parameters : callable
         Rows (m,) -> their parameters, (m,) table PARAM.
-    names, simulate
+    names, simulate, workers, progress
         As in `run_checks`.
     joints : int or None
         How many joints; None for all, the one without errors included.
@@ -161,7 +208,7 @@ def of_campaign(
     if not rows.size:
         return None
     options = [recorded.options_of(store, row) for row in rows.tolist()]
-    checks = run_checks(parameters(rows), options, names, simulate)
+    checks = run_checks(parameters(rows), options, names, simulate, workers, progress)
     for check in checks.values():
         kept.blank_others(check.results, store.columns)
     base = np.concatenate([store.results(slice(row, row + 1)) for row in rows.tolist()])
@@ -179,7 +226,12 @@ def small(store: ResultStore, parameters: Callable[..., NDArray[np.void]], simul
 
 
 def check(
-    path: Path, joints: int | str = 24, seed: int | None = None, on_start: Callable[[], None] = lambda: None
+    path: Path,
+    joints: int | str = 24,
+    seed: int | None = None,
+    on_start: Callable[[], None] = lambda: None,
+    workers: int = 1,
+    progress: Progress = silent,
 ) -> Verification:
     """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
 
@@ -188,7 +240,7 @@ def check(
     from tolstat.study import load
 
     if path.suffix != ".toml":
-        return check_file(path, joints, seed, on_start=on_start)
+        return check_file(path, joints, seed, on_start=on_start, workers=workers, progress=progress)
     faults: list[Fault] = []
     with gather(faults):
         number_of(joints)
@@ -197,7 +249,7 @@ def check(
     if faults:
         raise InputError(faults)
     on_start()
-    return check_study(plan, joints, seed)
+    return check_study(plan, joints, seed, workers=workers, progress=progress)
 
 
 def check_file(
@@ -206,6 +258,8 @@ def check_file(
     seed: int | None = None,
     names: Iterable[str] = FULL,
     on_start: Callable[[], None] = lambda: None,
+    workers: int = 1,
+    progress: Progress = silent,
 ) -> Verification:
     """Check joints of a result file and keep that in it, in place of an earlier verification.
 
@@ -221,6 +275,8 @@ def check_file(
         Which of `FULL`.
     on_start : callable
         Called when the file is known to be good, before the work.
+    workers, progress
+        As in `run_checks`.
 
     Returns
     -------
@@ -242,14 +298,20 @@ def check_file(
         if not (store.status() == Status.OK).any():
             raise StoreError(str(Fault(str(path), "has no settled joint", "run the campaign first: tolstat run")))
         on_start()
-        found = of_campaign(store, partial(recorded.parameters, store), names, number, seed)
+        params = partial(recorded.parameters, store)
+        found = of_campaign(store, params, names, number, seed, None, workers, progress)
         assert found is not None
         verification.write(store, found)
     return found
 
 
 def check_study(
-    plan: Study, joints: int | str = 24, seed: int | None = None, names: Iterable[str] = FULL
+    plan: Study,
+    joints: int | str = 24,
+    seed: int | None = None,
+    names: Iterable[str] = FULL,
+    workers: int = 1,
+    progress: Progress = silent,
 ) -> Verification:
     """Check joints of a study that has not been run: they are simulated as it would, and in other ways.
 
@@ -268,7 +330,7 @@ def check_study(
     params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)
     options = [plan.solvers[number].options() for number in recorded.variants(plan, rows).tolist()]
     base = by_options(partial(_plain, None), params, options)
-    checks = run_checks(params, options, names)
+    checks = run_checks(params, options, names, None, workers, progress)
     for results in (base, *(check.results for check in checks.values())):
         kept.blank_others(results, plan.output.columns)
     return Verification(seed, rows, base, checks)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import announce_compilation, as_text, say, writing
+from tolstat.cli._app import Workers, announce_compilation, as_text, say, writing
 
 if TYPE_CHECKING:
     from tolstat.store.verification import Verification
@@ -24,6 +24,7 @@ def verify(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="CSV", help="Write every joint, check and load as a table.")
     ] = None,
+    workers: Workers = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
     """Measure the numerical error on joints of a campaign.
@@ -32,13 +33,18 @@ def verify(
     reference (scipy's Radau). Prints how far the largest loads are off, relative to the largest of the kind in the
     joint. Of a result file the joints are those that it holds, and what is found is kept in it for the report.
     """
+    from tolstat import progress
     from tolstat import verify as verification
+    from tolstat.executor import available_workers
     from tolstat.files import check_target
     from tolstat.report import accuracy, text
 
     if out is not None:
         check_target(out, what)
-    found = verification.check(what, joints, seed, on_start=announce_compilation)
+    with progress.reporter() as reporter:
+        found = verification.check(
+            what, joints, seed, announce_compilation, workers or available_workers(), progress=reporter
+        )
     if as_json:
         typer.echo(as_text(_summary(found)))
     else:

@@ -112,8 +112,8 @@ def in_lanes(options: Options) -> bool:
     """Whether joints with these settings go in lock-step; all others go one after the other."""
     from numba import config
 
-    covered = options.fidelity == Fidelity.DYNAMIC and options.method == Method.BDF2 and options.rtol == 0
-    return covered and not vars(config)["DISABLE_JIT"]
+    bdf2 = options.fidelity == Fidelity.DYNAMIC and options.method == Method.BDF2 and options.rtol == 0
+    return (bdf2 or options.fidelity == Fidelity.QUASISTATIC) and not vars(config)["DISABLE_JIT"]
 
 
 def simulate_rows(

@@ -1,6 +1,6 @@
 """Memory of the joints that go in lock-step: everything in a few records, whose floats are lanes.
 
-Joints come into a lane and leave it through the State of one joint.
+Joints come into a lane through the State of one joint.
 """
 
 from typing import NamedTuple
@@ -8,29 +8,40 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.kernel._jit import njit
-from tolstat.kernel.integrate import UNLIMITED
 from tolstat.kernel.lane import WIDTH
 from tolstat.kernel.lane_memory import aligned_zeros, lane_dtype
 from tolstat.kernel.settle import make_samples
-from tolstat.kernel.state import AHEAD, ATTEMPTS_LEFT, FACTORISATIONS, H_OLD, HALVINGS, ITERATIONS, STEPS
+from tolstat.kernel.state import AHEAD, FACTORISATIONS, H_OLD, HALVINGS, ITERATIONS, STEPS
 from tolstat.kernel.topology import N_DOF
 from tolstat.kernel.trail import make_notes
 from tolstat.kernel.work import WORK
 from tolstat.tables import PARAM, Options
 
 MOTION = np.dtype(
-    [(name, "f8", N_DOF) for name in ("q", "v", "a", "q0", "v0", "a0", "q1", "v1", "residual", "weight", "ahead")]
+    [(name, "f8", N_DOF) for name in ("q", "v", "a", "q0", "v0", "a0", "q1", "v1", "a1", "aux")]
+    + [(name, "f8", N_DOF) for name in ("residual", "weight", "ahead")]
     + [("memory", "f8", 3)]
 )
 """What `state.State` is to one joint."""
 
+HOLD, RELAX, CHECK, STEP, LOOK, ANGLE = range(6)
+"""What a lane is at: equilibrium by Newton's iteration; in pseudo-time; whether it is there; a step; a step of the
+recorded revolution once more, in parts (`closeup`); the next angle."""
+
 CONTROL = np.dtype(
     [(name, "f8") for name in ("t", "h", "cv", "ca", "before", "iteration", "factorised", "at_roundoff")]
-    + [(name, "f8") for name in ("live", "fresh", "steps", "iterations", "halvings", "factorisations")]
-    + [(name, "i8", WIDTH) for name in ("joint", "k")]
+    + [(name, "f8") for name in ("phase", "live", "fresh", "passed", "origin", "grid", "pseudo")]
+    + [(name, "f8") for name in ("steps", "iterations", "halvings", "factorisations")]
+    + [(name, "i8", WIDTH) for name in ("joint", "k", "level", "done", "tries", "left", "part", "looked")]
 )
-"""Where a lane is in its joint: Newton's iteration; whether it has a joint (1 or 0) and is to begin a step; counters as
-of State; row of the joint, grid point it is on the way to."""
+"""Where a lane is in its joint.
+
+Time and step, Newton's iteration; what it is at; whether it has a joint (1 or 0), is to begin a step or angle, and has
+its trial point accepted then; time at which the step of the output grid began, its length, and the step of pseudo-time,
+s; counters as of State. Row of the joint; grid point or angle that it is on the way to, and there the level of its
+sub-step (of an angle or an equilibrium: ways that have failed) and what is done: parts of a step, revolutions of
+angles; steps in pseudo-time. Of a closer look: steps left to take, the part of the step it is at, and parts recorded.
+"""
 
 
 class Batch(NamedTuple):
@@ -43,6 +54,7 @@ class Batch(NamedTuple):
     motion: np.record
     control: np.record
     samples: np.recarray  # (WIDTH, steps_per_rev) SAMPLE
+    fine: np.recarray  # (WIDTH, 3) SAMPLE, as in `settle.Ring`
     notes: np.recarray  # (WIDTH,) NOTES
 
 
@@ -69,7 +81,8 @@ def make_batch(options: Options) -> Batch:
     motion.weight[:] = 1.0
     words = pars.view(np.float64).view(np.ndarray)
     samples = make_samples(WIDTH, options.steps_per_rev)
-    return Batch(pars[0], words, work, kept, motion, control, samples, make_notes(WIDTH))
+    fine = make_samples(WIDTH, 3)
+    return Batch(pars[0], words, work, kept, motion, control, samples, fine, make_notes(WIDTH))
 
 
 @njit
@@ -81,30 +94,42 @@ def put_joint(lane, words, batch):
 
 
 @njit
-def put_motion(lane, state, batch):
-    """Copy the last accepted points of a joint to a lane."""
-    motion, control = batch.motion, batch.control
+def put_points(lane, state, control, motion):
+    """Copy the last accepted points of a joint to a lane, without a tangent."""
     for i in range(N_DOF):
         motion.q0[i, lane], motion.v0[i, lane], motion.a0[i, lane] = state.q0[i], state.v0[i], state.a0[i]
         motion.q1[i, lane], motion.v1[i, lane] = state.q1[i], state.v1[i]
-        motion.weight[i, lane], motion.ahead[i, lane] = state.weight[i], state.ahead[i]
     motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = state.memory[H_OLD], state.memory[AHEAD]
-    control.steps[lane], control.iterations[lane] = state.counters[STEPS], state.counters[ITERATIONS]
-    control.halvings[lane], control.factorisations[lane] = state.counters[HALVINGS], state.counters[FACTORISATIONS]
+    control.passed[lane] = control.factorised[lane] = 0.0
 
 
 @njit
-def get_motion(lane, batch, state):
-    """Copy the last accepted points of a lane's joint, without a tangent."""
-    motion = batch.motion
+def put_start(lane, state, control, motion):
+    """Copy the start of a joint to a lane."""
+    put_points(lane, state, control, motion)
     for i in range(N_DOF):
-        state.q0[i], state.v0[i], state.a0[i] = motion.q0[i, lane], motion.v0[i, lane], motion.a0[i, lane]
-        state.q1[i], state.v1[i] = motion.q1[i, lane], motion.v1[i, lane]
-        state.weight[i] = motion.weight[i, lane]
-    state.memory[:] = 0.0
-    state.counters[ATTEMPTS_LEFT] = UNLIMITED
-    state.memory[H_OLD] = motion.memory[H_OLD, lane]
-    get_counters(lane, batch, state.counters)
+        motion.weight[i, lane] = state.weight[i]
+    control.live[lane], control.fresh[lane] = 1.0, 0.0
+    control.steps[lane] = control.iterations[lane] = control.halvings[lane] = control.factorisations[lane] = 0.0
+
+
+@njit
+def rest(lane, cv, ca, control, motion):
+    """Let a lane begin Newton's iteration from its last accepted point, at rest."""
+    for i in range(N_DOF):
+        motion.q[i, lane] = motion.q0[i, lane]
+        motion.v[i, lane] = motion.a[i, lane] = 0.0
+    control.cv[lane], control.ca[lane] = cv, ca
+    control.iteration[lane] = control.at_roundoff[lane] = 0.0
+
+
+@njit
+def empty(lane, batch):
+    """Leave a lane without a joint."""
+    motion, control = batch.motion, batch.control
+    control.live[lane] = control.fresh[lane] = control.passed[lane] = 0.0
+    for i in range(N_DOF):  # no NaN: it would take all lanes to the paths of large rotations
+        motion.q[i, lane] = motion.v[i, lane] = motion.a[i, lane] = 0.0
 
 
 @njit

@@ -11,17 +11,31 @@ from tolstat.kernel.state import AHEAD, H_OLD
 
 
 @njit
-def predict(h, begins, state, options):
-    """Write a trial point that obeys the formula, in lanes that begin a step; return cv = dv/dq and ca = da/dq."""
-    h_old = state.memory[H_OLD]
+def formula(h, h_old):
+    """Return cv = dv/dq of a step `h`, and how much of the last point and of the one before a derivative has."""
     r = where(h_old > 0, h / h_old, 0.0)
-    cv, b1, b2 = (1 + 2 * r) / (1 + r) / h, -(1 + r) / h, r * r / (1 + r) / h
+    return (1 + 2 * r) / (1 + r) / h, -(1 + r) / h, r * r / (1 + r) / h
+
+
+@njit
+def trial(h, of, last, before, known, ahead):
+    """Trial values of an unknown and its derivatives that obey the formula.
+
+    `of`: what `formula` has returned; `last`: (q, v, a) of the last accepted point; `before`: (q, v) of the one before;
+    `ahead`: change of q to expect where one is `known`, else a Taylor series.
+    """
+    cv, b1, b2 = of
+    q = last[0] + where(known, ahead, h * (last[1] + 0.5 * h * last[2]))
+    v = cv * q + (b1 * last[0] + b2 * before[0])
+    return q, v, cv * v + (b1 * last[1] + b2 * before[1])
+
+
+@njit
+def predict(h, state, options):
+    """Write a trial point that obeys the formula; return cv = dv/dq and ca = da/dq."""
+    of = formula(h, state.memory[H_OLD])
     known = state.memory[AHEAD] > 0
     for i in range(state.q.size):
-        change = where(known, state.ahead[i], h * (state.v0[i] + 0.5 * h * state.a0[i]))
-        guess = state.q0[i] + change
-        v = cv * guess + (b1 * state.q0[i] + b2 * state.q1[i])
-        state.q[i] = where(begins, guess, state.q[i])
-        state.v[i] = where(begins, v, state.v[i])
-        state.a[i] = where(begins, cv * v + (b1 * state.v0[i] + b2 * state.v1[i]), state.a[i])
-    return cv, cv * cv
+        last, before = (state.q0[i], state.v0[i], state.a0[i]), (state.q1[i], state.v1[i])
+        state.q[i], state.v[i], state.a[i] = trial(h, of, last, before, known, state.ahead[i])
+    return of[0], of[0] * of[0]

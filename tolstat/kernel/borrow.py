@@ -1,7 +1,13 @@
-"""Arrays without an owner: to pass them on counts no reference, which took an eighth of the time in lanes."""
+"""Memory as lanes want it: arrays without an owner, and records asked for before they are used.
 
+To pass on arrays that have no owner counts no reference, which took an eighth of the time in lanes. Revolutions of as
+many joints as there are lanes do not fit the cache of a core: who reads them in turn waits for each, unless they come
+while other lanes are at work.
+"""
+
+from llvmlite import ir
 from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 from numba.np.arrayobj import make_array
 
 
@@ -25,3 +31,32 @@ def borrowed(typingctx, value):
         return _borrow(context, builder, value, args[0])
 
     return value(value), codegen
+
+
+CACHE_LINE = 64
+"""Bytes that come at a time."""
+
+
+def fetch(record):
+    """Ask for the memory of a record that will be read and written soon."""
+
+
+@intrinsic
+def _fetch(typingctx, record):
+    def codegen(context, builder, sig, args):
+        byte, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(ir.VoidType(), [byte, number, number, number]), "llvm.prefetch.p0"
+        )
+        start = builder.bitcast(args[0], byte)
+        for offset in range(0, sig.args[0].size, CACHE_LINE):
+            line = builder.gep(start, [number(offset)])
+            builder.call(function, [line, number(1), number(3), number(1)])  # to write, to all caches, data
+        return context.get_dummy_value()
+
+    return types.void(record), codegen
+
+
+@overload(fetch)
+def _fetch_record(record):
+    return lambda record: _fetch(record)

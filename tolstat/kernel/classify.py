@@ -86,7 +86,7 @@ def build_classify(advance):
             if not advance((k - 1) * h, h, par, options, work, one):
                 return False
             if recorded:
-                record(k, 0, par, work, one, ring.samples)
+                record(k, 0, True, par, work, one.v0, ring.samples)
                 keep(k, ring)
             if one.counters[ITERATIONS] > MAX_ITERATIONS * n * (options.max_revs + REVOLUTIONS):
                 return False

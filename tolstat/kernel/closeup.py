@@ -100,6 +100,12 @@ def gain(samples, out):
     return worst
 
 
+@njit
+def roughen(samples, out):
+    """Let what the samples have missed of peaks count as roughness: twice, as it would bend a curve between three."""
+    out.roughness = max(out.roughness, 2 * gain(samples, out))
+
+
 def build_closeup(advance, acceleration):
     """Bind a stepping scheme and the equations of motion.
 
@@ -111,7 +117,9 @@ def build_closeup(advance, acceleration):
 
     Returns
     -------
-    jitted function (par, options, work, state, ring, out) -> None
+    recall : jitted function (s, h, par, options, work, state, samples) -> None
+        Makes recorded sample `s` the last accepted point, the grid's steps being `h` long.
+    look_closer : jitted function (par, options, work, state, samples, fine, out) -> None
         Takes the steps about switches on peaks of the recorded revolution again, each in ``options.peak_substeps``, and
         extends the extremes in `out`, a row of RESULT. What it takes is counted in ``state.counters``. A peak that the
         samples have missed counts as roughness: twice its height, as it would bend the curve between three samples.
@@ -148,10 +156,10 @@ def build_closeup(advance, acceleration):
                 if not advance((n + k - 1) * h + i * part, part, par, options, work, state):
                     left = 0
                     break
-                record(j, 0, par, work, state, fine)
+                record(j, 0, True, par, work, state.v0, fine)
                 count_in(j, fine, out)
                 j += 1
         if j > 0:
-            out.roughness = max(out.roughness, 2 * gain(samples, out))
+            roughen(samples, out)
 
-    return look_closer
+    return recall, look_closer

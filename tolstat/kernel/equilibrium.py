@@ -6,7 +6,8 @@ while contacts find each other the inertia terms bound each step; once they carr
 equilibrium. Where there is none (no torque), the bound on steps ends it; what follows starts from where it got.
 """
 
-from tolstat.kernel._jit import closure
+from tolstat.kernel._jit import closure, njit
+from tolstat.kernel.integrate import LOST, at_rounding
 from tolstat.kernel.state import CV_FACTORISED
 
 HELD = 1e-200
@@ -15,12 +16,24 @@ CV_REGULAR, CA_REGULAR = 10.0, 100.0
 """cv (1/s) and ca (1/s^2) in the tangent of an equilibrium, as of an implicit step of 0.1 s: damping and inertia hold a
 direction that nothing else holds, and are a thousandth of what a loaded contact has. The residual has neither."""
 
+FAR = 1.0
+"""Size of an unknown, m or rad, beyond which no equilibrium is looked for: Newton's iteration has left the joint."""
+
 FIRST, LARGEST, SMALLEST = 3e-4, 1e-1, 1e-9
 """Pseudo-time steps, s."""
 GROWTH, SHRINK = 3.0, 0.3
 MAX_STEPS = 60
 ENOUGH = 1e-4
 """Static residual, in units of its scale, at which the start is good enough."""
+
+
+@njit
+def near(cv, ca, fresh, options, work, state):
+    """Whether the last change ends Newton's iteration for an equilibrium, as `integrate.at_rounding`, or it is lost."""
+    for i in range(state.q.size):
+        if abs(state.q[i]) > FAR:
+            return LOST
+    return at_rounding(cv, ca, fresh, options, work, state)
 
 
 def build_equilibrium(residual, newton, static_newton, size, guess):

@@ -11,6 +11,7 @@ grid allows. An unconverged point is never accepted.
 
 from tolstat.kernel import bdf2, generalized_alpha, quadrature, trbdf2
 from tolstat.kernel._jit import closure, njit
+from tolstat.kernel.lane import where
 from tolstat.kernel.state import (
     AHEAD,
     ATTEMPTS_LEFT,
@@ -21,14 +22,13 @@ from tolstat.kernel.state import (
     ITERATIONS,
     STEPS,
 )
-from tolstat.kernel.vector import larger
 from tolstat.tables import Method
 
 BDF2, GENERALIZED_ALPHA, TR_BDF2 = int(Method.BDF2), int(Method.GENERALIZED_ALPHA), int(Method.TR_BDF2)
 SLOW = 0.2
 """Contraction per iteration above which the tangent is renewed."""
 ROUNDOFF = 10 * 2.0**-52
-NO, IF_STALLED, YES = 0, 1, 2
+NO, IF_STALLED, YES, LOST = range(4)
 """Whether a change of the unknowns ends Newton's iteration."""
 ERROR_TO_GROW = 0.1
 """Estimated error, in units of the tolerance, below which a step may be doubled."""
@@ -59,7 +59,7 @@ def predict(h, stage, state, options):
         cv, ca = tr_predict(h, stage, state, options)
         return cv, ca, (trbdf2.GAMMA if stage == 0 else 1.0)
     if options.method == BDF2:
-        cv, ca = bdf2_predict(h, True, state, options)
+        cv, ca = bdf2_predict(h, state, options)
     else:
         cv, ca = alpha_predict(h, state, options)
     return cv, ca, 1.0
@@ -75,6 +75,26 @@ def accept(h, state, options):
         state.q0[i], state.v0[i], state.a0[i] = state.q[i], state.v[i], state.a[i]
     state.memory[H_OLD], state.memory[AHEAD] = h, 0.0
     state.counters[STEPS] += 1
+
+
+@njit
+def fitting(level, h, h_old, options):
+    """Least level from `level` on whose sub-step of h / 2^level is not too long after a step of `h_old`."""
+    while level < options.max_halvings and h_old > 0 and h / (1 << level) > 1.0001 * MAX_RATIO * h_old:
+        level += 1
+    return level
+
+
+@njit
+def grown(level, done, whole, error):
+    """Level of the next sub-step: longer ones where the grid allows them, and where they would not be refused.
+
+    `done`: parts of the step that are behind, of `whole`; `error`: of the last sub-step, in units of the tolerance.
+    """
+    while level > 0 and done % (whole >> (level - 1)) == 0 and error < ERROR_TO_GROW:
+        level -= 1
+        error *= 8
+    return level
 
 
 @njit
@@ -100,11 +120,12 @@ def estimate(h, state, options):
 
 @njit
 def scaled_size(cv, ca, state):
-    """Largest residual, weighted."""
-    size = 0.0
+    """Largest residual, weighted; NaN if one is."""
+    size = total = 0.0
     for i in range(state.q.size):
-        size = larger(size, abs(state.residual[i]) * state.weight[i])
-    return size
+        one = abs(state.residual[i]) * state.weight[i]
+        size, total = max(size, one), total + one
+    return where(total == total, size, total)  # a comparison a value, instead of two of which the next one waits
 
 
 @njit
@@ -150,6 +171,8 @@ def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding
                 v[i] += cv * change
                 a[i] += ca * change
             negligible = small(cv, ca, fresh, options, work, state)
+            if negligible == LOST:
+                break
         state.memory[CV_FACTORISED] = 0.0
         return False
 
@@ -181,10 +204,8 @@ def build_advance(newton):
         whole = 1 << options.max_halvings  # the step is counted in parts of its smallest sub-step
         done = 0
         while done < whole:
-            h_old = state.memory[H_OLD]
-            if h_old > 0 and (options.method == BDF2 or options.rtol > 0):
-                while level < options.max_halvings and h / (1 << level) > 1.0001 * MAX_RATIO * h_old:
-                    level += 1
+            if options.method == BDF2 or options.rtol > 0:
+                level = fitting(level, h, state.memory[H_OLD], options)
             if state.counters[ATTEMPTS_LEFT] <= 0:
                 return False
             state.counters[ATTEMPTS_LEFT] -= 1
@@ -193,10 +214,7 @@ def build_advance(newton):
             if good:
                 accept(part, state, options)
                 done += whole >> level
-                # a longer step where the grid allows it, and where it would not be refused for its error
-                while level > 0 and done % (whole >> (level - 1)) == 0 and error < ERROR_TO_GROW:
-                    level -= 1
-                    error *= 8
+                level = grown(level, done, whole, error)
             else:
                 level += 1
                 state.memory[AHEAD] = 0.0
@@ -230,7 +248,7 @@ def build_integrator(residual, factorise, solve, size=scaled_size, small=at_roun
         Norm of ``state.residual`` that is compared with ``options.newton_tol``.
     small : jitted function (cv, ca, fresh, options, work, state) -> int
         Whether the change just made, ``work.solution``, leaves nothing to gain: `NO`, `YES`, or `IF_STALLED` when it
-        does so only if the residual did not fall; `fresh` tells that its tangent is new.
+        does so only if the residual did not fall, `LOST` when there is no hope; `fresh` tells that its tangent is new.
 
     Returns
     -------

@@ -1,44 +1,45 @@
 """Joints in lock-step: as many as there are lanes go through Newton's iteration together, each at its own time.
 
 A round evaluates the residual of every lane once, at whatever trial point the lane has arrived at; then each lane is
-corrected, gets a new tangent, or begins its next step. Lanes never wait for each other's convergence, and a lane whose
-joint is finished takes the next one from the queue. What is rare a joint does alone, as `simulate` does it: its start,
-and a step that must be halved. What a lane does depends on its own joint only; so does every bit of the result.
+corrected, gets a new tangent, or goes on: from the search for an equilibrium to its first step, from sub-step to
+sub-step, from grid point to grid point, or from angle to angle. Lanes never wait for each other's convergence, and a
+lane whose joint is finished takes the next one from the queue. A joint that has not settled, or whose step or angle has
+failed for good, is begun anew alone, as `simulate` does it. What a lane does depends on its own joint only; so does
+every bit of the result.
 """
 
-from tolstat.kernel import bdf2
 from tolstat.kernel._jit import njit
-from tolstat.kernel.batch import get_counters, get_motion, put_joint, put_motion
+from tolstat.kernel.batch import ANGLE, HOLD, LOOK, STEP, empty, get_counters, put_joint, put_points, put_start, rest
 from tolstat.kernel.borrow import borrowed
-from tolstat.kernel.integrate import MAX_RATIO, ROUNDOFF, SLOW, START_LEVEL, scaled_size
+from tolstat.kernel.closeup import STEPS as STEPS_AGAIN
+from tolstat.kernel.closeup import on_a_peak, roughen, switches
+from tolstat.kernel.course import advance, aim, depart, find, glance, retry, step, turn
+from tolstat.kernel.equilibrium import HELD
 from tolstat.kernel.lane import WIDTH, any_of, bits_of, count_of, where
 from tolstat.kernel.lane_memory import as_lanes
-from tolstat.kernel.settle import foresee, record, summarise
+from tolstat.kernel.quasistatic import angle_time, speed_ratios
+from tolstat.kernel.rounds import begin, correct, renew, verdict
+from tolstat.kernel.settle import summarise
 from tolstat.kernel.simulate import (
+    DYNAMIC,
     NOT_SETTLED,
     OK,
-    assemble,
-    begin,
+    QUASISTATIC,
+    RAMP,
+    acceleration,
     clear,
     clear_results,
     conclude,
     describe,
-    eliminate,
     grid_step,
     inside_model,
     is_finite,
-    judge,
-    look_closer,
+    recall,
     residual,
-    set_weight,
+    rigid_guess,
     simulate_joint,
-    solve,
-    substeps,
 )
-from tolstat.kernel.state import AHEAD, H_OLD, HALVINGS, ITERATIONS
-from tolstat.kernel.topology import N_DOF
 
-bdf2_predict = bdf2.predict
 PATIENCE = 3
 """Lanes that make a new tangent together: it costs as much for one as for all, and those that wait stand still."""
 
@@ -50,76 +51,85 @@ def samples_of(lane, batch, samples):
 
 
 @njit
-def send(lane, k, batch):
-    """Send a lane to grid point `k`."""
-    control = batch.control
-    control.k[lane], control.t[lane] = k, (k - 1) * control.h[lane] + control.h[lane]
-    control.live[lane] = control.fresh[lane] = 1.0
+def leave(lane, good, rows, options, alone, batch, samples, results):
+    """Go on with a lane whose joint has settled, or has taken a step once more: to its next closer look, or out.
 
-
-@njit
-def leave(lane, settled, rows, options, alone, batch, samples, results):
-    """Write a lane's joint to its row of RESULT, and empty the lane. One that has not settled is begun anew, alone."""
+    Where that has not been `good`: a joint that has not settled is begun anew, alone; a closer look is ended.
+    """
     work, state, ring = alone
-    control, motion = batch.control, batch.motion
-    joint, own = control.joint[lane], samples_of(lane, batch, samples)
-    out = results[joint]
-    if settled:
+    control, joint, own = batch.control, batch.control.joint[lane], samples_of(lane, batch, samples)
+    par, out, k = rows[joint], results[joint], 0
+    if control.phase[lane] == LOOK:
+        control.left[lane] = control.left[lane] if good else 0
+        good, k = True, control.k[lane] + 1
+    elif good:
+        if options.fidelity == QUASISTATIC:
+            speed_ratios(par, own)
         summarise(own, out)
-    if settled and is_finite(out):
-        conclude(rows[joint], own, batch.notes[lane], out)
+        good = is_finite(out)
+        if good:
+            conclude(par, own, batch.notes[lane], out)
+        control.left[lane] = control.looked[lane] = 0
+    if good:
+        closer = options.fidelity == DYNAMIC and options.peak_substeps > 1
+        if closer and look(lane, k, par, options, alone, batch, own, out):
+            return
+        if control.looked[lane] > 0:
+            roughen(own, out)
         get_counters(lane, batch, state.counters)
-        if options.peak_substeps > 1:
-            set_weight(rows[joint], state)
-            look_closer(rows[joint], options, work, state, own, ring.fine, out)
         describe(OK, options, state.counters, out)
     else:
-        simulate_joint(rows[joint], options, work, state, ring, out)
+        simulate_joint(par, options, work, state, ring, out)
         for s in range(own.size):
             own[s] = ring.samples[s]
-    control.live[lane] = control.fresh[lane] = 0.0
-    for i in range(N_DOF):  # no NaN: it would take all lanes to the paths of large rotations
-        motion.q[i, lane] = motion.v[i, lane] = motion.a[i, lane] = 0.0
+    empty(lane, batch)
 
 
 @njit
-def walk(lane, k, level, rows, options, alone, batch, samples, results):
-    """Take a lane's joint alone to grid point `k`, and on until it can step as the lanes do, or is finished."""
+def look(lane, k, par, options, alone, batch, samples, out):
+    """Send a lane to the next step, from the one to sample `k` on, that `closeup.look_closer` takes again, if any."""
     work, state, _ = alone
-    control, notes = batch.control, batch.notes[lane]
-    joint, own = control.joint[lane], samples_of(lane, batch, samples)
-    par = rows[joint]
-    h = grid_step(par, options)
-    status = NOT_SETTLED
-    while status == NOT_SETTLED and k <= options.max_revs * options.steps_per_rev:
-        if not substeps((k - 1) * h, h, level, par, options, work, state):
-            break
-        record(k, 0, par, work, state, own)
-        state.memory[AHEAD] = foresee(k, state.q0, state.v0, state.ahead, own)
-        status = judge(k, state.counters[ITERATIONS], options, own, notes, results[joint])
-        k, level = k + 1, 0
-        if status == NOT_SETTLED and h <= 1.0001 * MAX_RATIO * state.memory[H_OLD]:
-            put_motion(lane, state, batch)
-            control.h[lane], control.factorised[lane] = h, 0.0
-            send(lane, k, batch)
-            return
-    put_motion(lane, state, batch)
-    leave(lane, status == OK, rows, options, alone, batch, samples, results)
+    control, n, h = batch.control, options.steps_per_rev, grid_step(par, options)
+    while k <= n:
+        if k < n and switches(k, samples) and on_a_peak(k, samples, out):
+            if control.left[lane] == 0:
+                recall(k - 1, h, par, options, work, state, samples)
+                put_points(lane, state, control, batch.motion)
+                control.looked[lane] = 0
+            control.left[lane] = STEPS_AGAIN
+        if control.left[lane] > 0:
+            control.left[lane] -= 1
+            control.phase[lane], control.k[lane], control.part[lane] = LOOK, k, 0
+            control.origin[lane], control.grid[lane] = (n + k - 1) * h, h / options.peak_substeps
+            control.done[lane] = control.level[lane] = 0
+            aim(lane, options, control, batch.motion)
+            return True
+        k += 1
+    return False
 
 
 @njit
 def enter(lane, joint, rows, words, options, alone, batch, samples, results):
-    """Start a joint, and put it into a lane."""
+    """Put a joint into a lane, to find its equilibrium from where all pins just touch."""
     work, state, _ = alone
+    par, control, motion = rows[joint], batch.control, batch.motion
     clear_results(results[joint])
-    batch.control.joint[lane] = joint
+    control.joint[lane], control.phase[lane] = joint, HOLD
     put_joint(lane, words[joint], batch)
-    if not inside_model(rows[joint]):
+    if not inside_model(par):
         leave(lane, False, rows, options, alone, batch, samples, results)
         return
-    clear(rows[joint], state, samples_of(lane, batch, samples), batch.notes[lane])
-    begin(rows[joint], options, work, state)
-    walk(lane, 1, min(START_LEVEL, options.max_halvings), rows, options, alone, batch, samples, results)
+    clear(par, state, samples_of(lane, batch, samples), batch.notes[lane])
+    control.origin[lane], control.grid[lane] = 0.0, grid_step(par, options)
+    control.t[lane] = 0.0 if options.fidelity == DYNAMIC else angle_time(0, options.steps_per_rev, par)
+    if options.fidelity == DYNAMIC and options.start == RAMP:
+        acceleration(0.0, state.q0, state.v0, par, options, work, state.a0)
+        put_start(lane, state, control, motion)
+        depart(lane, par, options, control, motion)
+    else:
+        rigid_guess(control.t[lane], par, work, state)
+        put_start(lane, state, control, motion)
+        rest(lane, HELD, 0.0, control, motion)
 
 
 @njit
@@ -129,125 +139,6 @@ def fill(lane, queued, rows, words, options, alone, batch, samples, results):
         enter(lane, queued, rows, words, options, alone, batch, samples, results)
         queued += 1
     return queued
-
-
-@njit
-def arrive(lane, par, work, motion, rows, options, alone, batch, samples, results):
-    """Record the grid point that a lane has reached, and send it on to the next."""
-    control, own = batch.control, batch.motion
-    k, here = control.k[lane], samples_of(lane, batch, samples)
-    record(k, lane, par, work, motion, here)
-    own.memory[AHEAD, lane] = foresee(k, own.q0[:, lane], own.v0[:, lane], own.ahead[:, lane], here)
-    status = judge(k, int(control.iterations[lane]), options, here, batch.notes[lane], results[control.joint[lane]])
-    if status != NOT_SETTLED or k == options.max_revs * options.steps_per_rev:
-        leave(lane, status == OK, rows, options, alone, batch, samples, results)
-    else:
-        send(lane, k + 1, batch)
-
-
-@njit
-def halve(lane, rows, options, alone, batch, samples, results):
-    """Take the step that has failed in a lane in halves."""
-    state = alone[1]
-    get_motion(lane, batch, state)
-    state.counters[HALVINGS] += 1
-    if options.max_halvings == 0:
-        leave(lane, False, rows, options, alone, batch, samples, results)
-    else:
-        walk(lane, batch.control.k[lane], 1, rows, options, alone, batch, samples, results)
-
-
-@njit
-def verdict(options, motion, control):
-    """Which lanes have solved their step, have failed to, need a new tangent, or are to be corrected: four masks."""
-    now = scaled_size(control.cv, control.ca, motion)
-    finite, live = now < 1e300, control.live > 0
-    solved = live & ((now <= options.newton_tol) | ((control.at_roundoff > 0) & finite))
-    failed = live & ~solved & (~finite | (control.iteration == options.newton_max_iter))
-    going = live & ~solved & ~failed
-    slow = (control.iteration > 0) & (now > SLOW * control.before)
-    stale = going & ((control.factorised != control.cv) | slow)
-    control.before = where(going & ~stale, now, control.before)
-    return solved, failed, stale, going & ~stale, now
-
-
-@njit
-def accept(solved, motion, control):
-    """Make the trial point of the lanes that have solved their step the last accepted one."""
-    for i in range(N_DOF):
-        motion.q1[i] = where(solved, motion.q0[i], motion.q1[i])
-        motion.v1[i] = where(solved, motion.v0[i], motion.v1[i])
-        motion.q0[i] = where(solved, motion.q[i], motion.q0[i])
-        motion.v0[i] = where(solved, motion.v[i], motion.v0[i])
-        motion.a0[i] = where(solved, motion.a[i], motion.a0[i])
-    motion.memory[H_OLD] = where(solved, control.h, motion.memory[H_OLD])
-    control.steps = where(solved, control.steps + 1, control.steps)
-
-
-@njit
-def keep_blocks(mask, new, old):
-    """Copy matrices, shape (n, m, m), in the lanes of the mask."""
-    for b in range(new.shape[0]):
-        for i in range(new.shape[1]):
-            for j in range(new.shape[2]):
-                old[b, i, j] = where(mask, new[b, i, j], old[b, i, j])
-
-
-@njit
-def keep_rows(mask, new, old):
-    """Copy vectors, shape (n, m), in the lanes of the mask."""
-    for b in range(new.shape[0]):
-        for i in range(new.shape[1]):
-            old[b, i] = where(mask, new[b, i], old[b, i])
-
-
-@njit
-def renew(mask, control, par, work, kept):
-    """Make a new tangent in the lanes of the mask; returns in which of all lanes that can be done."""
-    assemble(control.cv, control.ca, par, work)
-    good = eliminate(work)
-    keep_blocks(mask, work.lump_block, kept.lump_block)
-    keep_blocks(mask, work.hub_pin, kept.hub_pin)
-    keep_blocks(mask, work.pin_hub, kept.pin_hub)
-    keep_blocks(mask, work.pin_arm, kept.pin_arm)
-    keep_blocks(mask, work.arm_pin, kept.arm_pin)
-    keep_blocks(mask, work.core, kept.core)
-    keep_rows(mask, work.arm_psi, kept.arm_psi)
-    keep_rows(mask, work.psi_arm, kept.psi_arm)
-    keep_rows(mask, work.pin_psi, kept.pin_psi)
-    keep_rows(mask, work.psi_pin, kept.psi_pin)
-    control.factorised = where(mask, control.cv, control.factorised)
-    control.factorisations = where(mask, control.factorisations + 1, control.factorisations)
-    return good
-
-
-@njit
-def correct(mask, kept, motion, control):
-    """Newton's correction in the lanes of the mask."""
-    for i in range(N_DOF):
-        kept.solution[i] = -motion.residual[i]
-    solve(motion.q, kept)
-    step = largest = 0.0 * control.cv
-    for i in range(N_DOF):
-        change = where(mask, kept.solution[i], 0.0)
-        motion.q[i] = where(mask, motion.q[i] + change, motion.q[i])
-        motion.v[i] = where(mask, motion.v[i] + control.cv * change, motion.v[i])
-        motion.a[i] = where(mask, motion.a[i] + control.ca * change, motion.a[i])
-        step, largest = max(step, abs(change)), max(largest, abs(motion.q[i]))
-    control.at_roundoff = where(mask & (step <= ROUNDOFF * largest), 1.0, 0.0)
-    control.iteration = where(mask, control.iteration + 1, control.iteration)
-    control.iterations = where(mask, control.iterations + 1, control.iterations)
-
-
-@njit
-def begin_steps(options, motion, control):
-    """Make trial points in the lanes that begin a step."""
-    fresh = control.fresh > 0
-    cv, ca = bdf2_predict(control.h, fresh, motion, options)
-    control.cv, control.ca = where(fresh, cv, control.cv), where(fresh, ca, control.ca)
-    control.iteration = where(fresh, 0.0, control.iteration)
-    control.at_roundoff = where(fresh, 0.0, control.at_roundoff)
-    control.fresh = 0.0
 
 
 @njit
@@ -261,7 +152,7 @@ def lockstep(rows, words, options, patience, alone, batch, samples, results, tal
     words : ndarray, shape (n, words)
         The same memory as doubles.
     options : Options
-        Numerical settings; the method must be BDF2, without error control.
+        Numerical settings; quasi-static, or dynamic with BDF2 and without error control.
     patience : int
         Lanes that need a new tangent wait until there are so many of them; no result depends on it.
     alone : Scratch
@@ -279,14 +170,15 @@ def lockstep(rows, words, options, patience, alone, batch, samples, results, tal
     alone, batch = borrowed(alone), borrowed(batch)
     par, work, kept = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.kept)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
+    lanes, own, at = (par, work, motion), batch.motion, batch.control
     queued = 0
     for lane in range(WIDTH):
         put_joint(lane, words[0], batch)
-        batch.control.live[lane] = 0.0
+        empty(lane, batch)
         queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)
     while any_of(control.live > 0):
         if any_of(control.fresh > 0):
-            begin_steps(options, motion, control)
+            begin(options, motion, control)
         residual(control.t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
         solved, failed, stale, moving, now = verdict(options, motion, control)
         tally[0] += 1
@@ -297,16 +189,26 @@ def lockstep(rows, words, options, patience, alone, batch, samples, results, tal
             tally[2] += 1
             control.before = where(stale, now, control.before)
             failed, moving = failed | (stale & ~good), moving | (stale & good)
-        if any_of(solved):
-            accept(solved, motion, control)
-        correct(moving, kept, motion, control)
+        failed = failed | correct(moving, kept, motion, control)
         acting = bits_of(solved | failed)
         arrived = bits_of(solved)
         for lane in range(WIDTH):
             if (acting >> lane) & 1 == 0:
                 continue
-            if (arrived >> lane) & 1:
-                arrive(lane, par, work, motion, rows, options, alone, batch, samples, results)
-            else:
-                halve(lane, rows, options, alone, batch, samples, results)
-            queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)
+            joint, phase, status = at.joint[lane], at.phase[lane], NOT_SETTLED
+            if (arrived >> lane) & 1 == 0:
+                status = retry(lane, rows[joint], options, at, own)
+            elif phase == ANGLE:
+                here = samples_of(lane, batch, samples)
+                status = turn(lane, rows[joint], lanes, options, at, own, here, results[joint])
+            elif phase < STEP:
+                find(lane, rows[joint], options, at, own)
+            elif advance(lane, options, at, own):
+                if phase == STEP:
+                    here = samples_of(lane, batch, samples)
+                    status = step(lane, lanes, options, at, own, here, batch.notes[lane], results[joint])
+                else:
+                    status = glance(lane, rows[joint], lanes, options, at, own, batch.fine[lane], results[joint])
+            if status != NOT_SETTLED:
+                leave(lane, status == OK, rows, options, alone, batch, samples, results)
+                queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)

@@ -4,7 +4,7 @@ from tolstat.kernel._jit import njit
 from tolstat.kernel.contact import contact_load
 from tolstat.kernel.lane import fma
 from tolstat.kernel.lane_memory import as_lanes
-from tolstat.kernel.simulate import assemble, begin, clear, eliminate, residual, solve
+from tolstat.kernel.simulate import assemble, begin, clear, eliminate, residual, rigid_guess, solve
 from tolstat.kernel.topology import N_DOF
 
 RESIDUAL, CONTACT, ASSEMBLY, ELIMINATION, SUBSTITUTION = range(5)
@@ -51,6 +51,15 @@ def start(rows, options, alone):
     for i in range(len(rows)):
         clear(rows[i], state, ring.samples, ring.trail.notes)
         begin(rows[i], options, work, state)
+
+
+@njit
+def guess(rows, alone):
+    """Do what of the start of every joint of `rows` is not done in lanes."""
+    work, state, ring = alone
+    for i in range(len(rows)):
+        clear(rows[i], state, ring.samples, ring.trail.notes)
+        rigid_guess(0.0, rows[i], work, state)
 
 
 @njit

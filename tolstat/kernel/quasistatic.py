@@ -11,6 +11,7 @@ transient continuation finds the equilibrium from there.
 import math
 
 from tolstat.kernel._jit import closure, njit
+from tolstat.kernel.lane import where
 from tolstat.kernel.motion import speed_ratio
 from tolstat.kernel.state import AHEAD, HALVINGS, STEPS
 from tolstat.kernel.topology import PSI
@@ -18,17 +19,24 @@ from tolstat.kernel.vector import larger
 
 
 @njit
-def extrapolate(known, state):
-    """Trial point: through the last four equally spaced angles, or three if no more are `known` or that was better.
+def angle_time(k, n, par):
+    """Time (s) at angle `k` of `n`, from the second revolution on: a torque that rises at the start has risen."""
+    return 2 * math.pi * (n + k) / (n * abs(par.omega))
 
-    ``state.aux`` and ``state.a1`` are the third and fourth last.
+
+@njit
+def extrapolate(begins, known, state):
+    """Trial point, in lanes that begin an angle, when `known` angles are solved.
+
+    Through the last four equally spaced angles, or three where no more are known or where that was better;
+    ``state.aux`` and ``state.a1`` are the third and fourth last. Before that, the angle before.
     """
-    cubic = known > 3 and state.memory[AHEAD] > 0
+    cubic, square = (known > 3) & (state.memory[AHEAD] > 0), known > 2
     for i in range(state.q.size):
-        if cubic:
-            state.q[i] = 4 * (state.q0[i] + state.aux[i]) - 6 * state.q1[i] - state.a1[i]
-        else:
-            state.q[i] = 3 * (state.q0[i] - state.q1[i]) + state.aux[i]
+        by_four = 4 * (state.q0[i] + state.aux[i]) - 6 * state.q1[i] - state.a1[i]
+        by_three = 3 * (state.q0[i] - state.q1[i]) + state.aux[i]
+        guess = where(cubic, by_four, where(square, by_three, state.q0[i]))
+        state.q[i] = where(begins, guess, state.q[i])
 
 
 @njit
@@ -39,43 +47,45 @@ def stay(state):
 
 
 @njit
-def keep(state):
-    """Make the trial point the last angle's solution; ``state.memory[AHEAD]``: whether four angles foretold it best."""
-    by_three = by_four = 0.0
+def keep(solved, state):
+    """Make the trial point the last angle's solution, in lanes that have one.
+
+    ``state.memory[AHEAD]``: whether four angles foretold it better than three.
+    """
+    by_three = by_four = 0.0 * state.q[0]
     for i in range(state.q.size):
         third = state.q[i] - 3 * (state.q0[i] - state.q1[i]) - state.aux[i]
         by_three += abs(third)
         by_four += abs(third - (state.q0[i] - 3 * (state.q1[i] - state.aux[i]) - state.a1[i]))
-    state.memory[AHEAD] = 1.0 if by_four < by_three else 0.0
-    for i in range(state.q.size):
-        state.a1[i], state.aux[i] = state.aux[i], state.q1[i]
-        state.q1[i], state.q0[i] = state.q0[i], state.q[i]
-    state.counters[STEPS] += 1
+        state.a1[i] = where(solved, state.aux[i], state.a1[i])
+        state.aux[i] = where(solved, state.q1[i], state.aux[i])
+        state.q1[i] = where(solved, state.q0[i], state.q1[i])
+        state.q0[i] = where(solved, state.q[i], state.q0[i])
+    state.memory[AHEAD] = where(solved, where(by_four < by_three, 1.0, 0.0), state.memory[AHEAD])
 
 
 @njit
-def end_closure(ring):
+def end_closure(samples):
     """Change of the loads' moduli at theta = 0 over the revolution, relative to the largest of their kind."""
     worst = 0.0
     for kind in (0, 1):
         largest = 0.0
-        for s in range(ring.samples.size):
+        for s in range(samples.size):
             for b in range(8):
-                largest = max(largest, ring.samples[s].modulus[b, kind])
-        change = ring.samples[0].change[kind]
+                largest = max(largest, samples[s].modulus[b, kind])
+        change = samples[0].change[kind]
         worst = larger(worst, change / largest if largest > 0 else change)
     return worst
 
 
 @njit
-def speed_ratios(par, ring):
+def speed_ratios(par, samples):
     """Write ``tau`` and ``psi`` of the samples from the deviation of the output shaft's angle, which ``tau`` holds.
 
     Its slope over the input angle is taken by central differences around the revolution.
     """
-    n = ring.samples.size
+    n = samples.size
     by_sample = n / (4 * math.pi) if par.omega > 0 else -n / (4 * math.pi)
-    samples = ring.samples
     first, before = samples[0].tau, samples[n - 1].tau
     for s in range(n):
         here, ahead = samples[s].tau, samples[s + 1].tau if s + 1 < n else first
@@ -92,26 +102,22 @@ def build_quasistatic(hold, relax, record):
     ----------
     hold, relax : jitted functions
         As `equilibrium.build_equilibrium` makes them.
-    record : jitted function (k, lane, par, work, state, samples) -> None
+    record : jitted function (k, lane, in_full, par, work, v, samples) -> None
         Keeps an angle.
 
     Returns
     -------
     jitted function (first, par, options, work, state, ring) -> bool
         Goes once around from the equilibrium ``state.q0`` at theta = 0; False when an angle has none in reach.
-        ``first``: whether there is no revolution before, whose last angles the extrapolation could use.
+        ``first``: whether there is no revolution before.
     """
 
     @closure
     def revolution(first, par, options, work, state, ring):
         n = ring.samples.size
         for k in range(0 if first else 1, n + 1):
-            # from the second revolution on: a torque that rises at the start (Start.RAMP) has risen
-            t = 2 * math.pi * (n + k) / (n * abs(par.omega))
-            if first and k < 3:
-                stay(state)
-            else:
-                extrapolate(k if first else n, state)
+            t = angle_time(k, n, par)
+            extrapolate(True, state.counters[STEPS], state)
             if not hold(t, par, options, work, state):
                 state.counters[HALVINGS] += 1
                 stay(state)
@@ -120,8 +126,9 @@ def build_quasistatic(hold, relax, record):
                     stay(state)
                     if not hold(t, par, options, work, state):
                         return False
-            keep(state)
-            record(k, 0, par, work, state, ring.samples)
+            keep(True, state)
+            state.counters[STEPS] += 1
+            record(k, 0, True, par, work, state.v0, ring.samples)
             ring.samples[k % n].tau = state.q0[PSI]
         return True
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.kernel._jit import njit
+from tolstat.kernel.borrow import fetch
 from tolstat.kernel.lane import pick
 from tolstat.kernel.state import make_state_record
 from tolstat.kernel.topology import N_DOF, PSI
@@ -67,27 +68,35 @@ def skew(lane, work):
 
 
 @njit
-def record(k, lane, par, work, state, samples):
-    """Keep grid point `k` (counted from the start) of the joint in `lane`, as it was last evaluated."""
+def record(k, lane, in_full, par, work, v, samples):
+    """Keep grid point `k` (counted from the start) of the joint in `lane`, as it was last evaluated with rates `v`.
+
+    `in_full`: whether more is wanted than the loads' moduli, which the next revolution is compared with.
+    """
     sample = samples[k % samples.size]
-    sample.change[0] = sample.change[1] = 0.0
+    of_force = of_torque = 0.0
     for b in range(8):
         for kind in (0, 1):
             square = 0.0
             for i in range(3):
                 load = pick(work.load[b, 3 * kind + i], lane)
-                sample.loads[b, 3 * kind + i] = load
                 square += load * load
+                if in_full:
+                    sample.loads[b, 3 * kind + i] = load
             modulus = math.sqrt(square)
             change = abs(modulus - sample.modulus[b, kind])  # NaN in the first revolution
-            sample.change[kind] = larger(sample.change[kind], change)
+            of_force = larger(of_force, change) if kind == 0 else of_force
+            of_torque = larger(of_torque, change) if kind == 1 else of_torque
             sample.modulus[b, kind] = modulus
+    sample.change[0], sample.change[1] = of_force, of_torque
+    if not in_full:
+        return
     for pin in range(4):
         for side in (0, 1):
             sample.contact[pin, side] = pick(work.contact[pin, side], lane)
         sample.mode[pin] = int(pick(work.mode[pin], lane))
     sample.skew = skew(lane, work)
-    omega, rate = pick(par.omega, lane), pick(state.v0[PSI], lane)
+    omega, rate = pick(par.omega, lane), pick(v[PSI], lane)
     sample.tau = (pick(work.shaft[0], lane) + rate) / omega
     sample.psi = rate / (omega * sample.tau)
 
@@ -101,11 +110,16 @@ def foresee(k, q, v, ahead, samples):
     float
         1 when there was one, else 0: then nothing is known.
     """
-    here, following = samples[k % samples.size], samples[(k + 1) % samples.size]
+    n = samples.size
+    here, following = samples[k % n], samples[(k + 1) % n]
+    fetch(samples[(k + 2) % n])
+    known = k > n
     for i in range(N_DOF):
-        ahead[i] = following.q[i] - here.q[i]
-        here.q[i], here.v[i] = q[i], v[i]
-    return 1.0 if k > samples.size else 0.0
+        if known:
+            ahead[i] = following.q[i] - here.q[i]
+            here.v[i] = v[i]
+        here.q[i] = q[i]
+    return 1.0 if known else 0.0
 
 
 @njit

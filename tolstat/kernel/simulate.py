@@ -9,10 +9,10 @@ from tolstat.kernel import dynamics, integrate, linsolve, tangent
 from tolstat.kernel._jit import njit
 from tolstat.kernel.classify import build_classify
 from tolstat.kernel.closeup import build_closeup
-from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium
+from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium, near
 from tolstat.kernel.guess import rigid_guess
 from tolstat.kernel.ideal_loads import ideal_loads
-from tolstat.kernel.quasistatic import build_quasistatic, end_closure, speed_ratios
+from tolstat.kernel.quasistatic import angle_time, build_quasistatic, end_closure, speed_ratios
 from tolstat.kernel.settle import Ring, closure_error, foresee, keep, make_ring, record, summarise
 from tolstat.kernel.state import AHEAD, FACTORISATIONS, HALVINGS, ITERATIONS, STEPS, make_state_record
 from tolstat.kernel.topology import N_DOF, N_LUMPS, PSI
@@ -52,11 +52,11 @@ def factorise_static(t, q, v, a, cv, ca, par, options, work):
 
 newton = integrate.build_newton(residual, factorise, solve)
 substeps, advance = integrate.build_advance(newton)
-static_newton = integrate.build_newton(residual, factorise_static, solve)
+static_newton = integrate.build_newton(residual, factorise_static, solve, small=near)
 hold, relax, equilibrium = build_equilibrium(residual, newton, static_newton, integrate.scaled_size, rigid_guess)
 revolution = build_quasistatic(hold, relax, record)
 classify = build_classify(advance)
-look_closer = build_closeup(advance, acceleration)
+recall, look_closer = build_closeup(advance, acceleration)
 reset = integrate.reset
 
 
@@ -134,7 +134,7 @@ def run_ideal(par, work, state, ring, out):
     n = ring.samples.size
     for k in range(n):
         ideal_loads(math.copysign(2 * math.pi * k / n, par.omega), par, state, work)
-        record(k, 0, par, work, state, ring.samples)
+        record(k, 0, True, par, work, state.v0, ring.samples)
     out.closure, out.revolutions = 0.0, 1.0
     state.counters[STEPS] = n
     return OK
@@ -144,16 +144,16 @@ def run_ideal(par, work, state, ring, out):
 def run_quasistatic(par, options, work, state, ring, out):
     """Go around through equilibria, again where a revolution does not end where it began."""
     n = ring.samples.size
-    equilibrium(2 * math.pi / abs(par.omega), par, options, work, state)
+    equilibrium(angle_time(0, n, par), par, options, work, state)
     for revolutions in range(options.max_revs):
         if not revolution(revolutions == 0, par, options, work, state, ring):
             return NEWTON_FAILED
-        out.closure, out.revolutions = end_closure(ring), revolutions + 1.0
+        out.closure, out.revolutions = end_closure(ring.samples), revolutions + 1.0
         if out.closure <= options.settle_tol:
             break
         if state.counters[ITERATIONS] > MAX_ITERATIONS * n * options.max_revs:
             return NEWTON_FAILED
-    speed_ratios(par, ring)
+    speed_ratios(par, ring.samples)
     return OK if out.closure <= options.settle_tol else NOT_SETTLED
 
 
@@ -198,7 +198,7 @@ def run_dynamic(par, options, work, state, ring, out):
         if not advance((k - 1) * h, h, par, options, work, state):
             out.failed_step = k
             return NEWTON_FAILED
-        record(k, 0, par, work, state, ring.samples)
+        record(k, 0, k > n or options.max_revs == 1, par, work, state.v0, ring.samples)
         state.memory[AHEAD] = foresee(k, state.q0, state.v0, state.ahead, ring.samples)
         if k > half:
             keep(k, ring)

@@ -151,14 +151,16 @@ def measure(these: Sample, rounds: int) -> Iteration:
     start_iterations, start_tangents = _start_counts(these, len(params))
     iterations, tangents = mean["newton_iterations"] - start_iterations, mean["factorisations"] - start_tangents
     one = np.array([iterations + mean["steps"] + mean["halvings"], tangents, iterations])
+    # in lanes an equilibrium is found as a step is solved: its iterations, and the residual that ends them
+    own = one + np.array([start_iterations + 1, start_tangents, start_iterations])
     lanes = WIDTH / len(params) * np.array([rounds_done, renewals, rounds_done])
     operations = _operations(snaps)
     peak = 2 * WIDTH * CHAINS * PEAK_TIMES / float(times.seconds["peak"].min())
-    start = times.least("start") / len(params)
+    start = {name: times.least(f"{name} start") / len(params) for name in ("lanes", "alone")}
     whole = {name: times.least(name) / len(params) for name in ("lanes", "alone")}
     splits = {
-        name: split(whole[name], start, once[name], counts, one, mean["newton_iterations"], operations, peak)
-        for name, counts in (("lanes", lanes), ("alone", one))
+        name: split(whole[name], start[name], once[name], done, of_use, mean["newton_iterations"], operations, peak)
+        for name, done, of_use in (("lanes", lanes, own), ("alone", one, one))
     }
     per_iteration = one / iterations
     dense = against(times, once, TIMES // 10 * len(snaps), per_iteration)
@@ -198,7 +200,8 @@ def _tasks(these: Sample, snaps: list[Snapshot]) -> dict[str, Callable[[], objec
     tasks: dict[str, Callable[[], object]] = {
         "lanes": lambda: simulation.simulate_rows(params, options),
         "alone": lambda: alone(params, options),
-        "start": lambda: parts.start(params.view(np.recarray), options, scratch),
+        "lanes start": lambda: parts.guess(params.view(np.recarray), scratch),
+        "alone start": lambda: parts.start(params.view(np.recarray), options, scratch),
         "peak": lambda: parts.multiply_add(PEAK_TIMES, batch),
     }
     for name in Once._fields:

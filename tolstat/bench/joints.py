@@ -71,7 +71,8 @@ class Sample(NamedTuple):
     params : ndarray of PARAM, shape (n,)
         They have one contact law and one number of stations.
     options : Options
-        The study's settings, with BDF2 at fixed steps and dynamic fidelity: what goes in lanes.
+        The study's settings, with BDF2 at fixed steps, dynamic fidelity and no refinement: the same work in lanes and
+        alone.
     """
 
     params: Table
@@ -87,7 +88,7 @@ def sample(study: Study, n: int) -> Sample:
     params = perturbed(study, rows, errors, joint.perturb)
     alike = (params["law"] == params["law"][0]) & (params["n_stations"] == params["n_stations"][0])
     options = study.solver.options()
-    fixed = options._replace(fidelity=int(Fidelity.DYNAMIC), method=int(Method.BDF2), rtol=0.0)
+    fixed = options._replace(fidelity=int(Fidelity.DYNAMIC), method=int(Method.BDF2), rtol=0.0, max_refinements=0)
     return Sample(np.ascontiguousarray(params[alike]), fixed)
 
 

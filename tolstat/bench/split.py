@@ -25,7 +25,7 @@ class Parts(NamedTuple):
     Attributes
     ----------
     start : float
-        Equilibrium that a joint starts from.
+        Equilibrium that a joint starts from; in lanes the guess only, from which on it is one of the lanes.
     contact : float
         Contacts, once a residual.
     bodies : float
@@ -62,7 +62,7 @@ class Split:
     iteration_us : float
         Time of a joint over its Newton iterations, µs.
     residuals, tangents, solutions : float
-        How often a joint has them done after its start; in lanes idle ones count too.
+        How often a joint has them done, in lanes with its start, alone after it; in lanes idle ones count too.
     flops : float
         Operations of a joint in the parts counted (not start and rest), idle lanes left out.
     gflops : float

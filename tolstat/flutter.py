@@ -1,7 +1,7 @@
 """Flutter of the contacts: motions that settle at the steps taken and in truth do not.
 
 The law ``mode`` is not the gradient of a potential: the force of one end of a pin changes with the penetration of the
-other in another way than the reverse. Where contact damping does not hold that, pin and arm flutter at 5 to 50 kHz,
+other in another way than the reverse. Where damping does not hold that, pins, arms and hub flutter at 4 to 50 kHz,
 which the method damps at any step that a revolution needs. So it is looked for where it begins: in the eigenvalues of
 the equations of motion, linearised about the recorded revolution.
 """
@@ -15,14 +15,24 @@ from tolstat.tables import PARAM, Law, Mode, Options
 
 LEAST_SKEW = 0.7
 """Antisymmetric stiffness, in units of what damping holds (``skew``), above which eigenvalues are looked at."""
+LEAST_DEPTH = 0.6
+"""Force of a contact along both ends of a pin above which they are, in units of k2u^2/k1u: there the quadratic term of
+the contact's law approaches the linear one, and contacts stiffen to the frequencies of bushings."""
+BARELY = 0.01
+"""Damping ratio of a pin with its arm below which all bodies are looked at together; bushings alone give twice that."""
 ANGLES = 36
-"""Input angles of a revolution at which they are."""
+"""Input angles of a revolution at which eigenvalues are looked at."""
+CLEAR = 10.0
+"""Exponent at which the angles between would not change the verdict."""
+FOLLOWED = 0.2
+"""Phase of an oscillation in a step (rad) below which the integration itself shows whether it grows."""
 
 FloatArray = NDArray[np.float64]
+Angles = NDArray[np.intp]
 
 
-def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.void]) -> float:
-    """Largest growth of a small disturbance of a pin and its arm along the recorded revolution.
+def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.void], result: NDArray[np.void]) -> float:
+    """Largest growth of a small disturbance along the recorded revolution, at frequencies that the steps damp.
 
     Parameters
     ----------
@@ -32,54 +42,104 @@ def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.voi
         Settings that it was simulated with.
     samples : ndarray of SAMPLE, shape (steps_per_rev,)
         Its last revolution.
+    result : ndarray of RESULT, shape (1,)
+        What was made of the joint.
 
     Returns
     -------
     float
-        Logarithm of the growth over at most two revolutions; 0 where every disturbance decays. Each pin is taken with
-        its arm alone, all other bodies moving as recorded: at these frequencies the bushings part them.
+        Logarithm of the growth over at most two revolutions; 0 where every disturbance decays. At each angle it grows
+        as the fastest eigenvector there: at these frequencies the recorded motion is slow.
     """
-    period = 2 * np.pi / abs(float(params["omega"][0]))
-    chosen = np.unique(np.arange(ANGLES) * len(samples) // ANGLES)
-    rates = _rates(params, options, samples, chosen, period)
-    steps = np.diff(np.append(chosen, len(samples))) * period / len(samples)
-    worst = 0.0
-    for pin in rates.T:
-        grown = 0.0
-        for growth in np.tile(pin * steps, 2).tolist():
-            grown = max(0.0, grown + growth)
-            worst = max(worst, grown)
+    n, period = len(samples), 2 * np.pi / abs(float(params["omega"][0]))
+    least = FOLLOWED * n / period
+    chosen = np.unique(np.arange(ANGLES) * n // ANGLES)
+    matrices = _jacobians(params, options, samples, chosen)
+    if not is_deep(params, result)[0] and _least_damping(matrices, samples["mode"][chosen], least) > BARELY:
+        return 0.0
+    rates = _rates(matrices, samples["mode"][chosen], least)
+    found = _growth(rates, chosen, n, period)
+    between = _between(rates > 0, chosen, n)
+    if not 0 < found < CLEAR or not between.size:
+        return found
+    matrices = _jacobians(params, options, samples, between)
+    rates = np.append(rates, _rates(matrices, samples["mode"][between], least))
+    chosen = np.append(chosen, between)
+    order = np.argsort(chosen)
+    return _growth(rates[order], chosen[order], n, period)
+
+
+def _growth(rates: FloatArray, chosen: Angles, n: int, period: float) -> float:
+    """Largest sum of rates times time from any angle on; each of those `chosen`, of `n`, stands until the next."""
+    steps = np.diff(np.append(chosen, n)) * period / n
+    worst = grown = 0.0
+    for growth in np.tile(rates * steps, 2).tolist():
+        grown = max(0.0, grown + growth)
+        worst = max(worst, grown)
     return worst
 
 
-def _rates(
-    params: NDArray[np.void], options: Options, samples: NDArray[np.void], chosen: NDArray[np.intp], period: float
-) -> FloatArray:
-    """Largest real part of an eigenvalue of each pin with its arm, (angles, 4), 1/s; -inf but for uniform contact."""
+def _between(unstable: NDArray[np.bool_], chosen: Angles, n: int) -> Angles:
+    """Angles between two that are `chosen` of `n` and of which one at least is unstable."""
+    ends = np.append(chosen[1:], n)
+    either = unstable | np.roll(unstable, -1)
+    inner = [np.arange(a + 1, b) for a, b in zip(chosen[either], ends[either], strict=True)]
+    return np.concatenate(inner) if inner else np.empty(0, np.intp)
+
+
+def _jacobians(params: NDArray[np.void], options: Options, samples: NDArray[np.void], chosen: Angles) -> FloatArray:
+    """Equations of motion, linearised about the recorded revolution: (angles, 110, 110), 1/s."""
     from tolstat.kernel import first_order as kernel
-    from tolstat.kernel.topology import ARM, ARM_OF_PIN, N_DOF, PIN
+    from tolstat.kernel.topology import N_DOF
     from tolstat.kernel.work import WORK
 
-    works, column, whole = np.zeros(1, WORK), np.empty((3, 2 * N_DOF)), np.empty((2 * N_DOF, 2 * N_DOF))
-    rows = params.view(np.recarray)
-    rates = np.full((len(chosen), 4), -np.inf)
-    for i, s in enumerate(chosen.tolist()):
-        touching = np.flatnonzero(samples["mode"][s] == Mode.UNIFORM)
-        if not touching.size:
-            continue
-        t = period * (1 + s / len(samples))
+    works, column = np.zeros(1, WORK), np.empty((3, 2 * N_DOF))
+    matrices = np.empty((len(chosen), 2 * N_DOF, 2 * N_DOF))
+    period = 2 * np.pi / abs(float(params["omega"][0]))
+    for matrix, s in zip(matrices, chosen.tolist(), strict=True):
         state = np.concatenate([samples["q"][s], samples["v"][s]])
-        kernel.jacobian_of_row(t, state, rows, options, works, column, whole)
-        for pin in touching.tolist():
-            own = np.concatenate([6 * body + np.arange(6) for body in (PIN + pin, ARM + ARM_OF_PIN[pin])])
-            own = np.concatenate([own, N_DOF + own])
-            rates[i, pin] = np.linalg.eigvals(whole[np.ix_(own, own)]).real.max()
+        t = period * (1 + s / len(samples))
+        kernel.jacobian_of_row(t, state, params.view(np.recarray), options, works, column, matrix)
+    return matrices
+
+
+def _least_damping(matrices: FloatArray, modes: NDArray[np.uint8], least: float) -> float:
+    """Smallest damping ratio of pins that touch with both ends, each with its arm alone, above `least` rad/s."""
+    from tolstat.kernel.topology import ARM, ARM_OF_PIN, N_DOF, PIN
+
+    worst = np.inf
+    for pin in range(4):
+        own = np.concatenate([6 * body + np.arange(6) for body in (PIN + pin, ARM + ARM_OF_PIN[pin])])
+        own = np.concatenate([own, N_DOF + own])
+        values = np.linalg.eigvals(matrices[modes[:, pin] == Mode.UNIFORM][:, own[:, None], own])
+        values = values[np.abs(values.imag) > least]
+        worst = min(worst, (-values.real / np.abs(values)).min(initial=np.inf))
+    return worst
+
+
+def _rates(matrices: FloatArray, modes: NDArray[np.uint8], least: float) -> FloatArray:
+    """Largest growth of an oscillation faster than `least` rad/s at each angle, 1/s.
+
+    It is -inf where no pin touches with both ends: all stiffness is symmetric then.
+    """
+    touching = (modes == Mode.UNIFORM).any(axis=1)
+    values = np.linalg.eigvals(matrices[touching])
+    rates = np.full(len(matrices), -np.inf)
+    rates[touching] = np.where(np.abs(values.imag) > least, values.real, -np.inf).max(axis=1, initial=-np.inf)
     return rates
+
+
+def is_deep(params: NDArray[np.void], results: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Whether a contact along both ends of a pin is pressed deep enough to stiffen, (n,)."""
+    both_ends = results["mode_share"][:, :, Mode.UNIFORM] > 0
+    force = np.where(both_ends, results["contact_max"].max(axis=2), 0.0).max(axis=1)
+    return np.asarray(force * params["k1u"] > LEAST_DEPTH * params["k2u"] ** 2)
 
 
 def may_flutter(params: NDArray[np.void], results: NDArray[np.void]) -> NDArray[np.bool_]:
     """Which joints are worth looking at, (n,), by their parameters and results."""
-    return np.asarray((params["law"] == Law.MODE) & (results["skew"] > LEAST_SKEW))
+    skewed = results["skew"] > LEAST_SKEW
+    return np.asarray((params["law"] == Law.MODE) & (skewed | is_deep(params, results)))
 
 
 def warm_up(options: Options) -> None:

@@ -21,10 +21,15 @@ ROUGH, AT_STEPS = 0.02, 180
 they go with the square of a step."""
 RESOLVED = 2e-3
 """Change of the largest loads at which a refinement is the last if it leaves no roughness, relative to their kind's."""
+LIVELY, SMOOTH = 1e-3, 1e-3
+"""|Psi| and roughness above which deviations from the ideal motion are lively: their ringing can be damped at few steps
+to less than shows as roughness, and change little from one refinement to the next before it is resolved."""
+SURE_STEPS = 2880
+"""Steps a revolution to which lively joints are refined even if nothing changes."""
 UNRESOLVED = 5e-3
 """Change in the last refinement allowed that a joint may not exceed."""
-GROWN = 3.0
-"""Exponent of growth (`flutter`) above which a motion is not resolved: a disturbance becomes 20 times as large."""
+GROWN = 2.0
+"""Exponent of growth (`flutter`) above which a motion is not resolved: a disturbance becomes 7 times as large."""
 COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")
 """What a joint has cost: all its runs together."""
 
@@ -32,7 +37,7 @@ Simulate = Callable[[NDArray[np.intp], Options], NDArray[np.void]]
 
 
 def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> None:
-    """Simulate rough joints again with finer steps, until they change no more.
+    """Simulate rough and lively joints again with finer steps, until they change no more.
 
     Parameters
     ----------
@@ -45,8 +50,12 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     """
     if options.fidelity != Fidelity.DYNAMIC:
         return
-    rough = ROUGH * max(1.0, AT_STEPS / options.steps_per_rev) ** 2
-    rows = np.flatnonzero((results["status"] == Status.OK) & (results["roughness"] > rough))
+    coarse = max(1.0, AT_STEPS / options.steps_per_rev) ** 2
+    rough = ROUGH * coarse
+    lively = (results["psi_max"] > LIVELY) & (results["roughness"] > SMOOTH * coarse)
+    gentle = lively & (results["roughness"] <= rough)
+    unsure = (results["roughness"] > rough) | (lively & (options.steps_per_rev < SURE_STEPS))
+    rows = np.flatnonzero((results["status"] == Status.OK) & unsure)
     for _ in range(options.max_refinements):
         finer = options._replace(steps_per_rev=FACTOR * options.steps_per_rev)
         if not rows.size or finer.steps_per_rev > MOST_STEPS:
@@ -59,10 +68,13 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
         results["status"][rows[~known]] = Status.NOT_RESOLVED
         results[rows[known]] = found[known]
         results["refinement_change"][rows] = change
-        still = (change > RESOLVED) | (found["roughness"] > rough)
-        rows = rows[known & (found["status"] == Status.OK) & still]
-    far = rows[results["refinement_change"][rows] > UNRESOLVED]
-    results["status"][far] = Status.NOT_RESOLVED
+        early = options.steps_per_rev < SURE_STEPS
+        still = (change > RESOLVED) | (found["roughness"] > rough) | (lively[rows] & early)
+        # steps that neither damp ringing nor resolve it can keep a joint from settling
+        worth = (found["status"] == Status.OK) | (gentle[rows] & early)
+        rows = rows[known & still & worth]
+    far = results["refinement_change"][rows] > UNRESOLVED
+    results["status"][rows[far & (results["status"][rows] == Status.OK)]] = Status.NOT_RESOLVED
 
 
 def changes(before: NDArray[np.void], after: NDArray[np.void]) -> NDArray[np.float64]:

@@ -162,7 +162,8 @@ def _look_for_flutter(params: NDArray[np.void], options: Options, results: NDArr
     rows = np.flatnonzero((results["status"] == Status.OK) & flutter.may_flutter(params, results))
     run = _together if in_lanes(options) else _alone
     for i, samples in run(params[rows], options, True, np.zeros(len(rows), RESULT).view(np.recarray)):
-        results["flutter"][rows[i]] = flutter.exponent(params[rows[i : i + 1]], options, samples)
+        row = rows[i : i + 1]
+        results["flutter"][row] = flutter.exponent(params[row], options, samples, results[row])
     results["status"][rows[results["flutter"][rows] > refinement.GROWN]] = Status.NOT_RESOLVED
 
 

@@ -116,10 +116,10 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
 def test_counts(tmp_path: Path, study: fakes.Study) -> None:
     rows = np.arange(4)
     part = simulation(study, rows)
-    part.results["status"] = [Status.OK, Status.NOT_SETTLED, Status.NOT_FINITE, Status.OUTSIDE_MODEL]
+    part.results["status"] = [Status.NOT_PERIODIC, Status.NOT_SETTLED, Status.NOT_FINITE, Status.NOT_RESOLVED]
     with new_store(tmp_path / "a.h5", study) as store:
         store.write(rows, part)
-        assert store.counts() == Counts(total=12, done=4, not_settled=1, failed=2)
+        assert store.counts() == Counts(total=12, done=4, not_settled=2, failed=1, not_resolved=1)
 
 
 def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def text(counts: Counts, begun: int, seconds: float) -> str:
     if counts.done > begun and seconds > 0:
         rate = (counts.done - begun) / seconds
         words += [f"{rate:.3g} joints/s", f"{_clock((counts.total - counts.done) / rate)} to go"]
-    return ", ".join([*words, f"{counts.failed} failed", f"{counts.not_settled} not settled"])
+    return ", ".join([*words, counts.shortfall])
 
 
 def note(text: str) -> None:

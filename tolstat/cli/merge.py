@@ -24,7 +24,7 @@ def merge(
     merged = combine.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
-    words = [f"{out}: {counts.done} joints, {counts.failed} failed, {counts.not_settled} not settled"]
+    words = [f"{out}: {counts.done} joints, {counts.shortfall}"]
     words += [f"{merged.twice} rows were there twice, with the same results"] * bool(merged.twice)
     words += [f"{pending} still pending: tolstat run STUDY --out {out} goes on with them"] * bool(pending)
     say("\n".join(words))

@@ -154,7 +154,7 @@ def carry_out(plan: Study, path: Path, report: bool, until: str | None = None, *
     except WorkerDied as error:
         say(f"error: {error}")
         raise typer.Exit(1) from error
-    say(f"{path}: {counts.done} joints, {counts.failed} failed, {counts.not_settled} not settled")
+    say(f"{path}: {counts.done} joints, {counts.shortfall}")
     if report:
         from tolstat.report import build
 

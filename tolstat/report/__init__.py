@@ -136,7 +136,7 @@ def _cases(store: ResultStore, stem: Path) -> Report:
     full = cases.table(store)
     files = [text.csv(full, stem, "cases")]
     counts = store.counts()
-    notes = f"{counts.done} of {counts.total} joints, {counts.failed} failed, {counts.not_settled} not settled"
+    notes = f"{counts.done} of {counts.total} joints, {counts.shortfall}"
     if not paper_source.matching(store):
         notes = "\n".join([notes, *cases.advice(full)])
         if full["note"].any():

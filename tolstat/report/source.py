@@ -18,11 +18,11 @@ from tolstat.analysis.quantile import Quantile
 from tolstat.columns import RESULT_COLUMNS, Column
 from tolstat.errors import Fault, InputError
 from tolstat.origins import check_counted
-from tolstat.store import verification
+from tolstat.store import Counts, verification
 from tolstat.store.reader import BLOCK
 from tolstat.store.verification import Verification
 from tolstat.study.selection import LIMIT_UNITS
-from tolstat.tables import BUSHINGS, ERROR_FIELDS, FAILED, PINS, UNSETTLED, Status
+from tolstat.tables import BUSHINGS, ERROR_FIELDS, PINS, Status
 
 if TYPE_CHECKING:
     from tolstat.store import ResultStore
@@ -152,10 +152,9 @@ class Campaign:
 
     def head(self) -> str:
         """Sentence with the number of joints and of those without a valid result."""
-        failed = self.count(*FAILED)
-        pending = self.count(Status.PENDING)
-        text = f"{len(self.results) - pending} joints ({METHODS.get(self.method, self.method)}), "
-        text += f"{failed} failed, {self.count(*UNSETTLED)} not settled"
+        counts = Counts.of(self.results["status"])
+        pending = counts.total - counts.done
+        text = f"{counts.done} joints ({METHODS.get(self.method, self.method)}), {counts.shortfall}"
         return text + (f", {pending} still pending" if pending else "")
 
     def missing(self) -> str:

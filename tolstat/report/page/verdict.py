@@ -14,7 +14,8 @@ from tolstat.report import accuracy, capability, exceedance, style, text
 from tolstat.report.page import drawing
 from tolstat.report.page.blocks import Block, Card, Cards, Panel, Panels, Section, Table, Text
 from tolstat.report.page.findings import Findings
-from tolstat.tables import FAILED, UNSETTLED, Status
+from tolstat.store import Counts
+from tolstat.tables import Status
 
 WORDS = {"yes": "kept", "no": "not kept", "open": "open"}
 
@@ -91,10 +92,11 @@ def _headline(found: Findings, table: pd.DataFrame) -> list[Card]:
 
 def _basis(found: Findings) -> list[Card]:
     campaign = found.campaign
-    pending, failed, unsettled = (campaign.count(*s) for s in ((Status.PENDING,), FAILED, UNSETTLED))
-    done = len(campaign.results) - pending
-    note = f"{failed} failed, {unsettled} not settled" + (f", {pending} still pending" if pending else "")
-    cards = [Card(str(done), "joints simulated", note, "open" if failed + unsettled + pending else "")]
+    counts = Counts.of(campaign.results["status"])
+    pending = counts.total - counts.done
+    note = counts.shortfall + (f", {pending} still pending" if pending else "")
+    whole = campaign.count(Status.OK) == counts.total
+    cards = [Card(str(counts.done), "joints simulated", note, "" if whole else "open")]
     if campaign.verification:
         kinds = {name.rpartition(".")[2] for name in found.leading}
         errors = accuracy.usual(campaign.verification).items()

@@ -21,7 +21,7 @@ the contact's law approaches the linear one, and contacts stiffen to the frequen
 BARELY = 0.01
 """Damping ratio of a pin with its arm below which all bodies are looked at together; bushings alone give twice that."""
 ANGLES = 36
-"""Input angles of a revolution at which eigenvalues are looked at."""
+"""Input angles of a revolution at which eigenvalues are looked at, besides those where the skew stiffness peaks."""
 CLEAR = 10.0
 """Exponent at which the angles between would not change the verdict."""
 FOLLOWED = 0.2
@@ -53,7 +53,7 @@ def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.voi
     """
     n, period = len(samples), 2 * np.pi / abs(float(params["omega"][0]))
     least = FOLLOWED * n / period
-    chosen = np.unique(np.arange(ANGLES) * n // ANGLES)
+    chosen = np.union1d(np.arange(ANGLES) * n // ANGLES, _peaks(samples["skew"]))
     matrices = _jacobians(params, options, samples, chosen)
     if not is_deep(params, result)[0] and _least_damping(matrices, samples["mode"][chosen], least) > BARELY:
         return 0.0
@@ -67,6 +67,11 @@ def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.voi
     chosen = np.append(chosen, between)
     order = np.argsort(chosen)
     return _growth(rates[order], chosen[order], n, period)
+
+
+def _peaks(skew: FloatArray) -> Angles:
+    """Angles at which a closed curve has a maximum above zero."""
+    return np.flatnonzero((skew > np.roll(skew, 1)) & (skew >= np.roll(skew, -1)))
 
 
 def _growth(rates: FloatArray, chosen: Angles, n: int, period: float) -> float:

@@ -26,7 +26,7 @@ LIVELY, SMOOTH = 1e-3, 1e-3
 to less than shows as roughness, and change little from one refinement to the next before it is resolved."""
 SURE_STEPS = 2880
 """Steps a revolution to which lively joints are refined even if nothing changes."""
-UNRESOLVED = 5e-3
+UNRESOLVED = 3e-3
 """Change in the last refinement allowed that a joint may not exceed."""
 GROWN = 2.0
 """Exponent of growth (`flutter`) above which a motion is not resolved: a disturbance becomes 7 times as large."""

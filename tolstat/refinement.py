@@ -21,7 +21,7 @@ ROUGH, AT_STEPS = 0.02, 180
 they go with the square of a step."""
 RESOLVED = 2e-3
 """Change of the largest loads at which a refinement is the last if it leaves no roughness, relative to their kind's."""
-LIVELY, SMOOTH = 1e-3, 1e-3
+LIVELY, SMOOTH = 1.5e-3, 1e-3
 """|Psi| and roughness above which deviations from the ideal motion are lively: their ringing can be damped at few steps
 to less than shows as roughness, and change little from one refinement to the next before it is resolved."""
 SURE_STEPS = 2880

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from tolstat.tables import PARAM, Law, Mode, Options
 
 LEAST_SKEW = 0.7
-"""Antisymmetric stiffness, in units of what damping holds (``skew``), above which eigenvalues are looked at."""
+"""Antisymmetric stiffness of a pin's contact, or two thirds of that of two opposite pins, in units of what damping
+holds (``skew``), above which eigenvalues are looked at."""
 LEAST_DEPTH = 0.6
 """Force of a contact along both ends of a pin above which they are, in units of k2u^2/k1u: there the quadratic term of
 the contact's law approaches the linear one, and contacts stiffen to the frequencies of bushings."""
-BARELY = 0.01
-"""Damping ratio of a pin with its arm below which all bodies are looked at together; bushings alone give twice that."""
 ANGLES = 36
-"""Input angles of a revolution at which eigenvalues are looked at, besides those where the skew stiffness peaks."""
+"""Input angles of a revolution at which eigenvalues are looked at, besides those where the skew stiffness peaks: these
+alone where no contact is deep and none of them shows growth."""
 CLEAR = 10.0
 """Exponent at which the angles between would not change the verdict."""
 FOLLOWED = 0.2
@@ -52,18 +52,20 @@ def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.voi
         as the fastest eigenvector there: at these frequencies the recorded motion is slow.
     """
     n, period = len(samples), 2 * np.pi / abs(float(params["omega"][0]))
-    least = FOLLOWED * n / period
-    chosen = np.union1d(np.arange(ANGLES) * n // ANGLES, _peaks(samples["skew"]))
-    matrices = _jacobians(params, options, samples, chosen)
-    if not is_deep(params, result)[0] and _least_damping(matrices, samples["mode"][chosen], least) > BARELY:
+
+    def rates_at(angles: Angles) -> FloatArray:
+        return _rates(_jacobians(params, options, samples, angles), samples["mode"][angles], FOLLOWED * n / period)
+
+    peaks = _peaks(samples["skew"])
+    if not is_deep(params, result)[0] and not (rates_at(peaks) > 0).any():
         return 0.0
-    rates = _rates(matrices, samples["mode"][chosen], least)
+    chosen = np.union1d(np.arange(ANGLES) * n // ANGLES, peaks)
+    rates = rates_at(chosen)
     found = _growth(rates, chosen, n, period)
     between = _between(rates > 0, chosen, n)
     if not 0 < found < CLEAR or not between.size:
         return found
-    matrices = _jacobians(params, options, samples, between)
-    rates = np.append(rates, _rates(matrices, samples["mode"][between], least))
+    rates = np.append(rates, rates_at(between))
     chosen = np.append(chosen, between)
     order = np.argsort(chosen)
     return _growth(rates[order], chosen[order], n, period)
@@ -106,20 +108,6 @@ def _jacobians(params: NDArray[np.void], options: Options, samples: NDArray[np.v
         t = period * (1 + s / len(samples))
         kernel.jacobian_of_row(t, state, params.view(np.recarray), options, works, column, matrix)
     return matrices
-
-
-def _least_damping(matrices: FloatArray, modes: NDArray[np.uint8], least: float) -> float:
-    """Smallest damping ratio of pins that touch with both ends, each with its arm alone, above `least` rad/s."""
-    from tolstat.kernel.topology import ARM, ARM_OF_PIN, N_DOF, PIN
-
-    worst = np.inf
-    for pin in range(4):
-        own = np.concatenate([6 * body + np.arange(6) for body in (PIN + pin, ARM + ARM_OF_PIN[pin])])
-        own = np.concatenate([own, N_DOF + own])
-        values = np.linalg.eigvals(matrices[modes[:, pin] == Mode.UNIFORM][:, own[:, None], own])
-        values = values[np.abs(values.imag) > least]
-        worst = min(worst, (-values.real / np.abs(values)).min(initial=np.inf))
-    return worst
 
 
 def _rates(matrices: FloatArray, modes: NDArray[np.uint8], least: float) -> FloatArray:

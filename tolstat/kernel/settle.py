@@ -23,13 +23,16 @@ SAMPLE = np.dtype(
         ("tau", "f8"),
         ("psi", "f8"),  # Psi, eq. (13)
         ("mode", "u1", (4,)),
-        ("skew", "f8"),  # largest antisymmetric part of a pin's contact stiffness, N/m
+        ("skew", "f8"),  # antisymmetric part of a pin's contact stiffness, or of two opposite pins together, N/m
         ("q", "f8", (N_DOF,)),  # m, rad
         ("v", "f8", (N_DOF,)),  # per s
     ],
     align=True,
 )
 """Sample k of a revolution belongs to theta = 2 pi k / steps_per_rev."""
+
+TOGETHER = 2 / 3
+"""Share of the skew stiffness of two opposite pins that counts as a pin's own: the hub makes one oscillation of both."""
 
 
 def make_samples(joints: int, steps_per_rev: int) -> np.recarray:
@@ -58,12 +61,19 @@ def make_ring(steps_per_rev: int, max_revs: int) -> Ring:
 
 @njit
 def skew(lane, work):
-    """Largest |df_a / d(delta_b) - df_b / d(delta_a)| of a pin's two stations: the law `mode` has no potential."""
+    """Largest |df_a / d(delta_b) - df_b / d(delta_a)| of a pin's two stations: the law `mode` has no potential.
+
+    Of two opposite pins it is the sum times `TOGETHER` where that is more.
+    """
     worst = 0.0
-    for pin in range(4):
-        a = pick(work.mode_weight[pin, 3], lane) * pick(work.station[pin, 0, EXCESS], lane)
-        b = pick(work.mode_weight[pin, 1], lane) * pick(work.station[pin, 1, EXCESS], lane)
-        worst = abs(a - b) if abs(a - b) > worst else worst  # NaN where no law was asked
+    for first in (0, 2):
+        both = 0.0
+        for pin in (first, first + 1):
+            a = pick(work.mode_weight[pin, 3], lane) * pick(work.station[pin, 0, EXCESS], lane)
+            b = pick(work.mode_weight[pin, 1], lane) * pick(work.station[pin, 1, EXCESS], lane)
+            own = abs(a - b) if abs(a - b) > 0 else 0.0  # NaN where no law was asked
+            worst, both = max(worst, own), both + own
+        worst = max(worst, TOGETHER * both)
     return worst
 
 

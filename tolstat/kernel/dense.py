@@ -10,7 +10,7 @@ import numpy as np
 
 from tolstat.kernel._jit import closure, njit
 from tolstat.kernel.integrate import IF_STALLED, NO, YES, at_rounding
-from tolstat.kernel.vector import larger
+from tolstat.kernel.vector import copy, larger
 
 DIFFERENCE = 2.0**-26
 """Increment of one-sided differences relative to the motion in a step, the root of the unit roundoff."""
@@ -227,9 +227,9 @@ def build_given(acceleration, force, tangent, mass=None, divided=False):
             return False
         for j in range(n):
             if divided:
-                work.solution[:] = work.matrix[:, j]
+                copy(work.matrix[:, j], work.solution)
                 lu_solve(work.mass, work.mass_pivots, work.solution)
-                work.matrix[:, j] = work.solution
+                copy(work.solution, work.matrix[:, j])
             work.matrix[j, j] += ca
         return lu(work.matrix, work.pivots)
 

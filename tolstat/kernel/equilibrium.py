@@ -9,6 +9,7 @@ equilibrium. Where there is none (no torque), the bound on steps ends it; what f
 from tolstat.kernel._jit import closure, njit
 from tolstat.kernel.integrate import LOST, at_rounding
 from tolstat.kernel.state import CV_FACTORISED
+from tolstat.kernel.vector import copy
 
 HELD = 1e-200
 """cv = dv/dq of an equilibrium: nothing to a force, but not the zero that stands for no tangent."""
@@ -67,11 +68,11 @@ def build_equilibrium(residual, newton, static_newton, size, guess):
         state.a0[:] = 0.0
         step = FIRST
         for _ in range(MAX_STEPS):
-            state.q[:] = state.q0
+            copy(state.q0, state.q)
             state.v[:] = 0.0
             state.a[:] = 0.0
             if newton(t, 1 / step, 1 / (step * step), par, options, work, state):
-                state.q0[:] = state.q
+                copy(state.q, state.q0)
                 residual(t, state.q0, state.v0, state.a0, par, options, work, state.residual)
                 if size(1.0, 1.0, state) < ENOUGH:
                     return True
@@ -86,9 +87,9 @@ def build_equilibrium(residual, newton, static_newton, size, guess):
     @closure
     def equilibrium(t, par, options, work, state):
         guess(t, par, work, state)
-        state.q[:] = state.q0
+        copy(state.q0, state.q)
         if hold(t, par, options, work, state):
-            state.q0[:] = state.q
+            copy(state.q, state.q0)
             return True
         if relax(t, par, options, work, state):
             return True

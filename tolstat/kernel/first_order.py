@@ -4,6 +4,7 @@ from tolstat.kernel._jit import njit
 from tolstat.kernel.dynamics import acceleration, forces
 from tolstat.kernel.motion import speed_ratio
 from tolstat.kernel.topology import N_DOF, PSI
+from tolstat.kernel.vector import copy
 
 POSITION_STEP, VELOCITY_STEP = 1e-10, 1e-6
 """Differences of the Jacobian (m and rad, per s): above rounding, below the micrometre over which contacts rise."""
@@ -22,7 +23,7 @@ def jacobian(t, y, par, options, work, column, out):
     """Write d(rate)/dy to `out`, (110, 110), by forward differences; `column`, (3, 110), is scratch."""
     base, moved, there = column[0], column[1], column[2]
     rate(t, y, par, options, work, base)
-    moved[:] = y
+    copy(y, moved)
     for j in range(2 * N_DOF):
         moved[j] = y[j] + (POSITION_STEP if j < N_DOF else VELOCITY_STEP)
         step = moved[j] - y[j]
@@ -59,7 +60,9 @@ def sample(times, states, par, work, loads, contact, psi):
     """
     for k in range(times.size):
         forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
-        loads[k] = work.load
-        contact[k] = work.contact
+        for bushing in range(8):
+            copy(work.load[bushing], loads[k, bushing])
+        for pin in range(4):
+            copy(work.contact[pin], contact[k, pin])
         tau = (work.shaft[0] + states[k, N_DOF + PSI]) / par.omega
         psi[k] = (tau - speed_ratio(par.omega * times[k], par.alpha)) / tau

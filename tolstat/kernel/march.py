@@ -6,6 +6,7 @@ from tolstat.kernel._jit import closure
 from tolstat.kernel.dense import build_dense, lu, make_dense_work, motion_size, small_change
 from tolstat.kernel.integrate import build_integrator, reset
 from tolstat.kernel.state import ATTEMPTS_LEFT, make_state
+from tolstat.kernel.vector import copy
 from tolstat.tables import Status
 
 OK, NEWTON_FAILED, NOT_FINITE = int(Status.OK), int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
@@ -34,14 +35,14 @@ def build_march(force, tangent=None, mass=None, divided=False):
     def march(t0, t1, par, options, attempts, work, state, points):
         steps = points.shape[0] - 1
         h = (t1 - t0) / steps
-        state.q0[:] = points[0, 0]
-        state.v0[:] = points[0, 1]
+        copy(points[0, 0], state.q0)
+        copy(points[0, 1], state.v0)
         acceleration(t0, state.q0, state.v0, work, state.a0)
         reset(state)
         state.counters[ATTEMPTS_LEFT] = attempts
         if not finite(state):
             return NOT_FINITE
-        points[0, 2] = state.a0
+        copy(state.a0, points[0, 2])
         for k in range(steps):
             if not advance(t0 + k * h, h, par, options, work, state):
                 return NEWTON_FAILED

@@ -11,7 +11,7 @@ from tolstat.kernel.lane import pick
 from tolstat.kernel.state import make_state_record
 from tolstat.kernel.topology import N_DOF, PSI
 from tolstat.kernel.trail import Trail, make_trail
-from tolstat.kernel.vector import larger
+from tolstat.kernel.vector import copy, larger
 from tolstat.kernel.work import EXCESS
 
 SAMPLE = np.dtype(
@@ -139,7 +139,8 @@ def keep(k, ring):
     s, r = k % n, ((k - 1) // n) % trail.revolution.size
     stride = -(-n // trail.modulus.shape[1])
     if s % stride == 0:
-        trail.modulus[r, s // stride] = ring.samples[s].modulus
+        for b in range(8):
+            copy(ring.samples[s].modulus[b], trail.modulus[r, s // stride, b])
     if s == 0:
         summarise(ring.samples, trail.revolution[r])
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.kernel._jit import njit
-from tolstat.kernel.vector import larger
+from tolstat.kernel.vector import copy, larger
 from tolstat.tables import RESULT
 
 MOST_KEPT = 16
@@ -126,7 +126,8 @@ def combine(last, count, trail, out):
             else:
                 out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / count, top - low
     out.psi_max = first.psi_max
-    out.contact_max[:] = first.contact_max
+    for pin in range(4):
+        copy(first.contact_max[pin], out.contact_max[pin])
     out.mode_share[:] = 0.0
     for r in range(last - count + 1, last + 1):
         one = trail.revolution[r % kept]

@@ -87,6 +87,13 @@ def turn_back(matrices, i, a):
 
 
 @njit
+def copy(values, out):
+    """Write the numbers of one array to another, of the same shape and one axis; NumPy's way allocates."""
+    for i in range(out.size):
+        out[i] = values[i]
+
+
+@njit
 def larger(a, b):
     """The larger of two numbers; NaN if one of them is."""
     return where((b > a) | (b != b), b, a)

@@ -64,7 +64,7 @@ def _finite(value: Any) -> Any:
 
 
 def bench(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], None]) -> Bench:
-    """Measure; two minutes, with `quick` half of one, with `cold` several more.
+    """Measure; two minutes, with `quick` half of one, with `cold` two more.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def announce_compilation() -> None:
     from tolstat.simulation import is_compiled
 
     if not is_compiled():
-        say("compiling the kernels for this machine: some three minutes, this once")
+        say("compiling the kernels for this machine: about a minute, this once")
 
 
 def as_text(summary: dict[str, Any]) -> str:

@@ -17,7 +17,7 @@ def bench(
         bool, typer.Option("--quick", help="Few joints and rounds, no other integrators: half a minute.")
     ] = False,
     cold: Annotated[
-        bool, typer.Option("--cold", help="Measure compilation into an empty cache too: several minutes.")
+        bool, typer.Option("--cold", help="Measure compilation into an empty cache too: two minutes more.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> None:

@@ -152,9 +152,14 @@ def simulate_rows(
 
     results = simulate(np.arange(len(params)), options)
     refinement.refine(results, options, simulate)
-    if options.max_refinements > 0 and options.fidelity == Fidelity.DYNAMIC:
+    if _looks_for_flutter(options):
         _look_for_flutter(params, options, results)
     return Simulation(results, kept)
+
+
+def _looks_for_flutter(options: Options) -> bool:
+    """Whether flutter is looked for."""
+    return options.max_refinements > 0 and options.fidelity == Fidelity.DYNAMIC
 
 
 def _look_for_flutter(params: NDArray[np.void], options: Options, results: NDArray[np.void]) -> None:
@@ -234,8 +239,10 @@ def is_compiled(options: Options | None = None) -> bool:
 
 def warm_up(options: Options | None = None) -> None:
     """Compile the kernels that `options` need, or load them from the cache, with a joint that has no clearance."""
+    options = options or Options()
     params = np.zeros(1, PARAM)
     params["clearance"] = -1.0
-    simulate_rows(params, options or Options())
-    flutter.warm_up(options or Options())
+    simulate_rows(params, options)
+    if _looks_for_flutter(options):
+        flutter.warm_up(options)
     rainflow.count(np.zeros((2, 8, 6)))

@@ -84,6 +84,7 @@ def record(k, lane, in_full, par, work, v, samples):
     `in_full`: whether more is wanted than the loads' moduli, which the next revolution is compared with.
     """
     sample = samples[k % samples.size]
+    fetch(samples[(k + 2) % samples.size])
     of_force = of_torque = 0.0
     for b in range(8):
         for kind in (0, 1):
@@ -122,7 +123,6 @@ def foresee(k, q, v, ahead, samples):
     """
     n = samples.size
     here, following = samples[k % n], samples[(k + 1) % n]
-    fetch(samples[(k + 2) % n])
     known = k > n
     for i in range(N_DOF):
         if known:

@@ -32,7 +32,7 @@ SAMPLE = np.dtype(
 """Sample k of a revolution belongs to theta = 2 pi k / steps_per_rev."""
 
 TOGETHER = 2 / 3
-"""Share of the skew stiffness of two opposite pins that counts as a pin's own: the hub makes one oscillation of both."""
+"""Share of the skew stiffness of two opposite pins that counts as a pin's own: one oscillation of both by the hub."""
 
 
 def make_samples(joints: int, steps_per_rev: int) -> np.recarray:

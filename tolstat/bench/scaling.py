@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -147,6 +148,11 @@ def _simulate(options: Options, block: NDArray[np.void]) -> Stint:
 
 def memory_mb() -> float:
     """Largest memory of this process so far, MB; 0 where that is not known."""
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+        return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) * 1.024e-3
+    except (OSError, StopIteration):  # not on Linux, where getrusage would give that of the process that started this
+        pass
     try:
         import resource
     except ImportError:  # not on Windows

@@ -187,7 +187,7 @@ class Options(NamedTuple):
     rtol: float = 0.0
     atol: float = 0.0
     fidelity: int = int(Fidelity.DYNAMIC)
-    peak_substeps: int = 8
+    peak_substeps: int = 16
     max_refinements: int = 2
 
 

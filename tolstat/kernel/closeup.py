@@ -15,7 +15,7 @@ from tolstat.kernel.state import ATTEMPTS_LEFT, H_OLD
 
 NEAR = 0.005
 """Distance of a load from its largest value, in units of the largest of its kind, that ringing may bridge."""
-KINK = 1e-3
+KINK = 5e-4
 """Third difference of a load's samples, in the same units, below which a switch is too soft to ring that far."""
 STEPS = 2
 """Steps of the grid that are taken again: the one in which the contact switches, and the next."""

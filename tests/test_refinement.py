@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolstat import flutter, joint, refinement, sampling, study
+from tolstat import joint, refinement, sampling, study
 from tolstat.remedy import remedy
 from tolstat.simulation import simulate_rows
 from tolstat.tables import RESULT, Law, Options, Status
@@ -23,10 +23,6 @@ DAMPED = (302, 668, 835)
 DAMPED_FLUTTER = (145, 320, 964, 1155)
 """Rows of fuzz.toml with flutter: of several pins with the hub; along 10 degrees; where skew stiffness peaks; of one
 pin with its arm, at little skew."""
-
-
-OPPOSITE = 861
-"""Row of iso2768_f.toml whose opposite pins flutter with the hub at 338 /s; neither does alone."""
 
 
 def parameters(name: str, *rows: int) -> np.ndarray:
@@ -80,17 +76,6 @@ def test_lively_joints_are_right_or_not_ok() -> None:
     assert (refinement.changes(ringing, true)[ok] < 2e-3).all()
     assert (flutters["flutter"] > refinement.GROWN).all()
     assert (flutters["status"] == Status.NOT_RESOLVED).all()
-
-
-def test_flutter_of_opposite_pins_is_found_where_none_is_deep() -> None:
-    """Row 861 is 3 % off at 46 080 steps; the others are as skew, and damped."""
-    params = parameters("iso2768_f.toml", 386, 739, OPPOSITE)
-    found = simulate_rows(params, Options()).results
-    assert not flutter.is_deep(params, found).any()
-    assert flutter.may_flutter(params, found).all()
-    assert found["status"].tolist() == [Status.OK, Status.OK, Status.NOT_RESOLVED]
-    assert found["flutter"][:2].tolist() == [0, 0]
-    assert 3 < found["flutter"][2] < 6
 
 
 def test_no_refined_joint_depends_on_others() -> None:

@@ -1,9 +1,10 @@
 """Flutter of the contacts: motions that settle at the steps taken and in truth do not.
 
 The law ``mode`` is not the gradient of a potential: the force of one end of a pin changes with the penetration of the
-other in another way than the reverse. Where damping does not hold that, pins, arms and hub flutter at 4 to 50 kHz,
+other in another way than the reverse. Where damping does not hold that, pins, arms and hub flutter at 2 to 50 kHz,
 which the method damps at any step that a revolution needs. So it is looked for where it begins: in the eigenvalues of
-the equations of motion, linearised about the recorded revolution.
+the equations of motion, linearised about the recorded revolution. There are two kinds: the whole cross swings on its
+contacts, at some 2 kHz, which a condensed model shows (`kernel.cross_growth`), and contacts that are pressed deep.
 """
 
 from __future__ import annotations
@@ -13,15 +14,13 @@ from numpy.typing import NDArray
 
 from tolstat.tables import PARAM, Law, Mode, Options
 
-LEAST_SKEW = 0.7
-"""Antisymmetric stiffness of a pin's contact, or two thirds of that of two opposite pins, in units of what damping
-holds (``skew``), above which eigenvalues are looked at."""
+LEAST_GROWTH = 1.0
+"""Estimated growth of the cross on its contacts (``cross_growth``, an exponent) above which eigenvalues are taken."""
 LEAST_DEPTH = 0.6
 """Force of a contact along both ends of a pin above which they are, in units of k2u^2/k1u: there the quadratic term of
 the contact's law approaches the linear one, and contacts stiffen to the frequencies of bushings."""
 ANGLES = 36
-"""Input angles of a revolution at which eigenvalues are looked at, besides those where the skew stiffness peaks: these
-alone where no contact is deep and none of them shows growth."""
+"""Input angles of a revolution at which eigenvalues are looked at, besides those where the skew stiffness peaks."""
 CLEAR = 10.0
 """Exponent at which the angles between would not change the verdict."""
 FOLLOWED = 0.2
@@ -31,7 +30,7 @@ FloatArray = NDArray[np.float64]
 Angles = NDArray[np.intp]
 
 
-def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.void], result: NDArray[np.void]) -> float:
+def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.void], deep: bool) -> float:
     """Largest growth of a small disturbance along the recorded revolution, at frequencies that the steps damp.
 
     Parameters
@@ -42,8 +41,9 @@ def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.voi
         Settings that it was simulated with.
     samples : ndarray of SAMPLE, shape (steps_per_rev,)
         Its last revolution.
-    result : ndarray of RESULT, shape (1,)
-        What was made of the joint.
+    deep : bool
+        Whether contacts are, see `is_deep`. Where they are not, eigenvalues are looked at only at angles at which the
+        condensed model shows growth.
 
     Returns
     -------
@@ -54,12 +54,13 @@ def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.voi
     n, period = len(samples), 2 * np.pi / abs(float(params["omega"][0]))
 
     def rates_at(angles: Angles) -> FloatArray:
-        return _rates(_jacobians(params, options, samples, angles), samples["mode"][angles], FOLLOWED * n / period)
+        rates = np.full(len(angles), np.inf) if deep else _of_cross(params, samples, angles)
+        open_ = angles[rates > 0]
+        matrices = _jacobians(params, options, samples, open_)
+        rates[rates > 0] = _rates(matrices, samples["mode"][open_], FOLLOWED * n / period)
+        return rates
 
-    peaks = _peaks(samples["skew"])
-    if not is_deep(params, result)[0] and not (rates_at(peaks) > 0).any():
-        return 0.0
-    chosen = np.union1d(np.arange(ANGLES) * n // ANGLES, peaks)
+    chosen = np.union1d(np.arange(ANGLES) * n // ANGLES, _peaks(samples["skew"]))
     rates = rates_at(chosen)
     found = _growth(rates, chosen, n, period)
     between = _between(rates > 0, chosen, n)
@@ -92,6 +93,16 @@ def _between(unstable: NDArray[np.bool_], chosen: Angles, n: int) -> Angles:
     either = unstable | np.roll(unstable, -1)
     inner = [np.arange(a + 1, b) for a, b in zip(chosen[either], ends[either], strict=True)]
     return np.concatenate(inner) if inner else np.empty(0, np.intp)
+
+
+def _of_cross(params: NDArray[np.void], samples: NDArray[np.void], chosen: Angles) -> FloatArray:
+    """Growth of the cross on its contacts at each angle, 1/s: an estimate on the safe side."""
+    from tolstat.kernel import cross_growth as kernel
+    from tolstat.kernel.work import WORK
+
+    rates, rows = np.empty(len(chosen)), (params.view(np.recarray), np.zeros(1, WORK), samples.view(np.recarray))
+    kernel.fastest_of_row(*rows, chosen, kernel.make_cross_scratch(), rates)
+    return rates
 
 
 def _jacobians(params: NDArray[np.void], options: Options, samples: NDArray[np.void], chosen: Angles) -> FloatArray:
@@ -131,17 +142,16 @@ def is_deep(params: NDArray[np.void], results: NDArray[np.void]) -> NDArray[np.b
 
 def may_flutter(params: NDArray[np.void], results: NDArray[np.void]) -> NDArray[np.bool_]:
     """Which joints are worth looking at, (n,), by their parameters and results."""
-    skewed = results["skew"] > LEAST_SKEW
-    return np.asarray((params["law"] == Law.MODE) & (skewed | is_deep(params, results)))
+    swings = results["cross_growth"] > LEAST_GROWTH
+    return np.asarray((params["law"] == Law.MODE) & (swings | is_deep(params, results)))
 
 
 def warm_up(options: Options) -> None:
     """Compile what is needed here, or load it from the cache."""
-    from tolstat.kernel.first_order import jacobian_of_row
-    from tolstat.kernel.topology import N_DOF
-    from tolstat.kernel.work import WORK
+    from tolstat.kernel.settle import make_samples
 
-    n = 2 * N_DOF
-    params = np.zeros(1, PARAM).view(np.recarray)
-    params.omega = 1.0
-    jacobian_of_row(0.0, np.zeros(n), params, options, np.zeros(1, WORK), np.empty((3, n)), np.empty((n, n)))
+    params = np.zeros(1, PARAM)
+    params["omega"] = 1.0
+    samples, chosen = make_samples(1, 1)[0], np.zeros(1, np.intp)
+    _of_cross(params, samples, chosen)
+    _jacobians(params, options, samples, chosen)

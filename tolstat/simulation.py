@@ -168,7 +168,8 @@ def _look_for_flutter(params: NDArray[np.void], options: Options, results: NDArr
     run = _together if in_lanes(options) else _alone
     for i, samples in run(params[rows], options, True, np.zeros(len(rows), RESULT).view(np.recarray)):
         row = rows[i : i + 1]
-        results["flutter"][row] = flutter.exponent(params[row], options, samples, results[row])
+        deep = bool(flutter.is_deep(params[row], results[row])[0])
+        results["flutter"][row] = flutter.exponent(params[row], options, samples, deep)
     results["status"][rows[results["flutter"][rows] > refinement.GROWN]] = Status.NOT_RESOLVED
 
 

@@ -332,7 +332,7 @@ RESULT_FIELDS = (
     Field("revolutions", "1", "revolutions integrated, the recorded one included"),
     Field("steps_per_rev", "1", "steps a revolution of the results: more than solver.steps_per_rev if refined", "i4"),
     Field("roughness", "1", "largest bend of a load between three samples, relative to the largest load of the kind"),
-    Field("skew", "1", "antisymmetric contact stiffness, of a pin or 2/3 of two opposite, over what damping holds"),
+    Field("cross_growth", "1", "estimate of flutter on the safe side, of the cross swinging on its contacts"),
     Field("flutter", "1", "exponent by which flutter of the contacts grows in a revolution; of settled joints"),
     Field("refinement_change", "1", "largest change of a largest load by the last refinement, relative to its kind's"),
     Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),

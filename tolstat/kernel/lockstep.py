@@ -68,7 +68,7 @@ def leave(lane, good, rows, options, alone, batch, samples, results):
         summarise(own, out)
         good = is_finite(out)
         if good:
-            conclude(par, own, batch.notes[lane], out)
+            conclude(par, options, work, own, batch.notes[lane], ring.cross, out)
         control.left[lane] = control.looked[lane] = 0
     if good:
         closer = options.fidelity == DYNAMIC and options.peak_substeps > 1

@@ -7,6 +7,7 @@ import numpy as np
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.borrow import fetch
+from tolstat.kernel.cross_growth import CrossScratch, make_cross_scratch
 from tolstat.kernel.lane import pick
 from tolstat.kernel.state import make_state_record
 from tolstat.kernel.topology import N_DOF, PSI
@@ -23,16 +24,13 @@ SAMPLE = np.dtype(
         ("tau", "f8"),
         ("psi", "f8"),  # Psi, eq. (13)
         ("mode", "u1", (4,)),
-        ("skew", "f8"),  # antisymmetric part of a pin's contact stiffness, or of two opposite pins together, N/m
+        ("skew", "f8"),  # antisymmetric part of the pins' contact stiffness, summed, N/m
         ("q", "f8", (N_DOF,)),  # m, rad
         ("v", "f8", (N_DOF,)),  # per s
     ],
     align=True,
 )
 """Sample k of a revolution belongs to theta = 2 pi k / steps_per_rev."""
-
-TOGETHER = 2 / 3
-"""Share of the skew stiffness of two opposite pins that counts as a pin's own: one oscillation of both by the hub."""
 
 
 def make_samples(joints: int, steps_per_rev: int) -> np.recarray:
@@ -51,30 +49,24 @@ class Ring(NamedTuple):
     trail: Trail  # of the revolutions before
     shadow: np.record  # State of a neighbour of the joint, see `classify`
     fine: np.recarray  # (3,) SAMPLE, see `closeup`
+    cross: CrossScratch
 
 
 def make_ring(steps_per_rev: int, max_revs: int) -> Ring:
     """Allocate, filled with NaN."""
     samples, fine = make_samples(1, steps_per_rev)[0], make_samples(1, 3)[0]
-    return Ring(samples, make_trail(steps_per_rev, max_revs), make_state_record(N_DOF), fine)
+    return Ring(samples, make_trail(steps_per_rev, max_revs), make_state_record(N_DOF), fine, make_cross_scratch())
 
 
 @njit
 def skew(lane, work):
-    """Largest |df_a / d(delta_b) - df_b / d(delta_a)| of a pin's two stations: the law `mode` has no potential.
-
-    Of two opposite pins it is the sum times `TOGETHER` where that is more.
-    """
-    worst = 0.0
-    for first in (0, 2):
-        both = 0.0
-        for pin in (first, first + 1):
-            a = pick(work.mode_weight[pin, 3], lane) * pick(work.station[pin, 0, EXCESS], lane)
-            b = pick(work.mode_weight[pin, 1], lane) * pick(work.station[pin, 1, EXCESS], lane)
-            own = abs(a - b) if abs(a - b) > 0 else 0.0  # NaN where no law was asked
-            worst, both = max(worst, own), both + own
-        worst = max(worst, TOGETHER * both)
-    return worst
+    """Sum over the pins of |df_a / d(delta_b) - df_b / d(delta_a)|, N/m: the law `mode` has no potential."""
+    total = 0.0
+    for pin in range(4):
+        a = pick(work.mode_weight[pin, 3], lane) * pick(work.station[pin, 0, EXCESS], lane)
+        b = pick(work.mode_weight[pin, 1], lane) * pick(work.station[pin, 1, EXCESS], lane)
+        total += abs(a - b) if abs(a - b) > 0 else 0.0  # NaN where no law was asked
+    return total
 
 
 @njit

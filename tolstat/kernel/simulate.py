@@ -9,6 +9,8 @@ from tolstat.kernel import dynamics, integrate, linsolve, tangent
 from tolstat.kernel._jit import njit
 from tolstat.kernel.classify import build_classify
 from tolstat.kernel.closeup import build_closeup
+from tolstat.kernel.contact import MODE_LAW
+from tolstat.kernel.cross_growth import cross_growth
 from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium, near
 from tolstat.kernel.guess import rigid_guess
 from tolstat.kernel.ideal_loads import ideal_loads
@@ -27,8 +29,6 @@ RAMP = int(Start.RAMP)
 DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)
 CHECKS_PER_REV = 12
 """How often a revolution the closure error is looked at, once two revolutions are recorded."""
-LEAST_DAMPING = 1e-3
-"""Of a contact, in units of the root of its stiffness times the pin's mass, where it has none."""
 SMALLEST_FORCE = 1e-3
 """Scale (N) of the stopping test of a joint that neither turns nor carries."""
 
@@ -88,7 +88,7 @@ def clear_results(out):
     out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
     out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
     out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = out.psi_max = nan
-    out.roughness = out.refinement_change = out.skew = out.flutter = nan
+    out.roughness = out.refinement_change = out.cross_growth = out.flutter = nan
     for b in range(8):
         out.F_max[b] = out.F_mean[b] = out.F_range[b] = nan
         out.T_max[b] = out.T_mean[b] = out.T_range[b] = nan
@@ -229,19 +229,11 @@ def describe(status, options, counters, out):
 
 
 @njit
-def skewness(par, samples):
-    """Antisymmetric stiffness of the contacts, in units of what their damping holds at a pin's frequency."""
-    worst = 0.0
-    for s in range(samples.size):
-        worst = max(worst, samples[s].skew)
-    size = math.sqrt(par.k2u * par.pin_mass)
-    return worst / (2 * max(par.c_d, LEAST_DAMPING * size) * size / par.pin_mass)
-
-
-@njit
-def conclude(par, samples, notes, out):
+def conclude(par, options, work, samples, notes, cross, out):
     """Write what only a joint that has settled has."""
-    out.skew, out.flutter = skewness(par, samples), 0.0
+    out.cross_growth = out.flutter = 0.0
+    if options.fidelity == DYNAMIC and par.law == MODE_LAW:
+        out.cross_growth = cross_growth(par, work, samples, cross)
     out.closure_trend, _ = closure_trend(0.0, notes)
     out.motion, out.period = PERIODIC, 1
 
@@ -272,7 +264,7 @@ def simulate_joint(par, options, work, state, ring, out):
         if not is_finite(out):
             status, failed = NOT_FINITE, state.counters[STEPS]
     if status == OK:
-        conclude(par, ring.samples, ring.trail.notes, out)
+        conclude(par, options, work, ring.samples, ring.trail.notes, ring.cross, out)
         if options.fidelity == DYNAMIC and options.peak_substeps > 1:
             look_closer(par, options, work, state, ring.samples, ring.fine, out)
     elif status == NOT_SETTLED:

@@ -42,8 +42,8 @@ def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.voi
     samples : ndarray of SAMPLE, shape (steps_per_rev,)
         Its last revolution.
     deep : bool
-        Whether contacts are, see `is_deep`. Where they are not, eigenvalues are looked at only at angles at which the
-        condensed model shows growth.
+        Whether contacts are, see `is_deep`. Where they are not, eigenvalues are taken only where the condensed model
+        shows growth on one side.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def exponent(params: NDArray[np.void], options: Options, samples: NDArray[np.voi
     n, period = len(samples), 2 * np.pi / abs(float(params["omega"][0]))
 
     def rates_at(angles: Angles) -> FloatArray:
-        rates = np.full(len(angles), np.inf) if deep else _of_cross(params, samples, angles)
+        rates = np.full(len(angles), np.inf) if deep else _of_cross(samples, angles)
         open_ = angles[rates > 0]
         matrices = _jacobians(params, options, samples, open_)
         rates[rates > 0] = _rates(matrices, samples["mode"][open_], FOLLOWED * n / period)
@@ -95,14 +95,14 @@ def _between(unstable: NDArray[np.bool_], chosen: Angles, n: int) -> Angles:
     return np.concatenate(inner) if inner else np.empty(0, np.intp)
 
 
-def _of_cross(params: NDArray[np.void], samples: NDArray[np.void], chosen: Angles) -> FloatArray:
-    """Growth of the cross on its contacts at each angle, 1/s: an estimate on the safe side."""
-    from tolstat.kernel import cross_growth as kernel
-    from tolstat.kernel.work import WORK
+def _of_cross(samples: NDArray[np.void], chosen: Angles) -> FloatArray:
+    """Growth of the cross on its contacts at each angle, 1/s: the larger of what the kernel found on its two sides."""
+    from tolstat.kernel.cross_growth import ANGLES as LOOKED_AT
 
-    rates, rows = np.empty(len(chosen)), (params.view(np.recarray), np.zeros(1, WORK), samples.view(np.recarray))
-    kernel.fastest_of_row(*rows, chosen, kernel.make_cross_scratch(), rates)
-    return rates
+    angles = np.arange(LOOKED_AT) * len(samples) // LOOKED_AT
+    before = np.searchsorted(angles, chosen, side="right") - 1
+    found = samples["growth"][angles]
+    return np.asarray(np.maximum(found[before], found[(before + 1) % LOOKED_AT]))
 
 
 def _jacobians(params: NDArray[np.void], options: Options, samples: NDArray[np.void], chosen: Angles) -> FloatArray:
@@ -152,6 +152,4 @@ def warm_up(options: Options) -> None:
 
     params = np.zeros(1, PARAM)
     params["omega"] = 1.0
-    samples, chosen = make_samples(1, 1)[0], np.zeros(1, np.intp)
-    _of_cross(params, samples, chosen)
-    _jacobians(params, options, samples, chosen)
+    _jacobians(params, options, make_samples(1, 1)[0], np.zeros(1, np.intp))

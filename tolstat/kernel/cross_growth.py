@@ -43,12 +43,11 @@ class CrossScratch(NamedTuple):
 
     hub: np.ndarray  # (4, 6, 6)
     power: np.ndarray  # (2, 12, 12)
-    rates: np.ndarray  # (ANGLES,)
 
 
 def make_cross_scratch() -> CrossScratch:
     """Allocate, filled with NaN."""
-    return CrossScratch(np.full((4, 6, 6), np.nan), np.full((2, 12, 12), np.nan), np.full(ANGLES, np.nan))
+    return CrossScratch(np.full((4, 6, 6), np.nan), np.full((2, 12, 12), np.nan))
 
 
 @njit
@@ -171,7 +170,7 @@ def cross_growth(par, work, samples, scratch):
     par, work : records of PARAM and WORK
         The joint; scratch.
     samples : ndarray of SAMPLE
-        Its last revolution.
+        Its last revolution; ``growth`` is written at the angles looked at, sample k n // `ANGLES` of n being angle k.
     scratch : CrossScratch
         Overwritten.
 
@@ -183,16 +182,9 @@ def cross_growth(par, work, samples, scratch):
     n, period, floor = samples.size, 2 * math.pi / abs(par.omega), LEAST_SKEW * skew_held(par)
     for k in range(ANGLES):
         s = k * n // ANGLES
-        scratch.rates[k] = fastest(s, par, work, samples, scratch) if samples[s].skew > floor else -math.inf
+        samples[s].growth = fastest(s, par, work, samples, scratch) if samples[s].skew > floor else -math.inf
     largest = grown = 0.0
     for k in range(2 * ANGLES):
-        grown = max(0.0, grown + scratch.rates[k % ANGLES] * period / ANGLES)
+        grown = max(0.0, grown + samples[(k % ANGLES) * n // ANGLES].growth * period / ANGLES)
         largest = max(largest, grown)
     return largest
-
-
-@njit
-def fastest_of_row(params, works, samples, chosen, scratch, rates):
-    """`fastest` at each sample `chosen` of the first row of `params`, (1,), with `works`, (1,)."""
-    for i in range(chosen.size):
-        rates[i] = fastest(chosen[i], params[0], works[0], samples, scratch)

@@ -25,6 +25,7 @@ SAMPLE = np.dtype(
         ("psi", "f8"),  # Psi, eq. (13)
         ("mode", "u1", (4,)),
         ("skew", "f8"),  # antisymmetric part of the pins' contact stiffness, summed, N/m
+        ("growth", "f8"),  # of the cross, where `cross_growth` has looked at it, 1/s
         ("q", "f8", (N_DOF,)),  # m, rad
         ("v", "f8", (N_DOF,)),  # per s
     ],

@@ -231,9 +231,9 @@ def describe(status, options, counters, out):
 @njit
 def conclude(par, options, work, samples, notes, cross, out):
     """Write what only a joint that has settled has."""
-    out.cross_growth = out.flutter = 0.0
-    if options.fidelity == DYNAMIC and par.law == MODE_LAW:
-        out.cross_growth = cross_growth(par, work, samples, cross)
+    if options.fidelity == DYNAMIC and options.max_refinements > 0:
+        out.cross_growth = cross_growth(par, work, samples, cross) if par.law == MODE_LAW else 0.0
+        out.flutter = 0.0
     out.closure_trend, _ = closure_trend(0.0, notes)
     out.motion, out.period = PERIODIC, 1
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.dynamics import forces
-from tolstat.kernel.linsolve import column, factorise, invert, product
+from tolstat.kernel.linsolve import column, factorise, invert, less, product, put_row, row
 from tolstat.kernel.tangent import assemble
 from tolstat.kernel.topology import HUB
 
@@ -42,12 +42,12 @@ class CrossScratch(NamedTuple):
     """What `cross_growth` works in."""
 
     hub: np.ndarray  # (4, 6, 6)
-    power: np.ndarray  # (2, 12, 12)
+    power: np.ndarray  # (2, 12, 2, 6): two 12 x 12 matrices, their rows in halves
 
 
 def make_cross_scratch() -> CrossScratch:
     """Allocate, filled with NaN."""
-    return CrossScratch(np.full((4, 6, 6), np.nan), np.full((2, 12, 12), np.nan))
+    return CrossScratch(np.full((4, 6, 6), np.nan), np.full((2, 12, 2, 6), np.nan))
 
 
 @njit
@@ -113,9 +113,20 @@ def transform(hub, power):
         by_rate = product(hub, SUM, column(hub, MASS, j))
         for i in range(6):
             one = 1.0 if i == j else 0.0
-            power[0, i, j], power[0, i, 6 + j] = one - 2 * by_place[i], 2 * by_rate[i]
-            power[0, 6 + i, j], power[0, 6 + i, 6 + j] = -2 * by_place[i], 2 * by_rate[i] - one
+            power[0, i, 0, j], power[0, i, 1, j] = one - 2 * by_place[i], 2 * by_rate[i]
+            power[0, 6 + i, 0, j], power[0, 6 + i, 1, j] = -2 * by_place[i], 2 * by_rate[i] - one
     return good
+
+
+@njit
+def square(here, scale, out):
+    """Write scale times the square of a 12 x 12 matrix to `out`."""
+    for i in range(12):
+        for half in range(2):
+            total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            for m in range(12):
+                total = less(total, -scale * here[i, m // 6, m % 6], row(here, m, half))
+            put_row(out, i, half, total)
 
 
 @njit
@@ -126,23 +137,17 @@ def log_radius(power):
     """
     found, share = 0.0, 1.0
     for k in range(SQUARINGS + 1):
-        here, square = power[k % 2], power[(k + 1) % 2]
+        here = power[k % 2]
         largest = 0.0
         for i in range(12):
-            for j in range(12):
-                largest = max(largest, abs(here[i, j]))
+            for half in range(2):
+                for j in range(6):
+                    largest = max(largest, abs(here[i, half, j]))
         found += share * math.log(largest)
         if found + share * LOG_SIZE < -ENOUGH:
             return found + share * LOG_SIZE
         share /= 2
-        for i in range(12):
-            for j in range(12):
-                here[i, j] /= largest
-                square[i, j] = 0.0
-        for i in range(12):
-            for m in range(12):
-                for j in range(12):
-                    square[i, j] += here[i, m] * here[m, j]
+        square(here, 1 / largest**2, power[(k + 1) % 2])
     return found
 
 

@@ -141,6 +141,13 @@ def test_cross_that_flutters_is_not_ok() -> None:
         assert (change > 1e-2) == flutters
 
 
+def test_joints_as_skew_whose_damping_holds_are_ok() -> None:
+    found = simulation.simulate_rows(parameters(386, 739, FLUTTERS), Options()).results
+    assert found["status"].tolist() == [Status.OK, Status.OK, Status.NOT_RESOLVED]
+    assert found["flutter"][:2].tolist() == [0, 0]
+    assert 3 < found["flutter"][2] < 6
+
+
 def test_joints_without_growth_are_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[int] = []
 

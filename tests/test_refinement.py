@@ -14,7 +14,7 @@ from tolstat.tables import RESULT, Law, Options, Status
 
 STUDIES = Path(__file__).parent.parent / "studies"
 PLAIN = Options(peak_substeps=1, max_refinements=0)
-RINGING = (163, 539, 594, 844)
+RINGING = (163, 293, 539, 594, 844, 883)
 """Rows of iso2768_f.toml whose largest load is ringing after a contact switches: 5 in a thousand low at 180 steps."""
 WRONG, FINE, FLUTTERS = 741, 142, 1413
 """Rows of fuzz.toml: a third low at 180 steps; the same at any number of steps; unstable at 14 kHz."""

@@ -17,6 +17,19 @@ REFERENCE_CASES = sorted(path.stem for path in REFERENCE.glob("*.toml"))
 
 Params = Callable[..., np.recarray]
 
+LAWS = ("mode", "uniform", "point", "sliced")
+
+
+def with_law(par: np.recarray, law: str) -> np.recarray:
+    """Give joints of PARAM the contact stations that `law` names; returns them."""
+    stations = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
+    own = joints.perturb(
+        stations, joints.nominal_errors(1, joints.Operation.model_construct(alpha=0, speed=1, torque=0))
+    )
+    for name in ("n_stations", "station_s", "station_k1", "station_k2", "station_weight"):
+        par[name] = own[name][0]
+    return par
+
 
 @pytest.fixture(scope="session")
 def cirelli() -> joints.Joint:

@@ -1,6 +1,6 @@
 """``python -m tests.make_golden``: a small result file of the present schema, and what is in it as CSV.
 
-Run once when a schema is released, and never again for it: the files stand for what users have on their disks.
+Run once when a schema is released, and never again for it: the file stands for what users have on their disks.
 """
 
 from __future__ import annotations

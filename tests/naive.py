@@ -69,13 +69,12 @@ def smooth_step(x):
 
 
 def contact_mode(stations):
-    """Name of the contact mode by Figure 3 of the paper, from direction and penetration of each station."""
-    sides = [n for n, delta in stations if delta > 0]
-    if not sides:
-        return "NONE"
-    if any(a @ b < 0 for a in sides for b in sides):
-        return "TWO_POINT"
-    return "UNIFORM" if len(sides) == len(stations) else "ONE_POINT"
+    """Name of the contact mode by Figure 3 of the paper, from direction and penetration of the end stations."""
+    ends = (stations[0], stations[-1])
+    sides = [n for n, delta in ends if delta > 0]
+    if len(sides) < 2:
+        return "ONE_POINT" if sides else "NONE"
+    return "TWO_POINT" if sides[0] @ sides[1] < 0 else "UNIFORM"
 
 
 def forces(t, q, v, par):
@@ -133,22 +132,11 @@ def forces(t, q, v, par):
             slip = slip - velocity[arm] - np.cross(spin[arm], point - body.position[arm])
             stations.append((point, g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p - 1], slip))
         modes.append(contact_mode([(n, delta) for _, n, delta, _ in stations]))
-        w = 1.0
-        if par.law == 1:
-            w = 0.0
-        elif par.law == 2:
-            (_, n_a, d_a, _), (_, n_b, d_b, _) = stations
-            w = 0.0
-            if d_a > 0 and d_b > 0:
-                r = min(d_a, d_b) / max(d_a, d_b)
-                w = r * r * (3 - 2 * r) * max(0.0, n_a @ n_b)
-        for (point, n, delta, slip), weight in zip(stations, par.station_weight, strict=False):
+        springs = zip(par.station_k1, par.station_k2, par.station_weight, strict=True)
+        for (point, n, delta, slip), (k1, k2, weight) in zip(stations, springs, strict=False):
             if delta <= 0:
                 continue
-            uniform = 0.5 * (par.k1u * delta**2 + par.k2u * delta)
-            elastic = w * uniform + (1 - w) * (par.k1p * delta**2 + par.k2p * delta)
-            if par.law == 3:
-                elastic = weight * uniform
+            elastic = k1 * delta**2 + k2 * delta
             ramp = weight * smooth_step(delta / par.delta_d)
             pressing = max(0.0, elastic + par.c_d * ramp * (slip @ n))
             tangential = slip - (slip @ n) * n - (slip @ axis) * axis

@@ -29,7 +29,7 @@ def results(n, seed=8, failed=0, unsettled=0):
         table[f"{letter}_max"] = np.array(values) * (1.0 + scatter * (1.0 if letter == "F" else 2.5))
         table[f"{letter}_mean"] = 0.9 * table[f"{letter}_max"]
         table[f"{letter}_range"] = 0.2 * table[f"{letter}_max"]
-    table["contact_max"] = 600.0 * (1.0 + scatter[:, :4, None] * [1.0, 0.5])
+    table["contact_max"] = 600.0 * (1.0 + scatter[:, :4, None] * [1.0, 0.5, 1.0])
     table["mode_share"][:, :, 1] = 1.0
     table["psi_max"] = 1e-4 * (1.0 + scatter[:, 0])
     table["revolutions"], table["steps"], table["closure"] = 2.0, 360, 2e-5

@@ -88,8 +88,8 @@ class TestIdeal:
     @pytest.mark.parametrize("speed", [SLOW, FAST, -FAST])
     @pytest.mark.parametrize("options", [STATIC, DYNAMIC])
     def test_elastic_joint_without_errors(self, params, speed, options):
-        """Every component at every angle: a clearance of 20 um when slow, 0.1 mm where inertia moves pins along z."""
-        small = {f"hole{k}__diameter": -0.16e-3 for k in (1, 2, 3, 4)} if speed == SLOW else {}
+        """Every component at every angle: a clearance of 30 um when slow, 0.1 mm where inertia moves pins along z."""
+        small = {f"hole{k}__diameter": -0.14e-3 for k in (1, 2, 3, 4)} if speed == SLOW else {}
         par = params(alpha=ALPHA, speed=speed, **small)
         _, found = solve(par, options._replace(steps_per_rev=36))
         row, closed = solve(par, IDEAL._replace(steps_per_rev=36))

@@ -20,7 +20,7 @@ from tests.test_campaign import datasets
 from tests.test_store import new_store, simulation
 from tolstat.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.errors import StoreError
-from tolstat.store import ResultStore, result_file
+from tolstat.store import ResultStore, integrity, result_file
 
 GOLDEN = sorted(make_golden.FOLDER.glob("schema*.h5"))
 
@@ -278,14 +278,25 @@ def test_no_pickle_anywhere() -> None:
         assert not path.read_text(encoding="utf-8").count("import pickle"), path
 
 
-def test_version_1_files_lack_nothing_that_is_asked_for() -> None:
-    with ResultStore.open(make_golden.FOLDER / "schema1.h5") as store:
+def test_a_released_file_lacks_nothing_that_is_asked_for() -> None:
+    with ResultStore.open(GOLDEN[-1]) as store:
         assert set(store.to_pandas().columns) >= {c.name for c in ERROR_COLUMNS + RESULT_COLUMNS}
 
 
-def test_a_copy_of_an_old_file_is_not_changed_by_reading(tmp_path: Path) -> None:
-    path = tmp_path / "old.h5"
-    shutil.copy(make_golden.FOLDER / "schema1.h5", path)
+@pytest.mark.parametrize(("version", "remedy"), [(2, "run its study again"), (4, "use a newer tolstat")])
+def test_another_schema_is_refused_in_one_sentence(tmp_path: Path, version: int, remedy: str) -> None:
+    path = tmp_path / "other.h5"
+    shutil.copy(GOLDEN[-1], path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["schema_version"] = version
+        integrity.seal(file)
+    with pytest.raises(StoreError, match=rf"schema version {version}, this tolstat reads 3\n.*{remedy}"):
+        ResultStore.open(path)
+
+
+def test_a_copy_of_a_file_is_not_changed_by_reading(tmp_path: Path) -> None:
+    path = tmp_path / "copy.h5"
+    shutil.copy(GOLDEN[-1], path)
     before = path.read_bytes()
     read_all(path)
     assert path.read_bytes() == before

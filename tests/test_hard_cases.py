@@ -18,7 +18,7 @@ from tolstat.tables import FAILED, RESULT, RESULT_FIELDS, SIMULATED, Motion, Opt
 
 STUDIES = Path(__file__).parent.parent / "studies"
 FLOATS = [f.name for f in RESULT_FIELDS if f.dtype == "f8"]
-MAY_BE_NAN = {"closure_trend", "lyapunov", "failed_theta", "refinement_change", "cross_growth", "flutter"}
+MAY_BE_NAN = {"closure_trend", "lyapunov", "failed_theta", "refinement_change"}
 
 
 def assert_honest(results: np.ndarray) -> None:
@@ -56,7 +56,8 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     ended = {name: {Status(s).label for s in results["status"][family == name]} for name in family}
     assert ended.pop("85 deg") == {"newton_failed"}
     assert ended.pop("85 deg, 720 steps") == {"not_settled"}
-    for name in ("0 N m", "1 N m", "70 deg", "5000 rpm", "Js x 1e4", "no damping, nor by the method"):
+    assert ended.pop("70 deg") <= {"not_periodic", "not_resolved"}
+    for name in ("0 N m", "1 N m", "5000 rpm", "Js x 1e4", "no damping, nor by the method"):
         assert ended.pop(name) == {"not_periodic"}, name
     assert ended.pop("20000 rpm") == {"not_settled"}
     assert set().union(*ended.values()) == {"ok"}, ended

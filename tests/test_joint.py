@@ -17,7 +17,7 @@ from tolstat.joint import Joint, Operation, material
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
 from tolstat.kernel.topology import ARM_OF_PIN
 from tolstat.schema import validate
-from tolstat.tables import ERROR_FIELDS, HOLES, MAX_STATIONS, PARAM, PINS, Law
+from tolstat.tables import ERROR_FIELDS, HOLES, MAX_STATIONS, PARAM, PINS
 
 FILE = files.data_dir() / "joints" / "cirelli2021.toml"
 MM = 1e-3
@@ -199,9 +199,9 @@ def test_nominal_joint(joint, operation):
     assert_array_equal(p["hole_axis"][0], [[1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 1, 0]])
     assert_allclose(p["c_cross"][0, 0], 0.08 * np.sqrt(6.54e9 * 0.32))
     assert_allclose(p["c_fork"][0, 3], 0.08 * np.sqrt(1.91e6 * joint.arm.body(7700.0)[1][0]))
-    assert p["law"][0] == Law.MODE
-    assert_allclose(p["station_s"][0, :2], [11 * MM, -11 * MM])
-    assert_array_equal(p["station_weight"][0], [1, 1] + [0] * (MAX_STATIONS - 2))
+    assert p["n_stations"][0] == 3
+    assert_allclose(p["station_s"][0, :3], [11 * MM, 0.0, -11 * MM])
+    assert_array_equal(p["station_weight"][0], [1, 0, 1] + [0] * (MAX_STATIONS - 3))
     assert all(np.isfinite(p[name]).all() for name in PARAM.names)
 
 
@@ -293,9 +293,109 @@ def test_factor_on_E(joint, operation):
     nominal = joints.perturb(joint, one(operation))
     p = joints.perturb(joint, one(operation, material__E_factor=1.21))
     for name in PARAM.names:
-        scale = 1.21 if name in ("k_cross", "k_fork", "k1u", "k2u", "k1p", "k2p") else 1.0
+        scale = 1.21 if name in ("k_cross", "k_fork", "station_k1", "station_k2") else 1.0
         scale = 1.1 if name in ("c_cross", "c_fork") else scale
         assert_allclose(p[name], scale * nominal[name], rtol=1e-14, err_msg=name)
+
+
+STATIONS = [
+    {"s_over_z": -0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0},
+    {"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0},
+    {"s_over_z": 0.0, "k1": "7.18e7 N/mm^2", "k2": "8.4e5 N/mm", "weight": 0.0},
+]
+"""The law `mode` of the default joint, written as stations."""
+
+
+@pytest.mark.parametrize(
+    ("law", "s", "k1", "k2", "weight"),
+    [
+        ("mode", [11, 0, -11], [1.6e12, 7.18e13, 1.6e12], [1.8e8, 8.4e8, 1.8e8], [1, 0, 1]),
+        ("uniform", [11, -11], [3.75e13, 3.75e13], [6e8, 6e8], [1, 1]),
+        ("point", [11, -11], [1.6e12, 1.6e12], [1.8e8, 1.8e8], [1, 1]),
+    ],
+)
+def test_a_law_is_a_set_of_stations(joint, law, s, k1, k2, weight):
+    own = joints.load("cirelli2021", {"contact": {"law": law}}, "case.toml")
+    stations = own.contact.springs(own.material)
+    for found, expected in zip(stations, (np.array(s) * MM, k1, k2, weight), strict=True):
+        assert_allclose(found, expected, rtol=1e-12)
+    if law == "mode":
+        assert sum(stations.k1) == pytest.approx(joint.contact.k1u)
+        assert sum(stations.k2) == pytest.approx(joint.contact.k2u)
+
+
+def test_stations_of_one_s_own(joint, operation):
+    own = joints.load("cirelli2021", {"contact": {"law": "stations", "stations": STATIONS}}, "case.toml")
+    errors = one(operation, material__E_factor=1.3, pin1__offset_t=1e-5)
+    mine, mode = joints.perturb(own, errors), joints.perturb(joint, errors)
+    for name in PARAM.names:
+        assert_allclose(mine[name], mode[name], rtol=1e-12, err_msg=name)
+    assert validate(Joint, own.model_dump(mode="json"), "file.h5") == own
+    values = {"contact.law": "stations", "contact.stations": [dict(x) for x in own.contact.stations]}
+    assert joints.varied(joint, values).contact.stations == own.contact.stations
+    assert not own.warnings()
+
+
+def test_an_override_of_the_law_leaves_out_the_keys_of_the_other(tmp_path):
+    path = tmp_path / "own.toml"
+    text = FILE.read_text(encoding="utf-8")
+    for key in ("n_stations", "coefficients", "k1u", "k2u", "k1p", "k2p", "H", "fit_load"):
+        text = re.sub(rf"(?m)^{key} = .*$", "", text)
+    rows = ", ".join(
+        f'{{ s_over_z = {x["s_over_z"]}, k1 = "{x["k1"]}", k2 = "{x["k2"]}", weight = {x["weight"]} }}'
+        for x in STATIONS
+    )
+    path.write_text(text.replace('law = "mode"', f'law = "stations"\nstations = [{rows}]'), encoding="utf-8")
+    assert joints.load(path, {}, "case.toml").contact.law == "stations"
+    coefficients = {"coefficients": "printed", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm", "H": 6.9}
+    again = joints.load(path, {"contact": {"law": "mode"} | coefficients}, "case.toml")
+    assert again.contact.stations is None
+    assert set(faults({"contact": {"law": "mode"}}, path)) == {
+        f"case.toml: joint.contact.{key}" for key in ("coefficients", "H")
+    }
+
+
+@pytest.mark.parametrize(
+    ("contact", "key", "found"),
+    [
+        ({"law": "stations"}, "stations", "missing key"),
+        ({"law": "stations", "stations": []}, "stations", "has 0 stations"),
+        ({"law": "stations", "stations": 17 * STATIONS[:1]}, "stations", "has 17 stations"),
+        ({"law": "stations", "stations": STATIONS, "k1u": "1 N/m^2"}, "k1u", 'no meaning with law = "stations"'),
+        ({"law": "stations", "stations": STATIONS, "coefficients": "fitted"}, "coefficients", "no meaning with law"),
+        ({"stations": STATIONS}, "stations", 'no meaning with law = "mode"'),
+        ({"law": "stations", "stations": [STATIONS[0] | {"s_over_z": 0.6}]}, "stations[0].s_over_z", "beyond the end"),
+        ({"law": "stations", "stations": [STATIONS[0] | {"k1": "-1 N/m^2"}]}, "stations[0].k1", "not be negative"),
+        ({"law": "stations", "stations": [STATIONS[0] | {"k3": "1 N/m"}]}, "stations[0].k3", "unknown key"),
+        ({"law": "stations", "stations": [STATIONS[0] | {"weight": -1.0}]}, "stations[0].weight", "not be negative"),
+        ({"law": "stations", "stations": [STATIONS[0] | {"k2": "0 N/m"}]}, "stations", "no station has k2 > 0"),
+        ({"k1p": "3.8e7 N/mm^2"}, "k1p", "2 k1p exceeds k1u"),
+        ({"k2p": "6.1e5 N/mm"}, "k2p", "2 k2p exceeds k2u"),
+        ({"coefficients": "fitted", "H": 1.9}, "H", "2 k2p = 2 k2u / 1.9 exceeds k2u"),
+        ({"law": "sliced", "n_stations": 0}, "n_stations", "greater than or equal to 1"),
+    ],
+)
+def test_stations_without_sense_are_faults(contact, key, found):
+    told = faults({"contact": contact})
+    assert set(told) == {f"case.toml: joint.contact.{key}"}
+    assert found in told[f"case.toml: joint.contact.{key}"].found
+    assert told[f"case.toml: joint.contact.{key}"].remedy
+
+
+@pytest.mark.parametrize(
+    ("changes", "warned"),
+    [
+        ({}, []),
+        ({0: {"weight": 0.0}}, [0]),
+        ({0: {"weight": 0.0}, 1: {"weight": 0.0}}, [0, 1]),
+        ({0: {"weight": 0.0, "k1": "0 N/m^2", "k2": "0 N/m"}}, [2]),
+        ({0: {"k1": "0 N/m^2", "k2": "0 N/m"}}, []),
+    ],
+)
+def test_a_station_that_can_touch_alone_without_damping_is_a_warning(changes, warned):
+    stations = [x | changes.get(i, {}) for i, x in enumerate(STATIONS)]
+    own = joints.load("cirelli2021", {"contact": {"law": "stations", "stations": stations}}, "case.toml")
+    assert [w.place for w in own.warnings()] == [f"contact.stations[{i}]" for i in warned]
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, MAX_STATIONS])
@@ -304,7 +404,6 @@ def test_sliced_law_has_gauss_points_the_outermost_first(operation, n):
     p = joints.perturb(j, joints.nominal_errors(1, operation))[0]
     s, w = p["station_s"], p["station_weight"]
     assert p["n_stations"] == n
-    assert p["law"] == Law.SLICED
     assert_array_equal(s[n:], 0.0)
     assert_array_equal(w[n:], 0.0)
     assert (np.diff(s[:n]) < 0).all()

@@ -7,13 +7,14 @@ import math
 import numpy as np
 import pytest
 
+from tests.conftest import LAWS
 from tolstat import joint as joints
 from tolstat import simulation
 from tolstat.kernel import lockstep
 from tolstat.kernel._jit import closure
 from tolstat.kernel.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
 from tolstat.kernel.lane_memory import aligned_zeros, as_lanes, lane_dtype
-from tolstat.tables import PARAM, Fidelity, Law, Options, Start, Status
+from tolstat.tables import PARAM, Fidelity, Options, Start, Status
 
 FAST = Options(steps_per_rev=45, max_revs=6, max_refinements=0)
 STATIC = FAST._replace(fidelity=int(Fidelity.QUASISTATIC))
@@ -76,12 +77,12 @@ def halve_all(record):
     for pin in range(4):
         for k in range(3):
             lanes.pin_axis[pin, k] = where(lanes.R > 1, lanes.R, lanes.pin_axis[pin, k])
-    return lanes.law
+    return lanes.n_stations
 
 
 def test_records_are_read_and_written_lane_by_lane():
     record = aligned_zeros(1, lane_dtype(PARAM)).view(np.recarray)[0]
-    record.R[:], record.law, record.pin_axis[...] = np.arange(WIDTH), 2, -1.0
+    record.R[:], record.n_stations, record.pin_axis[...] = np.arange(WIDTH), 2, -1.0
     assert halve_all(record) == 2
     np.testing.assert_array_equal(record.R, 0.5 * np.arange(WIDTH))
     np.testing.assert_array_equal(record.pin_axis[3, 2], np.where(record.R > 1, record.R, -1.0))
@@ -92,8 +93,8 @@ def mixed(cirelli):
     """Joints of all laws, tight and wide, some that halve their steps, some that fail, some outside the model."""
     rng = np.random.default_rng(11)
     rows = []
-    for law in Law:
-        joint = joints.load("cirelli2021", {"contact": {"law": law.name.lower()}}, "test", None)
+    for law in LAWS:
+        joint = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
         n = 7
         operation = joints.Operation.model_construct(alpha=0.3, speed=52.0, torque=100.0)
         errors = joints.nominal_errors(n, operation)

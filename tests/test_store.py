@@ -83,7 +83,7 @@ def test_every_dataset_has_unit_and_description(tmp_path: Path, study: fakes.Stu
     new_store(tmp_path / "a.h5", study).close()
     with h5py.File(tmp_path / "a.h5") as file:
         assert file.attrs["filetype"] == b"tolstat campaign"
-        assert file.attrs["schema_version"] == 2
+        assert file.attrs["schema_version"] == 3
         for group, columns in (("errors", ERROR_COLUMNS), ("results", RESULT_COLUMNS)):
             assert set(file[group]) == {c.name for c in columns}
             for c in columns:
@@ -109,7 +109,7 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
     assert frame["status"].tolist() == [Status(s).label for s in results["status"]]
     assert frame["status"].iloc[-1] == "pending"
     np.testing.assert_array_equal(frame["fork3.T_mean"], results["T_mean"][:, 6])
-    np.testing.assert_array_equal(frame["pin2.contact2_max"], results["contact_max"][:, 1, 1])
+    np.testing.assert_array_equal(frame["pin2.contact_inner_max"], results["contact_max"][:, 1, 1])
     np.testing.assert_array_equal(frame["pin4.share_uniform"], results["mode_share"][:, 3, 3])
 
 
@@ -187,8 +187,8 @@ def test_limits_are_replaced_whole_or_not_at_all(
     [
         ({"filetype": "statepoint"}, "is HDF5, but of type 'statepoint'"),
         (
-            {"schema_version": 3},
-            "has schema version 3, this tolstat reads up to 2\n  hint: use a newer tolstat",
+            {"schema_version": 4},
+            "has schema version 4, this tolstat reads 3\n  hint: use a newer tolstat",
         ),
     ],
 )

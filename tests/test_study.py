@@ -19,7 +19,7 @@ from tolstat.study import Study, load_case
 from tolstat.study import file as study_file
 from tolstat.study.model import Solver
 from tolstat.tolerance import Normal, Rayleigh
-from tolstat.units import to_si
+from tolstat.units import to_si, written
 
 STUDIES = Path(__file__).parent.parent / "studies"
 
@@ -398,6 +398,25 @@ def test_what_is_no_number_with_a_unit_is_not_guessed(text: str) -> None:
 )
 def test_quantities_are_read(text: str, unit: str, value: float) -> None:
     assert to_si(text, unit) == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("1200 rpm", "1200 rev/min", "1200 turn/min", "20 rps", "20 rev/s", "7200 deg/s", "125.66370614359172 rad/s"),
+        *("1200 min^-1", "1200 min**-1", "1200 min⁻¹", "1200 1/min", "1200/min", "1200 / min", "1200 1/minute"),
+        *("20 1/s", "20/s", "20 s^-1", "20 s⁻¹", "72000 1/h", "0.02 1/ms"),
+    ],
+)
+def test_a_speed_is_in_revolutions_however_it_is_spelt(text: str) -> None:
+    assert to_si(text, "rad/s") == pytest.approx(40.0 * math.pi, rel=1e-14)
+    assert to_si(str(written(80.0 * math.pi, "rad/s", text)), "rad/s") == pytest.approx(80.0 * math.pi, rel=1e-11)
+
+
+@pytest.mark.parametrize("text", ["20 Hz", "0.02 kHz", "20 Bq", "20 cps"])
+def test_a_frequency_is_no_speed(text: str) -> None:
+    with pytest.raises(PydanticCustomError, match="ambiguous"):
+        to_si(text, "rad/s")
 
 
 def test_a_study_is_not_a_case_and_says_so(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ solver = { steps_per_rev = 180 }
 [[variant]]
 name = "not_resolved"
 cases = []
-operation = { alpha = "60 deg", speed = "800 rpm" }
+operation = { alpha = "55 deg", speed = "800 rpm" }
 
 [[variant]]
 name = "newton_failed"

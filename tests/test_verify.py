@@ -73,12 +73,17 @@ def force_and_torque(base, other):
 
 
 def test_estimate_is_of_the_size_of_the_error(coarse):
-    """What the solver's own checks give is within a factor of two of the distance to the reference, in each joint."""
+    """What the solver's own checks give is within a factor of two of the distance to the reference, in each joint.
+
+    Where the error passes through zero at these steps, the estimate cannot know it and is above.
+    """
     own = {name: check.results for name, check in coarse.checks.items() if name != "reference"}
-    ratio = accuracy.by_kind(accuracy.numerical(coarse.base, own))[:, :2]
-    ratio /= force_and_torque(coarse.base, coarse.checks["reference"].results)
+    true = force_and_torque(coarse.base, coarse.checks["reference"].results)
+    ratio = accuracy.by_kind(accuracy.numerical(coarse.base, own))[:, :2] / true
+    crossing = true < 0.1 * np.median(true, axis=0)
+    assert crossing.sum() <= 3
     assert (ratio > 1 / 2).all()
-    assert (ratio < 2).all()
+    assert (ratio[~crossing] < 2).all()
 
 
 def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
@@ -270,7 +275,7 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
 
 def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
-        "500 rpm", "1500 rpm"
+        "500 rpm", "2000 rpm"
     )
     found = verify.check_study(study.load(written(tmp_path, text)), joints=1, names=(*verify.SMALL, "reference"))
     true = force_and_torque(found.base, found.checks["reference"].results)

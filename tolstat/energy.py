@@ -18,7 +18,6 @@ GAINS = {
     "contact_damping": -1.0,
     "film": -1.0,
     "bushing_moments": 1.0,
-    "mode_blend": 1.0,
 }
 """Powers of the balance and the sign with which they change what is stored."""
 

@@ -56,13 +56,11 @@ def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
             c.of(results)[:] = np.nan
 
 
-def needed(load: str) -> tuple[str, ...]:
-    """Columns that a load with a limit (``cross1.F``, ``pin1.contact``, ``psi``) is read from."""
-    if load.endswith(".contact"):
-        return tuple(f"{load}{half}_max" for half in (1, 2))
-    return (f"{load}_max",)
+def needed(load: str) -> str:
+    """Column that a load with a limit (``cross1.F``, ``pin1.contact``, ``psi``) is read from."""
+    return f"{load}_max"
 
 
 def holds(kept: Iterable[Column], load: str) -> bool:
     """Whether a load that can have a limit can be read from the columns kept."""
-    return {c.name for c in kept}.issuperset(needed(load))
+    return any(c.name == needed(load) for c in kept)

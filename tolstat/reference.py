@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import RESULT, SIMULATED, Fidelity, Options, Start, Status, without_results
+from tolstat.tables import CONTACTS, RESULT, SIMULATED, Fidelity, Options, Start, Status, without_results
 
 FloatArray = NDArray[np.float64]
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
@@ -35,8 +35,8 @@ class Largest(NamedTuple):
     ----------
     F, T : ndarray, shape (8,)
         Moduli of the bushing loads cross 1-4, fork 1-4, N and N m.
-    contact : ndarray, shape (4, 2)
-        Normal force on the outer and inner half of each pin, N.
+    contact : ndarray, shape (4, 3)
+        Contact forces of each pin, in the order of `tables.CONTACTS`, N.
     psi : float
         Modulus of Psi, eq. (13).
     """
@@ -132,7 +132,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
     def largest(times: FloatArray, states: FloatArray) -> Largest:
         m = len(times)
-        loads, contact, psi = np.empty((m, 8, 6)), np.empty((m, 4, 2)), np.empty(m)
+        loads, contact, psi = np.empty((m, 8, 6)), np.empty((m, 4, len(CONTACTS))), np.empty(m)
         kernel.sample(times, np.ascontiguousarray(states), par, work, loads, contact, psi)
         force, torque = (np.linalg.norm(loads[..., k : k + 3], axis=2).max(axis=0) for k in (0, 3))
         return Largest(force, torque, contact.max(axis=0), float(np.abs(psi).max()))

@@ -28,8 +28,6 @@ SURE_STEPS = 2880
 """Steps a revolution to which lively joints are refined even if nothing changes."""
 UNRESOLVED = 3e-3
 """Change in the last refinement allowed that a joint may not exceed."""
-GROWN = 2.0
-"""Exponent of growth (`flutter`) above which a motion is not resolved: a disturbance becomes 7 times as large."""
 COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")
 """What a joint has cost: all its runs together."""
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.refinement import FACTOR, GROWN
+from tolstat.refinement import FACTOR
 from tolstat.tables import MAX_ITERATIONS, STATUS_TEXT, Motion, Status
 
 ALLOWED_REVS, ALLOWED_STEPS = 1000, 20_000
@@ -59,9 +59,6 @@ def _of_failure(row: np.void, options: Mapping[str, Any]) -> str:
 
 def _of_steps(row: np.void, options: Mapping[str, Any]) -> str:
     steps, change = int(row["steps_per_rev"]), float(row["refinement_change"])
-    if row["flutter"] > GROWN:
-        grown = float(row["flutter"])
-        return f'a disturbance of the contacts grows by a factor e^{grown:.0f}: contact.law = "sliced" does not flutter'
     if not math.isfinite(change):
         return f"fails at {FACTOR * steps} steps a revolution: try solver.max_halvings = 20"
     found = f"largest loads change by {change:.1%} up to {steps} steps a revolution"

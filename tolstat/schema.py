@@ -6,6 +6,7 @@ import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -148,6 +149,8 @@ def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]
             return []
         else:
             current = fields[part].annotation
+            if NoneType in get_args(current):  # a key that may be left out
+                current = get_args(current)[0]
     fields = getattr(current, "model_fields", {})
     return [f.alias or name for name, f in fields.items()]
 

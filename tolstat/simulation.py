@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import flutter, rainflow, refinement
-from tolstat.tables import PARAM, RESULT, SIMULATED, Fidelity, HistorySpec, Method, Options, Simulation, Status
+from tolstat import rainflow, refinement
+from tolstat.tables import (
+    CONTACTS,
+    PARAM,
+    RESULT,
+    SIMULATED,
+    Fidelity,
+    HistorySpec,
+    Method,
+    Options,
+    Simulation,
+)
 
 if TYPE_CHECKING:
     from tolstat.kernel.batch import Batch
@@ -41,11 +51,11 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
     n = options.steps_per_rev
     loads = "force e, t, z (N), torque e, t, z (N m) of bushings cross 1-4, fork 1-4 on the lump, in base marker axes"
     if histories == "full":
-        contact = "normal force on the outer and inner half of pins 1-4"
+        contact = "contact force of pins 1-4: normal force at the outer and the inner end, resultant of all stations"
         modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
             "loads": HistorySpec((n, 8, 6), "f4", "N, N*m", loads, ("theta", "bushing", "component")),
-            "contact": HistorySpec((n, 4, 2), "f4", "N", contact, ("theta", "pin", "half")),
+            "contact": HistorySpec((n, 4, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
             "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
             "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
         }
@@ -152,25 +162,7 @@ def simulate_rows(
 
     results = simulate(np.arange(len(params)), options)
     refinement.refine(results, options, simulate)
-    if _looks_for_flutter(options):
-        _look_for_flutter(params, options, results)
     return Simulation(results, kept)
-
-
-def _looks_for_flutter(options: Options) -> bool:
-    """Whether flutter is looked for."""
-    return options.max_refinements > 0 and options.fidelity == Fidelity.DYNAMIC
-
-
-def _look_for_flutter(params: NDArray[np.void], options: Options, results: NDArray[np.void]) -> None:
-    """Write ``flutter`` of settled joints that may, and the status of those that do."""
-    rows = np.flatnonzero((results["status"] == Status.OK) & flutter.may_flutter(params, results))
-    run = _together if in_lanes(options) else _alone
-    for i, samples in run(params[rows], options, True, np.zeros(len(rows), RESULT).view(np.recarray)):
-        row = rows[i : i + 1]
-        deep = bool(flutter.is_deep(params[row], results[row])[0])
-        results["flutter"][row] = flutter.exponent(params[row], options, samples, deep)
-    results["status"][rows[results["flutter"][rows] > refinement.GROWN]] = Status.NOT_RESOLVED
 
 
 def _alone(
@@ -190,7 +182,7 @@ def _alone(
 def _together(
     params: NDArray[np.void], options: Options, keep: bool, results: NDArray[np.void]
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints in lock-step, those of one contact law at a time; gives the samples of each if they are kept."""
+    """Simulate joints in lock-step, those with as many contact stations together; gives their samples if kept."""
     from tolstat.kernel.lockstep import PATIENCE, lockstep
     from tolstat.kernel.settle import make_samples
 
@@ -198,7 +190,7 @@ def _together(
     most = max(1, MOST_KEPT // options.steps_per_rev) if keep else len(params)
     for here in _groups(params, most):
         part = np.ascontiguousarray(params[here])
-        batch.par.law, batch.par.n_stations = part["law"][0], part["n_stations"][0]
+        batch.par.n_stations = part["n_stations"][0]
         words = part.view(np.float64).reshape(len(part), -1)
         samples = make_samples(len(part) if keep else 0, options.steps_per_rev)
         out = np.zeros(len(part), RESULT).view(np.recarray)
@@ -209,10 +201,9 @@ def _together(
 
 
 def _groups(params: NDArray[np.void], most: int) -> Iterator[NDArray[np.intp]]:
-    """Rows with one contact law and one number of stations, `most` at a time."""
-    kinds = np.stack([params["law"], params["n_stations"]], axis=1)
-    for kind in np.unique(kinds, axis=0):
-        rows = np.flatnonzero((kinds == kind).all(axis=1))
+    """Rows with one number of contact stations, `most` at a time."""
+    for stations in np.unique(params["n_stations"]):
+        rows = np.flatnonzero(params["n_stations"] == stations)
         for first in range(0, len(rows), most):
             yield rows[first : first + most]
 
@@ -244,6 +235,4 @@ def warm_up(options: Options | None = None) -> None:
     params = np.zeros(1, PARAM)
     params["clearance"] = -1.0
     simulate_rows(params, options)
-    if _looks_for_flutter(options):
-        flutter.warm_up(options)
     rainflow.count(np.zeros((2, 8, 6)))

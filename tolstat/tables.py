@@ -21,8 +21,11 @@ CHANNELS = {
     for load in ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z", "F", "T")
 }
 """Unit of every load that cycles are counted of: components of a bushing's force and torque, and their moduli."""
+CONTACTS = ("outer", "inner", "resultant")
+"""Contact forces of a pin: at its outer end station, at its inner one, and the resultant of all its stations."""
+OUTER, INNER, RESULTANT = range(3)
 MAX_STATIONS = 16
-"""Most contact stations that one pin can have (``contact.law = "sliced"``)."""
+"""Most contact stations that one pin can have."""
 MAX_ITERATIONS = 40
 """Bound on the work of a joint, in Newton iterations per step of the longest run allowed: no joint can hang a campaign.
 Joints that never settle take some 8 to 10."""
@@ -65,8 +68,8 @@ STATUS_TEXT = {
     "last revolution",
     Status.NOT_PERIODIC: "steady, but not the same in each revolution: sub-harmonic, quasi-periodic or chaotic, "
     "see motion; results are those of the whole period, or of up to the last 16 revolutions",
-    Status.NOT_RESOLVED: "settled, but not at all steps: largest loads change with them (refinement_change), or its "
-    "contacts flutter (flutter); results are those of the finest steps taken",
+    Status.NOT_RESOLVED: "settled, but its largest loads still change with finer steps (refinement_change); results "
+    "are those of the finest steps taken",
     Status.TIMEOUT: "took longer than the time allowed to a joint; results are NaN",
     Status.CRASHED: "its process died with it twice; results are NaN",
     Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
@@ -75,15 +78,6 @@ STATUS_TEXT = {
     Status.OUTSIDE_MODEL: "negative clearance (interference fit), |alpha| of 90 deg or more, no speed, or stiffness "
     "not positive: the model has no meaning there; results are NaN",
 }
-
-
-class Law(IntEnum):
-    """Contact law (model, section 5)."""
-
-    UNIFORM = 0
-    POINT = 1
-    MODE = 2
-    SLICED = 3
 
 
 class Method(IntEnum):
@@ -285,17 +279,14 @@ PARAM_FIELDS = (
     Field("c_cross", "N*s/m, N*m*s/rad", "cross bushing damping, same order", shape=(6,)),
     Field("k_fork", "N/m, N*m/rad", "fork bushing stiffness, same order", shape=(6,)),
     Field("c_fork", "N*s/m, N*m*s/rad", "fork bushing damping, same order", shape=(6,)),
-    Field("law", "1", "contact law, see Law", "i8"),
-    Field("k1u", "N/m^2", "quadratic coefficient, uniform contact"),
-    Field("k2u", "N/m", "linear coefficient, uniform contact"),
-    Field("k1p", "N/m^2", "quadratic coefficient, point contact"),
-    Field("k2p", "N/m", "linear coefficient, point contact"),
     Field("c_d", "N*s/m", "normal contact damping"),
     Field("c_t", "N*s/m", "tangential contact damping (lubricant film)"),
     Field("delta_d", "m", "penetration over which contact damping rises"),
     Field("n_stations", "1", "contact stations per pin", "i8"),
-    Field("station_s", "m", "signed distance of each station from P along the pin axis", shape=(MAX_STATIONS,)),
-    Field("station_weight", "1", "weight of each station; 1 at two stations, sum 2", shape=(MAX_STATIONS,)),
+    Field("station_s", "m", "signed distance of each station from P along the pin, falling", shape=(MAX_STATIONS,)),
+    Field("station_k1", "N/m^2", "quadratic coefficient of each station's force", shape=(MAX_STATIONS,)),
+    Field("station_k2", "N/m", "linear coefficient of each station's force", shape=(MAX_STATIONS,)),
+    Field("station_weight", "1", "weight of each station's damping and film", shape=(MAX_STATIONS,)),
     Field("clearance", "m", "radial clearance c of each pin", shape=(4,)),
     Field("pin_point", "m", "P less the pin's reference point, in axes of C", shape=(4, 3)),
     Field("pin_axis", "1", "direction of the pin axis, in axes of C", shape=(4, 3)),
@@ -332,8 +323,6 @@ RESULT_FIELDS = (
     Field("revolutions", "1", "revolutions integrated, the recorded one included"),
     Field("steps_per_rev", "1", "steps a revolution of the results: more than solver.steps_per_rev if refined", "i4"),
     Field("roughness", "1", "largest bend of a load between three samples, relative to the largest load of the kind"),
-    Field("cross_growth", "1", "estimate of flutter on the safe side, of the cross swinging on its contacts alone"),
-    Field("flutter", "1", "exponent by which flutter of the contacts grows in a revolution; NaN where not looked for"),
     Field("refinement_change", "1", "largest change of a largest load by the last refinement, relative to its kind's"),
     Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),
     Field("newton_iterations", "1", "Newton iterations", "i4"),
@@ -343,8 +332,8 @@ RESULT_FIELDS = (
     Field(
         "contact_max",
         "N",
-        "largest normal force on the outer (1) and inner (2) half of the pin",
-        shape=(4, 2),
+        "largest contact force of the pin: normal force at its outer and at its inner end, resultant of all stations",
+        shape=(4, len(CONTACTS)),
     ),
     Field("mode_share", "1", "share of the revolutions that count in each contact mode", shape=(4, 4)),
     Field("psi_max", "1", "largest |Psi|, relative error of the speed ratio, eq. (13)"),

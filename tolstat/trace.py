@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.columns import CONTACT_NAMES
 from tolstat.remedy import remedy
 from tolstat.simulation import simulate_rows, warm_up
 from tolstat.tables import BUSHINGS, PINS, Motion, Options, Simulation, Status
@@ -73,7 +74,8 @@ class CaseResult(NamedTuple):
         """Trace of the last revolution, one row per input angle.
 
         Columns: ``theta`` (deg), ``tau``, ``Psi``, then ``cross1.F_e`` … ``fork4.T_z`` (N and N m, on the lump, in
-        the base marker's axes), ``pin1.contact1`` … ``pin4.contact2`` (N, outer and inner half) and ``pin1.mode`` …
+        the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact`` … (N, normal force at
+        the ends, resultant) and ``pin1.mode`` …
         """
         import pandas as pd
 
@@ -91,8 +93,8 @@ class CaseResult(NamedTuple):
             for k, load in enumerate(LOADS):
                 columns[f"{bushing}.{load}"] = histories["loads"][:, b, k]
         for p, pin in enumerate(PINS):
-            for side in (0, 1):
-                columns[f"{pin}.contact{side + 1}"] = histories["contact"][:, p, side]
+            for i, name in enumerate(CONTACT_NAMES):
+                columns[f"{pin}.{name}"] = histories["contact"][:, p, i]
         for p, pin in enumerate(PINS):
             columns[f"{pin}.mode"] = histories["mode"][:, p]
         return pd.DataFrame(columns)

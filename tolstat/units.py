@@ -46,12 +46,14 @@ def registry() -> pint.UnitRegistry[float]:
     """Return the one unit registry (made on first use: it costs some 0.3 s)."""
     import pint
 
-    return pint.UnitRegistry()
+    units: pint.UnitRegistry[float] = pint.UnitRegistry()
+    units.define("@alias turn = rev")
+    return units
 
 
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)(?![a-z]))"
-    r"\s*(?P<unit>|[A-Za-zµμ°%][\w µμ°%*/^().·-]{0,40})\s*",
+    r"\s*(?P<unit>|(?:1?\s*/\s*)?[A-Za-zµμ°%][\w µμ°%*/^().·⁻¹²³⁴-]{0,40})\s*",
     re.ASCII | re.IGNORECASE,
 )
 """A number and a unit. Anything else is refused: pint would read "1,5 mm" as 15 mm and "0,1 mm" as nothing."""
@@ -63,7 +65,10 @@ def _parsed(text: str) -> Any:
     found = _QUANTITY.fullmatch(text)
     if found is None:
         return None
-    return registry().Quantity(float(found["number"]), found["unit"].replace("·", "*") or "dimensionless")
+    unit = found["unit"].replace("·", "*")
+    if unit.startswith("/"):
+        unit = f"1{unit}"
+    return registry().Quantity(float(found["number"]), unit or "dimensionless")
 
 
 _NOT_PARSED = (
@@ -134,9 +139,19 @@ def _convert(quantity: Any, unit: str, value: str) -> float:
         return float(quantity.to("").magnitude)
     if quantity.unitless:
         raise _fault(f"{value!r} has no unit", unit)
-    if unit == "rad/s" and "hertz" in str(quantity.units):
-        raise _fault(f"{value!r} is ambiguous (1 Hz may mean 1 rad/s or 2 pi rad/s)", unit)
+    if unit == "rad/s":
+        return _speed(quantity, value)
     return float(quantity.to(unit).magnitude)
+
+
+def _speed(quantity: Any, value: str) -> float:
+    """Angular velocity, rad/s: 1/min and min^-1 count revolutions, as on drawings; Hz is refused."""
+    dimensions = {name: registry().get_dimensionality(name) for name, _ in quantity.unit_items()}
+    for name, dimension in dimensions.items():
+        if dimension == {"[time]": -1} and not name.startswith("revolutions_per"):
+            raise _fault(f"{value!r} is ambiguous (1 Hz may mean 1 rad/s or 2 pi rad/s)", "rad/s")
+    per_revolution = all(dimension == {"[time]": 1} for dimension in dimensions.values())
+    return float(quantity.to("rad/s").magnitude) * (2.0 * math.pi if per_revolution else 1.0)
 
 
 def written(value: float, unit: str, like: object, digits: int = 12) -> str | float:
@@ -161,7 +176,7 @@ def written(value: float, unit: str, like: object, digits: int = 12) -> str | fl
     number, name = value, ""
     if isinstance(like, str) and (found := _QUANTITY.fullmatch(like)) is not None:
         name = found["unit"]
-        number = float(registry().Quantity(value, "" if unit == "1" else unit).to(_parsed(like).units).magnitude)
+        number = value / to_si(f"1 {name}" if name else 1.0, unit)
     number = float(f"{number:.{digits}g}")
     return f"{number!r} {name}" if name else number
 

@@ -23,8 +23,8 @@ class Evidence(NamedTuple):
         Misalignment, rad.
     gamma : ndarray, shape (m, 8, 2)
         Gamma of force and torque with sign, per cent.
-    contact : ndarray, shape (m, 4, 2)
-        Largest normal force on the outer and inner half of each pin, N.
+    contact : ndarray, shape (m, 4)
+        Largest resultant contact force of each pin, N.
     psi : ndarray, shape (m,)
         Largest error of the speed ratio.
     spectra : ndarray, shape (m, orders, 8, 2)

@@ -89,7 +89,7 @@ def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
             batch.motion[name][:, lane] = getattr(snap, name)
         for name in ("t", "cv", "ca"):
             batch.control[name][lane] = getattr(snap, name)
-    batch.par.law, batch.par.n_stations = snaps[0].params["law"][0], snaps[0].params["n_stations"][0]
+    batch.par.n_stations = snaps[0].params["n_stations"][0]
     return batch
 
 
@@ -100,7 +100,7 @@ def _tally(these: Sample) -> NDArray[np.int64]:
 
     params, options = these
     batch, tally = simulation.lanes(options), np.zeros(3, np.int64)
-    batch.par.law, batch.par.n_stations = params["law"][0], params["n_stations"][0]
+    batch.par.n_stations = params["n_stations"][0]
     words = params.view(np.float64).reshape(len(params), -1)
     out = np.zeros(len(params), RESULT).view(np.recarray)
     samples = make_samples(0, options.steps_per_rev)

@@ -69,7 +69,7 @@ class Sample(NamedTuple):
     Attributes
     ----------
     params : ndarray of PARAM, shape (n,)
-        They have one contact law and one number of stations.
+        They have one number of contact stations.
     options : Options
         The study's settings, with BDF2 at fixed steps, dynamic fidelity and no refinement: the same work in lanes and
         alone.
@@ -80,13 +80,13 @@ class Sample(NamedTuple):
 
 
 def sample(study: Study, n: int) -> Sample:
-    """The first random joints of a study, those of the first one's contact law."""
+    """The first random joints of a study, those with as many contact stations as the first."""
     first = int(study.sampling.nominal_first)
     rows = np.arange(first, min(first + n, study.rows))
     whole = study.sampling.method == "lhs"  # its joints cannot be drawn one by one
     errors = sampling.draw(study)[rows] if whole else sampling.draw(study, range(rows[0], rows[-1] + 1))
     params = perturbed(study, rows, errors, joint.perturb)
-    alike = (params["law"] == params["law"][0]) & (params["n_stations"] == params["n_stations"][0])
+    alike = params["n_stations"] == params["n_stations"][0]
     options = study.solver.options()
     fixed = options._replace(fidelity=int(Fidelity.DYNAMIC), method=int(Method.BDF2), rtol=0.0, max_refinements=0)
     return Sample(np.ascontiguousarray(params[alike]), fixed)

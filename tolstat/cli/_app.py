@@ -18,8 +18,9 @@ from tolstat import __version__
 from tolstat.errors import Fault, InputError, TolstatError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
+    from tolstat.joint import Joint
     from tolstat.report import Report
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which load is exceeded by which share of the joints."
@@ -78,6 +79,11 @@ def _options(
 
 def say(text: str) -> None:
     typer.echo(text, err=True)
+
+
+def warn(path: Path, joints: Iterable[Joint]) -> None:
+    for fault in dict.fromkeys(fault for joint in joints for fault in joint.warnings()):
+        say(f"warning: {path}: joint.{fault}")
 
 
 def tell(report: Report) -> None:

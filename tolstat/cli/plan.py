@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, as_text
+from tolstat.cli._app import Workers, announce_compilation, as_text, warn
 
 if TYPE_CHECKING:
     from tolstat.plan import Plan
@@ -33,6 +33,7 @@ def plan(
     from tolstat import study
 
     loaded = study.load(study_file, n=n)
+    warn(study_file, loaded.joints)
     announce_compilation()
     made = plans.plan(loaded, workers, pilot)
     typer.echo(as_text(asdict(made)) if as_json else _lines(made))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, say, tell
+from tolstat.cli._app import Workers, announce_compilation, say, tell, warn
 from tolstat.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ def run(
         again = None if retry is None else parse(retry, settings or (), plan)
     if faults:
         raise InputError(faults)
+    warn(study_file, plan.joints)
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import announce_compilation, as_text, say, writing
+from tolstat.cli._app import announce_compilation, as_text, say, warn, writing
 
 if TYPE_CHECKING:
     from tolstat.trace import CaseResult
@@ -30,6 +30,7 @@ def simulate(
     if out is not None:
         check_target(out, case)
     loaded = study.load_case(case)
+    warn(case, [loaded.joint])
     announce_compilation()
     result = trace.simulate_case(loaded)
     summary = result.summary()

@@ -1,11 +1,16 @@
-"""The contact section of a joint file: coefficients, damping and stations of a pin in its hole."""
+"""The contact section of a joint file: damping and stations of a pin in its hole, as the contact law has them.
+
+A contact law is a set of stations (model, section 5): places along the pin, each with a force
+f(delta) = k1 delta^2 + k2 delta of its own and a weight of damping and film.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat import units
 from tolstat.joint import material
@@ -27,9 +32,12 @@ from tolstat.tables import MAX_STATIONS
 QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
 Damping = Annotated[units.Damping, NOT_NEGATIVE]
 Force = Annotated[float, units.Quantity("N"), POSITIVE]
-
+OPTIONAL = Field(default=None, validate_default=True)
+"""Default of a key that may be left out where another one does not ask for it."""
 
 NEEDED = {
+    "n_stations": ("law", "sliced", "mode"),
+    "stations": ("law", "stations", "mode"),
     "k1u": ("coefficients", "printed", "fitted"),
     "k2u": ("coefficients", "printed", "fitted"),
     "fit_load": ("coefficients", "fitted", "printed"),
@@ -39,27 +47,80 @@ NEEDED = {
 """Keys that a selector asks for: the selector, the word that needs the key, the word that does without."""
 
 
+COEFFICIENTS = ("coefficients", "k1u", "k2u", "k1p", "k2p", "H", "fit_load", "n_stations")
+"""Keys that all laws but ``"stations"`` take their stations from."""
+
+
+class Stations(NamedTuple):
+    """Contact stations of a pin, the outermost first.
+
+    Attributes
+    ----------
+    s : ndarray, shape (n,)
+        Signed distance from P along the pin's axis, m.
+    k1, k2 : ndarray, shape (n,)
+        Quadratic (N/m^2) and linear (N/m) coefficient of the force, eq. (5).
+    weight : ndarray, shape (n,)
+        Weight of damping c_d and film c_t.
+    """
+
+    s: Array
+    k1: Array
+    k2: Array
+    weight: Array
+
+
+def _on_the_pin(ratio: float) -> float:
+    if not abs(ratio) <= 0.5:
+        raise refuse(f"{ratio:g} is beyond the end of the contact", "give a number from -0.5 to 0.5")
+    return ratio
+
+
+class Station(Strict):
+    """One contact station of the law ``"stations"``."""
+
+    s_over_z: Annotated[units.Number, AfterValidator(_on_the_pin)]
+    k1: QuadraticStiffness
+    k2: Annotated[units.Stiffness, NOT_NEGATIVE]
+    weight: Ratio
+
+
+def _carries(stations: tuple[Station, ...] | None) -> tuple[Station, ...] | None:
+    if stations is not None and not 1 <= len(stations) <= MAX_STATIONS:
+        raise refuse(f"has {len(stations)} stations", f"give 1 to {MAX_STATIONS}")
+    if stations is not None and not any(station.k2 > 0.0 for station in stations):
+        raise refuse("no station has k2 > 0", "give one at least a linear coefficient")
+    return stations
+
+
+def of_its_law(contact: Mapping[str, Any], law: object) -> dict[str, Any]:
+    """Keys of a contact section that have a meaning with another `law`: what is left when an override sets it."""
+    other = COEFFICIENTS if law == "stations" else ("stations",)
+    return {key: value for key, value in contact.items() if key not in other}
+
+
 class Contact(Strict):
     """Contact of the pins in their holes.
 
     Which of the keys that may be ``None`` are needed is validated; methods assert it for the type checker.
     """
 
-    law: Literal["mode", "uniform", "point", "sliced"]
-    n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)]
+    law: Literal["mode", "uniform", "point", "sliced", "stations"]
+    n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = OPTIONAL
+    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_carries)] = OPTIONAL
     D_H: Length
     D_P: Length
     z: Length
-    coefficients: Literal["printed", "fitted"]
-    k1u: QuadraticStiffness | None = Field(default=None, validate_default=True)
-    k2u: Stiffness | None = Field(default=None, validate_default=True)
+    coefficients: Literal["printed", "fitted"] | None = OPTIONAL
+    k1u: QuadraticStiffness | None = OPTIONAL
+    k2u: Stiffness | None = OPTIONAL
     k1p: QuadraticStiffness | None = None
     k2p: Stiffness | None = None
-    H: Number | None = Field(default=None, validate_default=True)
-    fit_load: Force | None = Field(default=None, validate_default=True)
+    H: Number | None = OPTIONAL
+    fit_load: Force | None = OPTIONAL
     damping: Literal["given", "beam"]
-    c_d: Damping | None = Field(default=None, validate_default=True)
-    xi: Ratio | None = Field(default=None, validate_default=True)
+    c_d: Damping | None = OPTIONAL
+    xi: Ratio | None = OPTIONAL
     c_t: Damping
     delta_d: Length
 
@@ -71,9 +132,20 @@ class Contact(Strict):
             raise refuse(f"a pin of {value:g} m does not go into a hole of {hole:g} m", "give D_P <= D_H")
         return value
 
+    @field_validator(*COEFFICIENTS, "stations")
+    @classmethod
+    def _belongs(cls, value: object, info: ValidationInfo) -> object:
+        law, of_stations = info.data.get("law"), info.field_name == "stations"
+        if value is not None and law is not None and (law == "stations") != of_stations:
+            instead = "each station has its own coefficients" if not of_stations else 'write law = "stations"'
+            raise refuse(f'has no meaning with law = "{law}"', f"remove it: {instead}" if not of_stations else instead)
+        return value
+
     @field_validator("coefficients")
     @classmethod
-    def _clearance(cls, value: str, info: ValidationInfo) -> str:
+    def _source(cls, value: str | None, info: ValidationInfo) -> str | None:
+        if value is None and info.data.get("law") not in (None, "stations"):
+            raise refuse("missing key", 'write coefficients = "printed" or "fitted"')
         if value == "fitted" and "D_P" in info.data and info.data["D_P"] == info.data.get("D_H"):
             raise refuse("eq. (3) has no value at D_H = D_P", 'give a clearance, or write "printed"')
         return value
@@ -84,19 +156,37 @@ class Contact(Strict):
         needed(value, info, *NEEDED[str(info.field_name)])
         return value
 
+    @field_validator("k1p", "k2p")
+    @classmethod
+    def _leaves_a_middle(cls, value: float | None, info: ValidationInfo) -> float | None:
+        """The law ``"mode"`` has 2 point coefficients at the ends and the rest of the uniform one in the middle."""
+        name = str(info.field_name)
+        uniform = info.data.get(name.replace("p", "u"))
+        in_use = info.data.get("law") == "mode" and info.data.get("coefficients") == "printed"
+        if in_use and value is not None and uniform is not None and 2.0 * value > uniform:
+            found = f"2 {name} exceeds {name[:2]}u = {uniform:g}: the middle station would be negative"
+            raise refuse(found, f"give {name} <= {name[:2]}u / 2, or another law")
+        return value
+
     @field_validator("H")
     @classmethod
     def _point(cls, value: float | None, info: ValidationInfo) -> float | None:
+        law, fitted = info.data.get("law"), info.data.get("coefficients") == "fitted"
         given = info.data.get("k1p", 0.0) is not None and info.data.get("k2p", 0.0) is not None
-        if value is None and (info.data.get("coefficients") == "fitted" or not given):
+        if law == "stations" or (given and not fitted):
+            return value
+        if value is None:
             raise refuse("missing key, needed where k1p and k2p are not given", "add H, or both k1p and k2p")
+        if law == "mode" and value < 2.0:
+            found = f"2 k2p = 2 k2u / {value:g} exceeds k2u: the middle station would be negative"
+            raise refuse(found, "give H >= 2, or another law")
         return value
 
     def stiffness(self, of: Material) -> tuple[float, float, float, float]:
         """Coefficients k1u (N/m^2), k2u (N/m), k1p (N/m^2), k2p (N/m): as printed, or fitted to eq. (3).
 
         Point coefficients follow from the uniform ones by H where they are not given, and always where the
-        uniform ones are fitted.
+        uniform ones are fitted. The law ``"stations"`` has none.
         """
         k1u, k2u, k1p, k2p = self.k1u, self.k2u, self.k1p, self.k2p
         if self.coefficients == "fitted":
@@ -113,6 +203,50 @@ class Contact(Strict):
             _, k2p = material.point_coefficients(k1u, k2u, self.H)
         return k1u, k2u, k1p, k2p
 
+    def springs(self, of: Material) -> Stations:
+        """Contact stations that the law names (model, section 5), at Young's modulus of the material."""
+        if self.law == "stations":
+            assert self.stations is not None
+            own = sorted(self.stations, key=lambda station: -station.s_over_z)
+            return Stations(
+                self.z * np.array([station.s_over_z for station in own]),
+                np.array([station.k1 for station in own]),
+                np.array([station.k2 for station in own]),
+                np.array([station.weight for station in own]),
+            )
+        k1u, k2u, k1p, k2p = self.stiffness(of)
+        if self.law == "sliced":
+            assert self.n_stations is not None
+            x, weight = np.polynomial.legendre.leggauss(self.n_stations)
+            weight = weight[::-1]
+            return Stations(0.5 * self.z * x[::-1], 0.5 * k1u * weight, 0.5 * k2u * weight, weight)
+        ends, one = 0.5 * self.z * np.array([1.0, -1.0]), np.ones(2)
+        if self.law == "uniform":
+            return Stations(ends, 0.5 * k1u * one, 0.5 * k2u * one, one)
+        if self.law == "point":
+            return Stations(ends, k1p * one, k2p * one, one)
+        middle = max(k1u - 2.0 * k1p, 0.0), max(k2u - 2.0 * k2p, 0.0)
+        return Stations(
+            np.array([ends[0], 0.0, ends[1]]),
+            np.array([k1p, middle[0], k1p]),
+            np.array([k2p, middle[1], k2p]),
+            np.array([1.0, 0.0, 1.0]),
+        )
+
+    def undamped_ends(self) -> list[int]:
+        """Indices among ``stations`` of those that can touch alone and have no damping: nothing damps their whirl.
+
+        Along a straight pin the largest displacement is at an end, so that a station that carries can touch alone when
+        none farther out carries; one with a weight that is at least as far out damps it.
+        """
+        found = []
+        for side in (1.0, -1.0):
+            carrying = [(side * x.s_over_z, i) for i, x in enumerate(self.stations or ()) if x.k1 > 0.0 or x.k2 > 0.0]
+            damping = [side * x.s_over_z for x in self.stations or () if x.weight > 0.0]
+            if carrying and max(carrying)[0] > max(damping, default=-1.0):
+                found.append(max(carrying)[1])
+        return sorted(set(found))
+
     def normal_damping(self, pin: Pin, of: Material) -> float:
         """Damping c_d (N*s/m): as given, or of the pin as a cantilever, eqs. (6)-(7)."""
         if self.damping == "given":
@@ -121,13 +255,3 @@ class Contact(Strict):
         assert self.xi is not None
         mass, _ = pin.body(of.rho)
         return material.contact_damping(self.xi, mass, length=pin.l, A=pin.A, J=pin.J, E=of.E, rho=of.rho)
-
-    def stations(self) -> tuple[Array, Array]:
-        """Signed distance from P along the pin (m) and weight of each contact station, the outermost first.
-
-        Two stations of weight 1 at the ends; ``law = "sliced"``: Gauss-Legendre points on the length z.
-        """
-        if self.law != "sliced":
-            return np.array([0.5, -0.5]) * self.z, np.ones(2)
-        x, weight = np.polynomial.legendre.leggauss(self.n_stations)
-        return 0.5 * self.z * x[::-1], weight[::-1]

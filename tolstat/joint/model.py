@@ -13,7 +13,7 @@ from pydantic import ValidationInfo, field_validator
 from tolstat import schema
 from tolstat.errors import Fault, InputError
 from tolstat.files import data_dir
-from tolstat.joint.contact import Contact
+from tolstat.joint.contact import Contact, of_its_law
 from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
 from tolstat.schema import Strict, refuse
 
@@ -50,6 +50,12 @@ class Joint(Strict):
         if value.coefficients == "fitted" and of is not None and not min(value.stiffness(of)) > 0.0:
             raise refuse("the fit to eq. (3) gives no stiffening contact", "give a smaller contact.fit_load")
         return value
+
+    def warnings(self) -> list[Fault]:
+        """What can be simulated and is hardly meant, by key path in the joint file."""
+        found = "can touch alone with weight 0: nothing damps the whirl of the pin there"
+        remedy = "give it a weight, or a station with a weight beyond it"
+        return [Fault(f"contact.stations[{i}]", found, remedy) for i in self.contact.undamped_ends()]
 
     @property
     def k_cross(self) -> Array:
@@ -101,7 +107,7 @@ def load(
     path = _find(base, f"{place}: {section}", relative_to)
     data = schema.read_toml(path)
     try:
-        return schema.validate(Joint, merged(data, overrides), place)
+        return schema.validate(Joint, overridden(data, overrides), place)
     except InputError as error:
         raise InputError(_attributed(error.faults, data, path, place, section)) from error
 
@@ -117,6 +123,14 @@ def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
     close = difflib.get_close_matches(str(base), names, n=1)
     known = f"did you mean {close[0]!r}?" if close else f"write one of {', '.join(names)}, or a path to a .toml file"
     raise InputError([Fault(f"{place}.base", f"no joint is named {str(base)!r}", known)])
+
+
+def overridden(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Put the keys of `over` in place of those of a joint; where it sets a contact law, keys of other laws go."""
+    contact, own = data.get("contact"), over.get("contact")
+    if isinstance(contact, Mapping) and isinstance(own, Mapping) and "law" in own:
+        data = {**data, "contact": of_its_law(contact, own["law"])}
+    return merged(data, over)
 
 
 def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from tolstat.joint.model import Joint
 from tolstat.joint.sections import Array
 from tolstat.kernel.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 from tolstat.schema import Strict, refuse
-from tolstat.tables import ERROR, HOLES, PARAM, PINS, Law
+from tolstat.tables import ERROR, HOLES, MAX_STATIONS, PARAM, PINS
 
 Table = NDArray[np.void]
 
@@ -86,10 +86,8 @@ def perturb(joint: Joint, errors: Table) -> Table:
     params["omega"] = errors["operation.speed"]
     params["torque"] = errors["operation.torque"]
     factor = errors["material.E_factor"]
-    for name in ("k_cross", "k_fork"):
+    for name in ("k_cross", "k_fork", "station_k1", "station_k2"):
         params[name] *= factor[:, None]
-    for name in ("k1u", "k2u", "k1p", "k2p"):
-        params[name] *= factor
     with np.errstate(invalid="ignore"):  # a negative modulus ends in NaN, which the kernel reports as such
         for name in ("c_cross", "c_fork"):
             params[name] *= np.sqrt(factor)[:, None]
@@ -105,9 +103,9 @@ def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that are the same for every joint, at factor 1 on E."""
     pin_mass, pin_inertia = joint.pin.body(joint.material.rho)
     arm_mass, arm_inertia = joint.arm.body(joint.material.rho)
-    k1u, k2u, k1p, k2p = joint.contact.stiffness(joint.material)
-    s, weight = joint.contact.stations()
-    padding = (0, PARAM["station_s"].shape[0] - len(s))
+    stations = joint.contact.springs(joint.material)
+    n_stations = len(stations.s)
+    padding = (0, MAX_STATIONS - n_stations)
     xi = joint.bushing.xi
     return {
         "Js": joint.shaft.Js,
@@ -124,18 +122,11 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "c_cross": material.bushing_damping(joint.k_cross, pin_mass, pin_inertia, xi),
         "k_fork": joint.k_fork,
         "c_fork": material.bushing_damping(joint.k_fork, arm_mass, arm_inertia, xi),
-        "law": Law[joint.contact.law.upper()],
-        "k1u": k1u,
-        "k2u": k2u,
-        "k1p": k1p,
-        "k2p": k2p,
         "c_d": joint.contact.normal_damping(joint.pin, joint.material),
         "c_t": joint.contact.c_t,
         "delta_d": joint.contact.delta_d,
-        "n_stations": len(s),
-        "station_s": np.pad(s, padding),
-        "station_weight": np.pad(weight, padding),
-    }
+        "n_stations": n_stations,
+    } | {f"station_{name}": np.pad(values, padding) for name, values in stations._asdict().items()}
 
 
 def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:

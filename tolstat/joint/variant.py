@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from tolstat.joint.contact import Station
 from tolstat.joint.model import Joint
 from tolstat.joint.sections import BeamAxes
 
@@ -24,9 +25,14 @@ def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
         section, _, name = key.partition(".")
         if section not in Joint.model_fields:
             continue
-        sections.setdefault(section, {})[name] = tuple(value) if isinstance(value, list) else value
+        sections.setdefault(section, {})[name] = tuple(map(_item, value)) if isinstance(value, list) else value
     update = {name: _section(getattr(joint, name), own) for name, own in sections.items()}
     return joint.model_copy(update=update)
+
+
+def _item(value: Any) -> Any:
+    """An item of a list: a contact station, or a number."""
+    return Station.model_construct(**value) if isinstance(value, Mapping) else value
 
 
 def _section(section: Any, values: Mapping[str, Any]) -> Any:

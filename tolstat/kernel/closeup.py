@@ -12,6 +12,7 @@ from tolstat.kernel._jit import closure, njit
 from tolstat.kernel.integrate import UNLIMITED
 from tolstat.kernel.settle import extremes, peak, record
 from tolstat.kernel.state import ATTEMPTS_LEFT, H_OLD
+from tolstat.tables import CONTACTS
 
 NEAR = 0.005
 """Distance of a load from its largest value, in units of the largest of its kind, that ringing may bridge."""
@@ -23,12 +24,11 @@ STEPS = 2
 
 @njit
 def switches(s, samples):
-    """Whether a half of a pin has touched or left its hole between samples `s - 1` and `s`."""
+    """Whether a contact station has begun or ceased to carry between samples `s - 1` and `s`."""
+    switched = False
     for pin in range(4):
-        for side in (0, 1):
-            if (samples[s].contact[pin, side] > 0) != (samples[s - 1].contact[pin, side] > 0):
-                return True
-    return False
+        switched |= samples[s].pressed[pin] != samples[s - 1].pressed[pin]
+    return switched
 
 
 @njit
@@ -78,11 +78,11 @@ def count_in(j, fine, out):
             else:
                 out.T_max[b], out.T_range[b] = extend(load, out.T_max[b], out.T_range[b])
     for pin in range(4):
-        for side in (0, 1):
-            load = here.contact[pin, side]
+        for i in range(len(CONTACTS)):
+            load = here.contact[pin, i]
             if j > 1:
-                load = max(load, height(first.contact[pin, side], before.contact[pin, side], load))
-            out.contact_max[pin, side] = max(out.contact_max[pin, side], load)
+                load = max(load, height(first.contact[pin, i], before.contact[pin, i], load))
+            out.contact_max[pin, i] = max(out.contact_max[pin, i], load)
     out.psi_max = max(out.psi_max, abs(here.psi))
 
 

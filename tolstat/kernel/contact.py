@@ -1,7 +1,8 @@
-"""Pins in holes: penetration, contact laws and contact modes (model, section 5; Cirelli et al. 2021, eqs. 3-7).
+"""Pins in holes: penetration, contact forces and contact modes (model, section 5; Cirelli et al. 2021, eqs. 3-7).
 
-A pin touches its hole at stations along its axis. At each station n is the direction of the pin's displacement in
-the hole, h the hole axis and m = h x n; f acts on the pin along -n, the film's drag along -m.
+A pin touches its hole at stations along its axis, each a spring of its own: whatever the contact law, the forces have
+a potential. At each station n is the direction of the pin's displacement in the hole, h the hole axis and m = h x n;
+f acts on the pin along -n, the film's drag along -m.
 """
 
 import math
@@ -13,7 +14,6 @@ from tolstat.kernel.topology import ARM, ARM_OF_PIN, FRAME, PIN
 from tolstat.kernel.vector import add, axpy, choose, cross, dot, row, scale, sub, turn, turn_back
 from tolstat.kernel.work import (
     DELTA,
-    EXCESS,
     FORCE,
     NORMAL,
     POINT,
@@ -23,11 +23,10 @@ from tolstat.kernel.work import (
     V_NORMAL,
     V_TANGENT,
 )
-from tolstat.tables import Law
+from tolstat.tables import INNER, OUTER, RESULTANT
 from tolstat.tables import Mode as ContactMode
 
-UNIFORM, POINT_LAW, MODE_LAW = int(Law.UNIFORM), int(Law.POINT), int(Law.MODE)
-NONE, ONE_POINT, TWO_POINT, UNIFORM_MODE = (float(m) for m in ContactMode)
+NONE, ONE_POINT, TWO_POINT, UNIFORM = (float(m) for m in ContactMode)
 SMALLEST_RHO = 1e-15
 """Below it (m) the pin is centred and has no direction of displacement."""
 
@@ -82,84 +81,36 @@ def locate(pin, par, work):
 
 
 @njit
-def sharing(pin, law, work):
-    """Weight w of uniform contact in the law `mode`, with its derivatives, to ``work.mode_weight[pin]``.
-
-    w = r^2 (3 - 2 r) max(0, n_a . n_b), r the ratio of the smaller to the larger penetration; derivatives by
-    delta_a, by a displacement of a along m_a, and the same for b.
-    """
-    out = work.mode_weight[pin]
-    for k in range(5):
-        out[k] = 0.0
-    if law == UNIFORM:
-        out[0] = 1.0
-    if law != MODE_LAW:
-        return
-    a, b = work.station[pin, 0], work.station[pin, 1]
-    touching = (a[DELTA] > 0) & (b[DELTA] > 0)
-    if not any_of(touching):
-        return
-    cosine = along_a = along_b = 0.0
-    for k in range(3):
-        cosine += a[NORMAL + k] * b[NORMAL + k]
-        along_a += a[TANGENT + k] * b[NORMAL + k]
-        along_b += a[NORMAL + k] * b[TANGENT + k]
-    shared = touching & (cosine > 0)
-    a_is_larger = a[DELTA] >= b[DELTA]
-    larger, smaller = max(a[DELTA], b[DELTA]), min(a[DELTA], b[DELTA])
-    r = smaller / larger
-    step, slope = smooth_step(r), smooth_step_slope(r)
-    by_smaller, by_larger = slope * cosine / larger, -slope * cosine * r / larger
-    out[0] = where(shared, step * cosine, 0.0)
-    out[1] = where(shared, where(a_is_larger, by_larger, by_smaller), 0.0)
-    out[3] = where(shared, where(a_is_larger, by_smaller, by_larger), 0.0)
-    out[2] = where(shared, step * along_a / a[RHO], 0.0)
-    out[4] = where(shared, step * along_b / b[RHO], 0.0)
-
-
-@njit
-def press(pin, w, par, work):
-    """Normal force of each station, its slope by delta, and uniform less point law, to ``work.station[pin]``."""
-    sliced = par.law > MODE_LAW
+def press(pin, par, work):
+    """Normal force of each station and its slope by delta at constant rate, eq. (5); to ``work.station[pin]``."""
     for j in range(par.n_stations):
-        station, weight = work.station[pin, j], par.station_weight[j]
+        station = work.station[pin, j]
         delta = station[DELTA]
         touching = delta > 0
         if not any_of(touching):
-            station[FORCE] = station[SLOPE] = station[EXCESS] = 0.0
+            station[FORCE] = station[SLOPE] = 0.0
             continue
+        damping = par.c_d * par.station_weight[j]
         ramp = smooth_step(delta / par.delta_d)
-        slope_d = par.c_d * weight * smooth_step_slope(delta / par.delta_d) / par.delta_d * station[V_NORMAL]
-        uniform = 0.5 * weight * (par.k1u * delta + par.k2u) * delta
-        uniform_slope = 0.5 * weight * (2 * par.k1u * delta + par.k2u)
-        point = (par.k1p * delta + par.k2p) * delta
-        point_slope = 2 * par.k1p * delta + par.k2p
-        elastic, slope, excess = uniform, uniform_slope, uniform - point
-        if not sliced:
-            elastic = w * uniform + (1 - w) * point
-            slope = w * uniform_slope + (1 - w) * point_slope
-        total = elastic + par.c_d * weight * ramp * station[V_NORMAL]
+        ramp_slope = smooth_step_slope(delta / par.delta_d) / par.delta_d
+        elastic = (par.station_k1[j] * delta + par.station_k2[j]) * delta
+        slope = 2 * par.station_k1[j] * delta + par.station_k2[j]
+        total = elastic + damping * ramp * station[V_NORMAL]
         pressed = touching & (total > 0)
         station[FORCE] = where(pressed, total, 0.0)
-        station[SLOPE] = where(pressed, slope + slope_d, 0.0)
-        station[EXCESS] = where(pressed, excess, 0.0)
+        station[SLOPE] = where(pressed, slope + damping * ramp_slope * station[V_NORMAL], 0.0)
 
 
 @njit
 def classify(pin, par, work):
-    """Contact mode of `pin`: which stations touch, and on which side."""
-    touching = 0.0
-    opposed = False
-    for j in range(par.n_stations):
-        touches = work.station[pin, j, DELTA] > 0
-        touching += where(touches, 1.0, 0.0)
-        for i in range(j):
-            cosine = 0.0
-            for k in range(3):
-                cosine += work.station[pin, i, NORMAL + k] * work.station[pin, j, NORMAL + k]
-            opposed = opposed | (touches & (work.station[pin, i, DELTA] > 0) & (cosine < 0))
-    one_sided = where(touching == par.n_stations, UNIFORM_MODE, ONE_POINT)
-    return where(touching == 0, NONE, where(opposed, TWO_POINT, one_sided))
+    """Contact mode of `pin`, by its two end stations: which of them touch, and whether on the same side."""
+    outer, inner = work.station[pin, 0], work.station[pin, par.n_stations - 1]
+    cosine = 0.0
+    for k in range(3):
+        cosine += outer[NORMAL + k] * inner[NORMAL + k]
+    at_outer, at_inner = outer[DELTA] > 0, inner[DELTA] > 0
+    both = where(cosine < 0, TWO_POINT, UNIFORM)
+    return where(at_outer & at_inner, both, where(at_outer | at_inner, ONE_POINT, NONE))
 
 
 @njit
@@ -167,24 +118,23 @@ def contact_load(pin, par, work):
     """Contact forces of `pin`: added to pin and arm; ``work.contact[pin]`` and ``work.mode[pin]`` are written."""
     body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
     locate(pin, par, work)
-    sharing(pin, par.law, work)
-    press(pin, work.mode_weight[pin, 0], par, work)
-    work.contact[pin, 0] = work.contact[pin, 1] = 0.0
+    press(pin, par, work)
+    total = (0.0, 0.0, 0.0)
     for j in range(par.n_stations):
         station = work.station[pin, j]
         if not any_of(station[DELTA] > 0):
             continue
-        s = par.station_s[j]
-        outer = where(s == 0, 0.5, where(s > 0, 1.0, 0.0))
-        work.contact[pin, 0] += outer * station[FORCE]
-        work.contact[pin, 1] += (1 - outer) * station[FORCE]
         drag = par.c_t * par.station_weight[j] * smooth_step(station[DELTA] / par.delta_d) * station[V_TANGENT]
         n = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
         m = (station[TANGENT], station[TANGENT + 1], station[TANGENT + 2])
         point = (station[POINT], station[POINT + 1], station[POINT + 2])
         f_arm = axpy(station[FORCE], n, scale(drag, m))
+        total = add(total, f_arm)
         accumulate(work.force, arm, f_arm, cross(sub(point, row(work.pos, arm)), f_arm))
         f_pin = scale(-1.0, turn_back(work.relative, FRAME[arm], f_arm))
         lever = sub(turn_back(work.relative, FRAME[arm], point), row(work.pos, body))
         accumulate(work.force, body, f_pin, cross(lever, f_pin))
+    work.contact[pin, OUTER] = work.station[pin, 0, FORCE]
+    work.contact[pin, INNER] = work.station[pin, par.n_stations - 1, FORCE]
+    work.contact[pin, RESULTANT] = math.sqrt(dot(total, total))
     work.mode[pin] = classify(pin, par, work)

@@ -1,13 +1,11 @@
 """Energies of a joint and the powers that change them, at one state.
 
-With them, and w' the rate of the weight w of the law `mode`,
+With them
 
-    d/dt (kinetic + bushings + contacts) = input - load - bushing_damping - contact_damping - film
-                                           + bushing_moments + mode_blend
+    d/dt (kinetic + bushings + contacts) = input - load - bushing_damping - contact_damping - film + bushing_moments
 
-holds exactly along a solution. The last two are powers of what is not the gradient of a potential: a bushing's moment
-K phi works on the angular velocity, its potential phi . K phi / 2 changes with the rate of the rotation vector; the
-law `mode` blends two potentials with a weight that itself moves.
+holds exactly along a solution. The last is the power of what is not the gradient of a potential: a bushing's moment
+K phi works on the angular velocity, its potential phi . K phi / 2 changes with the rate of the rotation vector.
 
 Deformations are read off the force functions of the joint: a second row of parameters has springs of stiffness 1 and
 no damper, a third dampers of 1 and no spring.
@@ -15,7 +13,7 @@ no damper, a third dampers of 1 and no spring.
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.bushing import bushing_load
-from tolstat.kernel.contact import MODE_LAW, contact_load, smooth_step
+from tolstat.kernel.contact import contact_load, smooth_step
 from tolstat.kernel.dynamics import RAMP, forces, mass_of, resisting_torque
 from tolstat.kernel.topology import (
     BUSHING_BASE,
@@ -41,7 +39,6 @@ ENERGY_FIELDS = (
     Field("contact_damping", "W", "power that the contacts' normal damping takes"),
     Field("film", "W", "power that the lubricant film takes"),
     Field("bushing_moments", "W", "power of the bushings' elastic moments beyond their potential"),
-    Field("mode_blend", "W", "power of the moving weight of the law `mode`"),
 )
 ENERGY = dtype_of(ENERGY_FIELDS)
 
@@ -84,23 +81,14 @@ def contact_energy(pin, par, springs, work, out):
     for j in range(par.n_stations):
         out.contact_damping += work.station[pin, j, FORCE] * work.station[pin, j, V_NORMAL]
     contact_load(pin, springs, work)
-    weight = work.mode_weight[pin]
-    moving = 0.0
-    if par.law == MODE_LAW:
-        a, b = work.station[pin, 0], work.station[pin, 1]
-        moving = weight[1] * a[V_NORMAL] + weight[2] * a[V_TANGENT] + weight[3] * b[V_NORMAL] + weight[4] * b[V_TANGENT]
-    w = 1.0 if par.law > MODE_LAW else weight[0]
     for j in range(par.n_stations):
-        station, share = work.station[pin, j], par.station_weight[j]
+        station, weight = work.station[pin, j], par.station_weight[j]
         delta = station[DELTA]
         if delta <= 0:
             continue
         out.contact_damping -= station[FORCE] * station[V_NORMAL]
-        out.film += par.c_t * share * smooth_step(delta / par.delta_d) * station[V_TANGENT] ** 2
-        uniform = share * (par.k1u * delta / 6 + par.k2u / 4) * delta**2
-        point = (par.k1p * delta / 3 + par.k2p / 2) * delta**2
-        out.contacts += w * uniform + (1 - w) * point
-        out.mode_blend += moving * (uniform - point)
+        out.film += par.c_t * weight * smooth_step(delta / par.delta_d) * station[V_TANGENT] ** 2
+        out.contacts += (par.station_k1[j] * delta / 3 + par.station_k2[j] / 2) * delta**2
 
 
 @njit
@@ -129,7 +117,7 @@ def measure(t, q, v, rows, options, work, out):
     out.input = -work.force[INPUT_SHAFT, 5] * par.omega
     out.load = resisting_torque(t, par, options.start == RAMP) * (work.shaft[0] + v[PSI])
     out.bushings = out.contacts = 0.0
-    out.bushing_damping = out.contact_damping = out.film = out.bushing_moments = out.mode_blend = 0.0
+    out.bushing_damping = out.contact_damping = out.film = out.bushing_moments = 0.0
     for pin in range(4):
         contact_energy(pin, par, rows[1], work, out)
     for i in range(8):

@@ -55,7 +55,7 @@ def sample(times, states, par, work, loads, contact, psi):
         The solution, s; m and rad, per s.
     par, work : records of PARAM and WORK
         As elsewhere.
-    loads, contact, psi : ndarray, shapes (m, 8, 6), (m, 4, 2) and (m,)
+    loads, contact, psi : ndarray, shapes (m, 8, 6), (m, 4, 3) and (m,)
         Written as in `settle.Ring`: N, N m; N; Psi of eq. (13).
     """
     for k in range(times.size):

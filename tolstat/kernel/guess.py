@@ -29,13 +29,20 @@ def offset(pin, j, work):
 
 
 @njit
+def depth(load, k1, k2):
+    """Penetration at which a station carries `load`, eq. (5); 0 for a station without stiffness."""
+    slope = k2 + math.sqrt(k2 * k2 + 4 * k1 * load)
+    return 2 * load / slope if slope > 0 else 0.0
+
+
+@njit
 def need(pin, side, across, par, work):
-    """Displacement along t at which `pin` touches on `side`, and the radius of the station that touches first."""
+    """Displacement along t at which `pin` carries on `side`, and the radius of the end station that touches first."""
     load = abs(par.torque) / (2 * par.R)
-    reach = par.clearance[pin] + par.delta_d + load / par.k2p
-    reach = max(math.sqrt(max(reach * reach - across * across, 0.0)), LEAST * reach)
     best, radius = 0.0, 0.0
-    for j in range(par.n_stations):
+    for j in (0, par.n_stations - 1):
+        reach = par.clearance[pin] + par.delta_d + depth(load, par.station_k1[j], par.station_k2[j])
+        reach = max(math.sqrt(max(reach * reach - across * across, 0.0)), LEAST * reach)
         along, _ = offset(pin, j, work)
         want, r = side * reach - along, par.R + par.station_s[j]
         if radius == 0 or side * want / r < side * best / radius:

@@ -30,7 +30,7 @@ from tolstat.kernel.topology import (
 )
 from tolstat.kernel.triad import to_triad
 from tolstat.kernel.vector import add, cross, row, scale, sub, turn
-from tolstat.tables import Mode
+from tolstat.tables import INNER, OUTER, RESULTANT, Mode
 
 NONE, ONE_POINT = int(Mode.NONE), int(Mode.ONE_POINT)
 ZERO = (0.0, 0.0, 0.0)
@@ -39,10 +39,7 @@ ZERO = (0.0, 0.0, 0.0)
 @njit
 def contact_radius(par):
     """Distance R' (m) of the contacts from O: the hole's centre and the outermost station."""
-    outer = 0.0
-    for j in range(par.n_stations):
-        outer = max(outer, par.station_s[j])
-    return par.R + outer
+    return par.R + par.station_s[0]
 
 
 @njit
@@ -106,7 +103,8 @@ def touch(pin, radius, force, par, work):
     """Contact force on `pin`, in C axes: kept, and taken off what moves pin and arm."""
     arm = ARM + ARM_OF_PIN[pin]
     size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
-    work.contact[pin, 0], work.contact[pin, 1] = size, 0.0
+    work.contact[pin, OUTER] = work.contact[pin, RESULTANT] = size
+    work.contact[pin, INNER] = 0.0
     work.mode[pin] = ONE_POINT if size > 0 else NONE
     on_arm = turn(work.relative, FRAME[arm], force)
     for body, off in ((PIN + pin, scale(-1.0, force)), (arm, on_arm)):

@@ -68,7 +68,7 @@ def leave(lane, good, rows, options, alone, batch, samples, results):
         summarise(own, out)
         good = is_finite(out)
         if good:
-            conclude(par, options, work, own, batch.notes[lane], ring.cross, out)
+            conclude(batch.notes[lane], out)
         control.left[lane] = control.looked[lane] = 0
     if good:
         closer = options.fidelity == DYNAMIC and options.peak_substeps > 1
@@ -143,7 +143,7 @@ def fill(lane, queued, rows, words, options, alone, batch, samples, results):
 
 @njit
 def lockstep(rows, words, options, patience, alone, batch, samples, results, tally):
-    """Simulate joints with one contact law and one number of stations; row i of the results is joint i.
+    """Simulate joints with one number of contact stations; row i of the results is joint i.
 
     Parameters
     ----------

@@ -7,25 +7,24 @@ import numpy as np
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.borrow import fetch
-from tolstat.kernel.cross_growth import CrossScratch, make_cross_scratch
 from tolstat.kernel.lane import pick
 from tolstat.kernel.state import make_state_record
 from tolstat.kernel.topology import N_DOF, PSI
 from tolstat.kernel.trail import Trail, make_trail
 from tolstat.kernel.vector import copy, larger
-from tolstat.kernel.work import EXCESS
+from tolstat.kernel.work import FORCE
+from tolstat.tables import CONTACTS
 
 SAMPLE = np.dtype(
     [
         ("loads", "f8", (8, 6)),  # N, N m
-        ("contact", "f8", (4, 2)),  # N
+        ("contact", "f8", (4, len(CONTACTS))),  # N
         ("modulus", "f8", (8, 2)),  # |F|, |T|
         ("change", "f8", (2,)),  # largest change of |F| and |T| against the revolution before
         ("tau", "f8"),
         ("psi", "f8"),  # Psi, eq. (13)
         ("mode", "u1", (4,)),
-        ("skew", "f8"),  # antisymmetric part of the pins' contact stiffness, summed, N/m
-        ("growth", "f8"),  # of the cross, where `cross_growth` has looked at it, 1/s
+        ("pressed", "u2", (4,)),  # bit j: station j of the pin carries
         ("q", "f8", (N_DOF,)),  # m, rad
         ("v", "f8", (N_DOF,)),  # per s
     ],
@@ -38,7 +37,7 @@ def make_samples(joints: int, steps_per_rev: int) -> np.recarray:
     """Allocate revolutions, shape (joints, steps_per_rev), filled with NaN."""
     samples = np.zeros((joints, steps_per_rev), SAMPLE)
     for name in SAMPLE.names:
-        if name != "mode":
+        if SAMPLE[name].base.kind == "f":
             samples[name] = np.nan
     return samples.view(np.recarray)
 
@@ -50,24 +49,22 @@ class Ring(NamedTuple):
     trail: Trail  # of the revolutions before
     shadow: np.record  # State of a neighbour of the joint, see `classify`
     fine: np.recarray  # (3,) SAMPLE, see `closeup`
-    cross: CrossScratch
 
 
 def make_ring(steps_per_rev: int, max_revs: int) -> Ring:
     """Allocate, filled with NaN."""
     samples, fine = make_samples(1, steps_per_rev)[0], make_samples(1, 3)[0]
-    return Ring(samples, make_trail(steps_per_rev, max_revs), make_state_record(N_DOF), fine, make_cross_scratch())
+    return Ring(samples, make_trail(steps_per_rev, max_revs), make_state_record(N_DOF), fine)
 
 
 @njit
-def skew(lane, work):
-    """Sum over the pins of |df_a / d(delta_b) - df_b / d(delta_a)|, N/m: the law `mode` has no potential."""
-    total = 0.0
-    for pin in range(4):
-        a = pick(work.mode_weight[pin, 3], lane) * pick(work.station[pin, 0, EXCESS], lane)
-        b = pick(work.mode_weight[pin, 1], lane) * pick(work.station[pin, 1, EXCESS], lane)
-        total += abs(a - b) if abs(a - b) > 0 else 0.0  # NaN where no law was asked
-    return total
+def pressed(pin, lane, par, work):
+    """Which stations of `pin` carry, as bits."""
+    bits = 0
+    for j in range(par.n_stations):
+        if pick(work.station[pin, j, FORCE], lane) > 0:
+            bits |= 1 << j
+    return bits
 
 
 @njit
@@ -96,10 +93,10 @@ def record(k, lane, in_full, par, work, v, samples):
     if not in_full:
         return
     for pin in range(4):
-        for side in (0, 1):
-            sample.contact[pin, side] = pick(work.contact[pin, side], lane)
+        for i in range(len(CONTACTS)):
+            sample.contact[pin, i] = pick(work.contact[pin, i], lane)
         sample.mode[pin] = int(pick(work.mode[pin], lane))
-    sample.skew = skew(lane, work)
+        sample.pressed[pin] = pressed(pin, lane, par, work)
     omega, rate = pick(par.omega, lane), pick(v[PSI], lane)
     sample.tau = (pick(work.shaft[0], lane) + rate) / omega
     sample.psi = rate / (omega * sample.tau)
@@ -212,8 +209,8 @@ def summarise(samples, out):
                 out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / n, top - low
     out.psi_max, out.roughness = 0.0, roughness(samples)
     for pin in range(4):
-        for side in (0, 1):
-            out.contact_max[pin, side], _ = extremes(samples.contact[:, pin, side])
+        for i in range(len(CONTACTS)):
+            out.contact_max[pin, i], _ = extremes(samples.contact[:, pin, i])
         for mode in range(4):
             count = 0
             for s in range(n):

@@ -9,8 +9,6 @@ from tolstat.kernel import dynamics, integrate, linsolve, tangent
 from tolstat.kernel._jit import njit
 from tolstat.kernel.classify import build_classify
 from tolstat.kernel.closeup import build_closeup
-from tolstat.kernel.contact import MODE_LAW
-from tolstat.kernel.cross_growth import cross_growth
 from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium, near
 from tolstat.kernel.guess import rigid_guess
 from tolstat.kernel.ideal_loads import ideal_loads
@@ -20,7 +18,7 @@ from tolstat.kernel.state import AHEAD, FACTORISATIONS, HALVINGS, ITERATIONS, ST
 from tolstat.kernel.topology import N_DOF, N_LUMPS, PSI
 from tolstat.kernel.trail import closure_trend, note_closure
 from tolstat.kernel.work import make_work
-from tolstat.tables import MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
+from tolstat.tables import CONTACTS, MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
 NOT_FINITE, OUTSIDE_MODEL, NOT_PERIODIC = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL), int(Status.NOT_PERIODIC)
@@ -64,7 +62,12 @@ reset = integrate.reset
 def inside_model(par):
     """Whether the model has a meaning for a joint; written so that NaN has none."""
     good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
-    good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0 and par.k2u > 0 and par.k2p > 0
+    good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0
+    linear = 0.0
+    for j in range(par.n_stations):
+        good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0
+        linear += par.station_k2[j]
+    good = good and linear > 0
     for pin in range(4):
         good = good and par.clearance[pin] >= 0
     return good
@@ -88,12 +91,12 @@ def clear_results(out):
     out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
     out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
     out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = out.psi_max = nan
-    out.roughness = out.refinement_change = out.cross_growth = out.flutter = nan
+    out.roughness = out.refinement_change = nan
     for b in range(8):
         out.F_max[b] = out.F_mean[b] = out.F_range[b] = nan
         out.T_max[b] = out.T_mean[b] = out.T_range[b] = nan
     for pin in range(4):
-        for k in range(2):
+        for k in range(len(CONTACTS)):
             out.contact_max[pin, k] = nan
         for k in range(4):
             out.mode_share[pin, k] = nan
@@ -229,11 +232,8 @@ def describe(status, options, counters, out):
 
 
 @njit
-def conclude(par, options, work, samples, notes, cross, out):
+def conclude(notes, out):
     """Write what only a joint that has settled has."""
-    if options.fidelity == DYNAMIC and options.max_refinements > 0:
-        out.cross_growth = cross_growth(par, work, samples, cross) if par.law == MODE_LAW else 0.0
-        out.flutter = 0.0
     out.closure_trend, _ = closure_trend(0.0, notes)
     out.motion, out.period = PERIODIC, 1
 
@@ -264,7 +264,7 @@ def simulate_joint(par, options, work, state, ring, out):
         if not is_finite(out):
             status, failed = NOT_FINITE, state.counters[STEPS]
     if status == OK:
-        conclude(par, options, work, ring.samples, ring.trail.notes, ring.cross, out)
+        conclude(ring.trail.notes, out)
         if options.fidelity == DYNAMIC and options.peak_substeps > 1:
             look_closer(par, options, work, state, ring.samples, ring.fine, out)
     elif status == NOT_SETTLED:

@@ -8,7 +8,7 @@ turning of the loads themselves with the bodies, gyroscopic terms (2 Omega / cv 
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.bushing import markers
-from tolstat.kernel.contact import MODE_LAW, smooth_step, smooth_step_slope
+from tolstat.kernel.contact import smooth_step, smooth_step_slope
 from tolstat.kernel.dynamics import mass_of
 from tolstat.kernel.lane import any_of, fma, where
 from tolstat.kernel.topology import (
@@ -26,7 +26,6 @@ from tolstat.kernel.topology import (
 from tolstat.kernel.vector import add, axpy, cross, of_column, row, scale, sub, turn, turn_back
 from tolstat.kernel.work import (
     DELTA,
-    EXCESS,
     FORCE,
     NORMAL,
     POINT,
@@ -207,23 +206,9 @@ def _add_dyads(pin, n, by_n, m, by_m, work):
 
 
 @njit
-def _add_dyad(pin, left, right, work):
-    """Add left right^T in the same way."""
-    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
-    for i in range(6):
-        for j in range(6):
-            work.lump_block[body, i, j] += left[i] * right[j]
-            work.pin_arm[pin, i, j] += left[i] * right[6 + j]
-            work.arm_pin[pin, i, j] += left[6 + i] * right[j]
-            work.lump_block[arm, i, j] += left[6 + i] * right[6 + j]
-
-
-@njit
 def contact_tangent(pin, cv, par, work):
-    """Add the contact of `pin`: elastic, damping, film, and the sharing between its stations."""
-    left, right = work.left, work.right  # row 0: rows n and m of one station; row 1: summed over stations, the sharing
-    left[1, :] = 0.0
-    right[1, :] = 0.0
+    """Add the contact of `pin`: elastic, damping, film. Symmetric but for what film and damping add."""
+    by_n, by_m = work.by_n, work.by_m
     for j in range(par.n_stations):
         station = work.station[pin, j]
         touching = station[DELTA] > 0
@@ -242,16 +227,9 @@ def contact_tangent(pin, cv, par, work):
         _directions(pin, j, work)
         n, m = work.vectors[0], work.vectors[1]
         for i in range(12):
-            left[0, i] = fma(nm, m[i], nn * n[i])
-            right[0, i] = fma(mm, m[i], mn * n[i])
-        _add_dyads(pin, n, left[0], m, right[0], work)
-        if par.law == MODE_LAW:
-            by_delta, by_m = work.mode_weight[pin, 1 + 2 * j], work.mode_weight[pin, 2 + 2 * j]
-            for i in range(12):
-                left[1, i] += station[EXCESS] * n[i]
-                right[1, i] += by_delta * n[i] + by_m * m[i]
-    if par.law == MODE_LAW and any_of(work.mode_weight[pin, 0] > 0):
-        _add_dyad(pin, left[1], right[1], work)
+            by_n[i] = fma(nm, m[i], nn * n[i])
+            by_m[i] = fma(mm, m[i], mn * n[i])
+        _add_dyads(pin, n, by_n, m, by_m, work)
 
 
 @njit

@@ -12,7 +12,7 @@ import numpy as np
 
 from tolstat.kernel._jit import njit
 from tolstat.kernel.vector import copy, larger
-from tolstat.tables import RESULT
+from tolstat.tables import CONTACTS, RESULT
 
 MOST_KEPT = 16
 """Revolutions."""
@@ -133,7 +133,7 @@ def combine(last, count, trail, out):
         one = trail.revolution[r % kept]
         out.psi_max = max(out.psi_max, one.psi_max)
         for pin in range(4):
-            for side in (0, 1):
-                out.contact_max[pin, side] = max(out.contact_max[pin, side], one.contact_max[pin, side])
+            for i in range(len(CONTACTS)):
+                out.contact_max[pin, i] = max(out.contact_max[pin, i], one.contact_max[pin, i])
             for mode in range(4):
                 out.mode_share[pin, mode] += one.mode_share[pin, mode] / count

@@ -12,8 +12,8 @@ from tolstat.tables import MAX_STATIONS
 
 # columns of work.station
 POINT, NORMAL, TANGENT = 0, 3, 6
-RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE, EXCESS = 9, 10, 11, 12, 13, 14, 15
-N_STATION = 16
+RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE = 9, 10, 11, 12, 13, 14
+N_STATION = 15
 
 # rows of work.core
 PSI_COLUMN, PSI_ROW, PSI_PSI = 0, 1, 2
@@ -30,10 +30,9 @@ FIELDS = {
     "spin": (N_BODIES, 3),  # angular velocity against the ideal frame
     "force": (N_BODIES, 6),  # force, torque about the reference point
     "load": (8, 6),  # bushing loads on the lump, in the base marker's (e, t, z)
-    "contact": (4, 2),  # normal force on the outer and inner half of each pin
+    "contact": (4, 3),  # normal force at the outer and inner end station of each pin, resultant of all its stations
     "mode": (4,),  # contact mode of each pin
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
-    "mode_weight": (4, 5),  # w of the law `mode`, then dw/d(delta_a, m_a, delta_b, m_b)
     "lump_block": (N_LUMPS, 6, 6),  # blocks of the tangent, factorised in place
     "hub_pin": (4, 6, 6),  # rows of the hub, columns of pin p
     "pin_hub": (4, 6, 6),
@@ -45,8 +44,8 @@ FIELDS = {
     "psi_pin": (4, 6),  # fill-in
     "core": (1, 3, 6),  # psi: its column in the rows of the hub, its row, itself; after elimination their factors
     "vectors": (2, 12),  # n and m of a contact station as displacements of pin and arm
-    "left": (2, 12),  # scratch of contact_tangent
-    "right": (2, 12),
+    "by_n": (12,),  # scratch of contact_tangent: forces along n and m of that station by these displacements
+    "by_m": (12,),
     "solution": (N_DOF,),  # right-hand side, then solution, of the linear system
 }
 """State of the bodies at one instant, the loads between them, and the tangent's blocks.

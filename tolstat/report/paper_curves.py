@@ -18,6 +18,7 @@ from tolstat import ideal
 from tolstat.analysis import paper
 from tolstat.report import style
 from tolstat.report.paper_source import PaperStudy
+from tolstat.tables import CONTACTS, INNER, OUTER
 
 Array = NDArray[np.float64]
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
@@ -104,13 +105,11 @@ def springs(study: PaperStudy, alpha: float) -> Figure:
     with style.settings():
         title = f"Figures 21, 22. Normal force of the contact springs, α = {np.degrees(alpha):.0f}°"
         figure, axes = page(title, 2, 4, 2.6, 13.0)
-        ends = [(pin, end) for pin in (2, 3, 0, 1) for end in (0, 1)]
+        ends = [(pin, end) for pin in (2, 3, 0, 1) for end in (OUTER, INNER)]
         for number, (ax, (pin, end)) in enumerate(zip(axes, ends, strict=True), start=1):
             _draw(ax, study, alpha, study.main.contact[:, :, pin, end])
             side = "input" if pin > 1 else "output"
-            ax.set_title(
-                f"spring {number}: pin {pin + 1} ({side}), {'outer' if end == 0 else 'inner'} end", fontsize=9.5
-            )
+            ax.set_title(f"spring {number}: pin {pin + 1} ({side}), {CONTACTS[end]} end", fontsize=9.5)
             ax.set_ylabel("force [N]" if number % 4 == 1 else "")
         _share_scale(axes, 20.0)
         _legend(figure, study, [alpha])

@@ -12,7 +12,7 @@ from tolstat.analysis import paper, paper_spectra
 from tolstat.analysis.paper_evidence import Evidence
 from tolstat.joint import Joint
 from tolstat.store import ResultStore
-from tolstat.tables import Status
+from tolstat.tables import RESULTANT, Status
 
 Array = NDArray[np.float64]
 
@@ -37,8 +37,8 @@ class Main:
         Force (N) and torque (N m) over the input angle.
     couple : ndarray, shape (m, samples)
         Couple of cross bushings 1 and 2 about the cross's normal, N m.
-    contact : ndarray, shape (m, samples, 4, 2)
-        Normal force on outer and inner half of pins 1 to 4, N.
+    contact : ndarray, shape (m, samples, 4, 3)
+        Contact forces of pins 1 to 4, in the order of `tables.CONTACTS`, N.
     tau : ndarray, shape (m, samples)
         Speed ratio.
     """
@@ -81,7 +81,7 @@ class Main:
             tuple(cases[i] for i in self.case),
             self.alpha,
             self.gamma,
-            self.results["contact_max"],
+            self.results["contact_max"][:, :, RESULTANT],
             self.results["psi_max"],
             paper_spectra.amplitudes(self.moduli),
             100.0 * np.array(away) / np.abs(torque),

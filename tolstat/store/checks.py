@@ -22,8 +22,6 @@ from tolstat.tables import HistorySpec
 
 DAMAGED = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
 """What reading a damaged file raises, in h5py or in the code that trusts a file's attributes."""
-CHECKED_SINCE = 2
-"""First schema version with checksums."""
 MOST_COMPRESSED = 1100
 """Beyond this ratio no gzip stream goes (deflate ends at 1032): a dataset that claims more is not whole."""
 MOST_SAMPLES = 50_000_000
@@ -32,13 +30,8 @@ MOST_TEXT = 64_000_000
 """Bytes of the longest attribute that is read."""
 
 
-def check_schema(path: Path, file: h5py.File) -> int:
+def check_schema(path: Path, file: h5py.File) -> None:
     """Check that an HDF5 file is a result file that this version can read.
-
-    Returns
-    -------
-    int
-        Its schema version.
 
     Raises
     ------
@@ -50,12 +43,11 @@ def check_schema(path: Path, file: h5py.File) -> int:
         found = f"is HDF5, but of type {filetype!r} instead of {FILETYPE!r}"
         raise fault(path, found, "give a file that tolstat run has made")
     version = integer(file, "schema_version")
-    if version > SCHEMA_VERSION:
-        found = f"has schema version {version}, this tolstat reads up to {SCHEMA_VERSION}"
-        raise fault(path, found, "use a newer tolstat")
-    if (version >= CHECKED_SINCE or integrity.DIGEST in file.attrs) and not integrity.is_sealed(file):
+    if version != SCHEMA_VERSION:
+        remedy = "use a newer tolstat" if version > SCHEMA_VERSION else "run its study again"
+        raise fault(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)
+    if not integrity.is_sealed(file):
         raise ValueError("its attributes are not as they were written")
-    return version
 
 
 def integer(file: h5py.File, name: str, default: int | None = None) -> int:
@@ -114,7 +106,7 @@ def history_specs(file: h5py.File) -> dict[str, HistorySpec]:
     return specs
 
 
-def check_tables(file: h5py.File, version: int) -> int:
+def check_tables(file: h5py.File) -> int:
     """Check that every column kept is there as the tables have it, and lies in the file as a whole.
 
     Returns
@@ -131,15 +123,15 @@ def check_tables(file: h5py.File, version: int) -> int:
     n = int(status.shape[0]) if status.ndim == 1 else 0
     if n < 1:
         raise ValueError(f"/results/status has the shape {status.shape}")
-    groups = {"errors": ERROR_COLUMNS, "results": kept.columns(mapping(file, "identity"))}
-    if version >= CHECKED_SINCE:
-        histories = tuple(check_column(name) for name in mapping(file, "histories"))
-        groups["ledger"] = (*LEDGER_COLUMNS, *histories)
-    groups |= {name: columns for name, (columns, _) in descriptions(file).items()}
+    histories = tuple(check_column(name) for name in mapping(file, "histories"))
+    groups = {
+        "errors": ERROR_COLUMNS,
+        "results": kept.columns(mapping(file, "identity")),
+        "ledger": (*LEDGER_COLUMNS, *histories),
+        **{name: columns for name, (columns, _) in descriptions(file).items()},
+    }
     for group, columns in groups.items():
         for c in columns:
-            if version < SCHEMA_VERSION and c.name not in file[group]:
-                continue  # a column that files of that version did not have yet
             _check_column(_dataset(file, group, c.name), n, c.dtype)
     return n
 

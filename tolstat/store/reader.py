@@ -44,8 +44,7 @@ class Reader:
         self.path = path
         self._file = file
         attrs = file.attrs
-        version = checks.check_schema(path, file)
-        self._checked = version >= checks.CHECKED_SINCE
+        checks.check_schema(path, file)
         self._read_judgement()
         self.created = text(attrs, "created")
         self.git_commit = text(attrs, "git_commit")
@@ -56,13 +55,13 @@ class Reader:
         self.sampling = checks.mapping(file, "sampling")
         self.fidelity = checks.mapping(file, "fidelity") if "fidelity" in attrs else {}
         self.versions: dict[str, str] = checks.mapping(file, "versions")
-        self.retries: list[dict[str, Any]] = json.loads(text(attrs, "retries")) if self._checked else []
+        self.retries: list[dict[str, Any]] = json.loads(text(attrs, "retries"))
         self.stop: dict[str, Any] = checks.mapping(file, "stop") if "stop" in attrs else {}
         design = checks.mapping(file, "design")
         self.case_names: tuple[str, ...] = tuple(design["cases"])
         self.variants = tuple(Variant(**variant) for variant in design["variants"])
         self.history_specs = checks.history_specs(file)
-        self.n = checks.check_tables(file, version)
+        self.n = checks.check_tables(file)
         first = checks.integer(file, "first_row", 0)
         self.rows = range(first, first + self.n)
         self.campaign_rows = checks.integer(file, "campaign_rows", self.n)
@@ -110,7 +109,7 @@ class Reader:
     def damaged(self) -> NDArray[np.intp]:
         """Rows of this file whose results are not as they were written, as after a torn write or a bad disk."""
         found = [np.empty(0, np.intp)]
-        for first in range(0, self.n if self._checked else 0, BLOCK):
+        for first in range(0, self.n, BLOCK):
             rows = slice(first, first + BLOCK)
             done = self._status(rows) != Status.PENDING
             if done.any():
@@ -205,17 +204,14 @@ class Reader:
         if fields is not None:
             return self._in_blocks(self.results, rows, tables.RESULT, fields)
         table = self._results(rows)
-        if self._checked:
-            broken = (table["status"] == Status.PENDING) | ~self._intact(rows, table)
-            for field in tables.RESULT_FIELDS:
-                table[field.name][broken] = np.nan if np.dtype(field.dtype).kind == "f" else 0
+        broken = (table["status"] == Status.PENDING) | ~self._intact(rows, table)
+        for field in tables.RESULT_FIELDS:
+            table[field.name][broken] = np.nan if np.dtype(field.dtype).kind == "f" else 0
         self._check_status(table["status"])
         return table
 
     def attempt(self, rows: slice = slice(None)) -> NDArray[np.int32]:
         """Which attempt gives the results of each joint, (n,): 0 is the study's, k is ``retries[k - 1]``."""
-        if not self._checked:
-            return np.zeros(self.n, np.int32)[rows]
         return np.asarray(self.column("ledger", "attempt", rows))
 
     def histories(self, name: str, rows: NDArray[np.intp] | None = None) -> NDArray[Any]:
@@ -327,8 +323,6 @@ class Reader:
         return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
 
     def _check_errors(self, rows: slice, errors: NDArray[np.void]) -> None:
-        if not self._checked:
-            return
         first = self.rows.start + rows.indices(self.n)[0]
         described = [(c, self._read(name, c, dtype, rows)) for name, (c, dtype) in descriptions(self._file).items()]
         right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", rows)
@@ -338,8 +332,6 @@ class Reader:
             raise fault(self.path, found, remedy)
 
     def _check_history(self, name: str, rows: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
-        if not self._checked:
-            return
         held = self.column("ledger", f"{name}_check", slice(None))[rows[done]]
         wrong = integrity.history_checks(values[done], rows[done] + self.rows.start) != held
         if wrong.any():
@@ -363,8 +355,7 @@ class Reader:
         table = np.zeros(max(0, last - first), dtype)
         # The status comes first among the results: what it declares valid was written before it was.
         for c in columns:
-            if c.name in self._file[group]:
-                c.of(table)[:] = self.column(group, c.name, slice(first, last))
+            c.of(table)[:] = self.column(group, c.name, slice(first, last))
         return table
 
     def attributes(self) -> dict[str, str | int]:

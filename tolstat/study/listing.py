@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from tolstat import joint, schema
 from tolstat.errors import Fault, InputError, gather
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import merged
+from tolstat.joint.model import merged, overridden
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
 from tolstat.study.model import MAX_ROWS, CaseEntry, Range, Solver, VariantEntry
@@ -197,7 +197,7 @@ class _Variants:
         return [cases.index(name) for name in names]
 
     def _expanded(self, entry: VariantEntry, run: list[int], at: Section) -> list[Listed]:
-        keys = merged(self._study, entry.joint)
+        keys = overridden(self._study, entry.joint)
         made = [self._joint(keys, (*at, "joint"))]
         ranges = dict(_ranges(entry.vary, (*at, "vary"), self._place))
         if ranges:

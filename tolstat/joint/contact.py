@@ -6,6 +6,7 @@ f(delta) = k1 delta^2 + k2 delta of its own and a weight of damping and film.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -186,8 +187,10 @@ class Contact(Strict):
         """Coefficients k1u (N/m^2), k2u (N/m), k1p (N/m^2), k2p (N/m): as printed, or fitted to eq. (3).
 
         Point coefficients follow from the uniform ones by H where they are not given, and always where the
-        uniform ones are fitted. The law ``"stations"`` has none.
+        uniform ones are fitted. NaN with the law ``"stations"``, which has none.
         """
+        if self.law == "stations":
+            return (math.nan,) * 4
         k1u, k2u, k1p, k2p = self.k1u, self.k2u, self.k1p, self.k2p
         if self.coefficients == "fitted":
             assert self.fit_load is not None

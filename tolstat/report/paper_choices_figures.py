@@ -18,7 +18,13 @@ from tolstat.report.paper_equations import hertz
 from tolstat.report.paper_source import PaperStudy
 
 Array = NDArray[np.float64]
-LAWS = {"mode": ("o", "#0072B2"), "point": ("^", "#D55E00"), "uniform": ("s", "#009E73"), "sliced": ("D", "#CC79A7")}
+LAWS = {
+    "mode": ("o", "#0072B2"),
+    "point": ("^", "#D55E00"),
+    "uniform": ("s", "#009E73"),
+    "sliced": ("D", "#CC79A7"),
+    "stations": ("P", "#56B4E9"),
+}
 FLOOR = 0.05
 """Smallest change of a load that the sweeps show, per cent."""
 

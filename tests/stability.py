@@ -149,7 +149,8 @@ def main() -> None:
             )
             fine = Options(steps_per_rev=given.steps)
             if given.exponents:
-                for name, rows in (("ok", np.flatnonzero(ok)[: given.exponents]), ("not ok", np.flatnonzero(~ok))):
+                others = np.isin(results["status"], SIMULATED) & ~ok
+                for name, rows in (("ok", np.flatnonzero(ok)[: given.exponents]), ("others", np.flatnonzero(others))):
                     values = np.array([exponent(params[i : i + 1], fine, 6, 16) for i in rows])
                     print(f"  {name}: {len(rows)} exponents, {(values > 0).sum()} above 0, ", end="")
                     print(f"largest {np.nanmax(values, initial=-np.inf):.3g} a revolution", flush=True)

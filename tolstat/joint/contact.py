@@ -178,9 +178,10 @@ class Contact(Strict):
             return value
         if value is None:
             raise refuse("missing key, needed where k1p and k2p are not given", "add H, or both k1p and k2p")
-        if law == "mode" and value < 2.0:
-            found = f"2 k2p = 2 k2u / {value:g} exceeds k2u: the middle station would be negative"
-            raise refuse(found, "give H >= 2, or another law")
+        least = 2.0 if fitted or info.data.get("k2p") is None else math.sqrt(2.0)  # k2p = k2u/H, k1p = k1u/H^2
+        if law == "mode" and value < least:
+            found = f"{value:g} makes two ends stiffer than uniform contact: the middle station would be negative"
+            raise refuse(found, f"give at least {least:.4g}, or another law")
         return value
 
     def stiffness(self, of: Material) -> tuple[float, float, float, float]:

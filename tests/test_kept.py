@@ -83,10 +83,11 @@ def test_faults_are_told_together(tmp_path: Path) -> None:
     assert "allowed here: F_max, F_mean" in said
     with pytest.raises(InputError, match=r"at least"):
         loaded(tmp_path, text())
-    with pytest.raises(InputError, match=r"fork4\.T_max, pin1\.contact_max, psi_max") as caught:
+    contacts = ", ".join(rf"pin1\.contact_{name}_max" for name in ("outer", "inner", "resultant"))
+    with pytest.raises(InputError, match=rf"fork4\.T_max, {contacts}, psi_max") as caught:
         loaded(tmp_path, text("cross*.F_max", body=body))
     assert "cross1.F_max" not in str(caught.value)
-    assert loaded(tmp_path, text("cross1.F_max", "fork*.T_max", "pin1.contact_max", "psi_max", body=body)).limits
+    assert loaded(tmp_path, text("cross1.F_max", "fork*.T_max", "pin1.contact*", "psi_max", body=body)).limits
 
 
 def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
@@ -278,5 +279,5 @@ def test_what_is_not_kept_cannot_be_asked_for(tmp_path: Path) -> None:
             with pytest.raises(InputError, match=r"does not keep .*\n.*give one of: cross1\.F, "):
                 tail.worst(store, by)
     until = precision.parse("P(pin1.contact > 1 N) width < 0.1")
-    with pytest.raises(InputError, match=r"leaves out pin1\.contact of --until\n.*add pin1\.contact_max"):
+    with pytest.raises(InputError, match=r"leaves out pin1\.contact of --until\n.*add pin1\.contact_outer_max, pin1"):
         precision.run_until(study.load(tmp_path / "small.toml"), tmp_path / "b.h5", until, lambda row: None)

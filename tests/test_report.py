@@ -14,7 +14,7 @@ from tests import synthetic
 from tolstat import report
 from tolstat.errors import InputError, StoreError
 from tolstat.report import exceedance, source, style, sweep, text
-from tolstat.tables import BUSHINGS, RESULT, RESULTANT, Status
+from tolstat.tables import BUSHINGS, RESULT, Status
 
 
 def campaign(n=201, method="random", limits=None, **kwargs):
@@ -44,7 +44,7 @@ def test_every_limit_has_a_row_with_its_share_and_the_nominal_load():
     assert list(table["unit"]) == ["N*m", "N", "1"]
     assert list(table["count"]) == [
         int((made.results["T_max"][:, BUSHINGS.index("fork3")] > 18.0).sum()),
-        int((made.results["contact_max"][:, 1, RESULTANT] > 650.0).sum()),
+        int((made.results["contact_max"][:, 1].max(axis=1) > 650.0).sum()),
         int((made.results["psi_max"] > 1.1e-4).sum()),
     ]
     assert table["nominal"][0] == made.nominal["T_max"][0, BUSHINGS.index("fork3")]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tolstat.tables import BUSHINGS, DESIGN_FIELDS, ERROR_FIELDS, LEDGER_FIELDS, PINS, RESULT_FIELDS, Field, Mode
 
-CONTACT_NAMES = ("contact_outer", "contact_inner", "contact")
+CONTACT_NAMES = ("contact_outer", "contact_inner", "contact_resultant")
 """Names of a pin's contact forces in columns and traces, in the order of `CONTACTS`."""
 
 

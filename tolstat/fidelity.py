@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import BUSHINGS, FINEST_STEPS, PINS, RESULTANT, Fidelity, Options, Simulation, Status
+from tolstat.tables import BUSHINGS, FINEST_STEPS, PINS, Fidelity, Options, Simulation, Status
 
 Array = NDArray[np.float64]
 
@@ -155,7 +155,7 @@ def values(results: NDArray[np.void], name: str) -> tuple[Array, Array]:
     """A load of each joint and the joint's largest of the kind, which errors are relative to; (n,) each, SI."""
     part, _, kind = name.partition(".")
     if kind == "contact":
-        contact = results["contact_max"][:, :, RESULTANT]
+        contact = results["contact_max"].max(axis=2)
         return contact[:, PINS.index(part)], contact.max(axis=1)
     if name == "psi":
         return results["psi_max"], results["psi_max"]

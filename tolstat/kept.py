@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.columns import RESULT_COLUMNS, Column
+from tolstat.columns import CONTACT_NAMES, RESULT_COLUMNS, Column
 
 KEY = "output.results"
 """Key in the identity of a study: names of the columns selected; not there where all are kept."""
@@ -56,11 +56,12 @@ def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
             c.of(results)[:] = np.nan
 
 
-def needed(load: str) -> str:
-    """Column that a load with a limit (``cross1.F``, ``pin1.contact``, ``psi``) is read from."""
-    return f"{load}_max"
+def needed(load: str) -> tuple[str, ...]:
+    """Columns that a load with a limit (``cross1.F``, ``pin1.contact``, ``psi``) is read from."""
+    pin, _, kind = load.partition(".")
+    return tuple(f"{pin}.{name}_max" for name in CONTACT_NAMES) if kind == "contact" else (f"{load}_max",)
 
 
 def holds(kept: Iterable[Column], load: str) -> bool:
     """Whether a load that can have a limit can be read from the columns kept."""
-    return any(c.name == needed(load) for c in kept)
+    return {c.name for c in kept}.issuperset(needed(load))

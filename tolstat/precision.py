@@ -168,7 +168,7 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
         found = f"sampling.method is {own!r}: only independent samples, alike in weight, have such an interval"
         raise InputError([Fault("--until", found, 'use sampling.method = "random"')])
     if not kept.holds(study.output.columns, rule.load):
-        remedy = f"add {kept.needed(rule.load)}"
+        remedy = f"add {', '.join(kept.needed(rule.load))}"
         raise InputError([Fault(f"{study.path}: output.results", f"leaves out {rule.load} of --until", remedy)])
     planned = looks(rule.width, study.samples)
     first = int(study.sampling.nominal_first)

@@ -51,7 +51,7 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
     n = options.steps_per_rev
     loads = "force e, t, z (N), torque e, t, z (N m) of bushings cross 1-4, fork 1-4 on the lump, in base marker axes"
     if histories == "full":
-        contact = "contact force of pins 1-4: normal force at the outer and the inner end, resultant of all stations"
+        contact = "contact force of pins 1-4: of the outermost station, of the innermost one, resultant of all stations"
         modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
             "loads": HistorySpec((n, 8, 6), "f4", "N, N*m", loads, ("theta", "bushing", "component")),

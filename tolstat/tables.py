@@ -22,7 +22,7 @@ CHANNELS = {
 }
 """Unit of every load that cycles are counted of: components of a bushing's force and torque, and their moduli."""
 CONTACTS = ("outer", "inner", "resultant")
-"""Contact forces of a pin: at its outer end station, at its inner one, and the resultant of all its stations."""
+"""Contact forces of a pin: normal force of its outermost and of its innermost station, and the resultant of all."""
 OUTER, INNER, RESULTANT = range(3)
 MAX_STATIONS = 16
 """Most contact stations that one pin can have."""
@@ -332,7 +332,7 @@ RESULT_FIELDS = (
     Field(
         "contact_max",
         "N",
-        "largest contact force of the pin: normal force at its outer and at its inner end, resultant of all stations",
+        "largest contact force of the pin: of its outermost station, of its innermost one, resultant of all stations",
         shape=(4, len(CONTACTS)),
     ),
     Field("mode_share", "1", "share of the revolutions that count in each contact mode", shape=(4, 4)),

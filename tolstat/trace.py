@@ -74,8 +74,8 @@ class CaseResult(NamedTuple):
         """Trace of the last revolution, one row per input angle.
 
         Columns: ``theta`` (deg), ``tau``, ``Psi``, then ``cross1.F_e`` … ``fork4.T_z`` (N and N m, on the lump, in
-        the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact`` … (N, normal force at
-        the ends, resultant) and ``pin1.mode`` …
+        the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N) and
+        ``pin1.mode`` …
         """
         import pandas as pd
 

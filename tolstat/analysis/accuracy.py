@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import BUSHINGS, PINS, RESULTANT, SIMULATED, Status
+from tolstat.tables import BUSHINGS, PINS, SIMULATED, Status
 
 FloatArray = NDArray[np.float64]
 
@@ -53,7 +53,8 @@ class Spread(NamedTuple):
 
 def loads(results: NDArray[np.void]) -> FloatArray:
     """Largest loads of joints, (m,) table RESULT, as (m, 21): SI, in the order of `OBSERVABLES`."""
-    return np.concatenate([results["F_max"], results["T_max"], _contact(results), results["psi_max"][:, None]], axis=1)
+    contact = results["contact_max"].max(axis=2)
+    return np.concatenate([results["F_max"], results["T_max"], contact, results["psi_max"][:, None]], axis=1)
 
 
 def sizes(results: NDArray[np.void]) -> FloatArray:
@@ -64,14 +65,10 @@ def sizes(results: NDArray[np.void]) -> FloatArray:
 def size(results: NDArray[np.void], observable: str) -> FloatArray:
     """Largest load of the kind of one observable in each joint, (m,), SI: a column of `sizes`."""
     kind = KINDS[KIND_OF[OBSERVABLES.index(observable)]]
-    values = _contact(results) if kind == "contact" else results[f"{kind}_max"].reshape(len(results), -1)
+    fields = {"F": "F_max", "T": "T_max", "contact": "contact_max", "psi": "psi_max"}
+    values = results[fields[kind]].reshape(len(results), -1)
     held = ~np.isnan(values).all(axis=0)
     return values[:, held].max(axis=1) if held.any() else np.full(len(results), np.nan)
-
-
-def _contact(results: NDArray[np.void]) -> FloatArray:
-    """Largest resultant contact force of each pin, (m, 4), N."""
-    return np.asarray(results["contact_max"][:, :, RESULTANT])
 
 
 def _largest(values: FloatArray) -> FloatArray:

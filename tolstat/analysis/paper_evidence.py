@@ -23,8 +23,8 @@ class Evidence(NamedTuple):
         Misalignment, rad.
     gamma : ndarray, shape (m, 8, 2)
         Gamma of force and torque with sign, per cent.
-    contact : ndarray, shape (m, 4)
-        Largest resultant contact force of each pin, N.
+    contact : ndarray, shape (m, 4, 3)
+        Largest contact forces of each pin, in the order of `tables.CONTACTS`, N.
     psi : ndarray, shape (m,)
         Largest error of the speed ratio.
     spectra : ndarray, shape (m, orders, 8, 2)

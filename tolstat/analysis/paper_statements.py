@@ -47,7 +47,7 @@ def input_springs(e: Evidence) -> Answer:
     """Contact springs between cross and input fork do not feel the errors."""
     rows = e.rows()
     ideal = np.array([e.contact[e.ideal(i), 2:].max() for i in rows])
-    change = 100.0 * np.abs(e.contact[rows, 2:].max(axis=1) / ideal - 1.0)
+    change = 100.0 * np.abs(e.contact[rows, 2:].max(axis=(1, 2)) / ideal - 1.0)
     worst = int(np.argmax(change))
     text = f"largest change of their force {change[worst]:.1f} % ({e.name(int(rows[worst]))}), "
     text += f"median {np.median(change):.1f} %"

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from tolstat.joint import Joint
     from tolstat.report import Report
+    from tolstat.tables import Variant
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which load is exceeded by which share of the joints."
 EPILOG = "Exit codes: 0 done, 1 internal error, 2 input that cannot be used, 130 interrupted, 143 terminated."
@@ -81,9 +82,12 @@ def say(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def warn(path: Path, joints: Iterable[Joint]) -> None:
-    for fault in dict.fromkeys(fault for joint in joints for fault in joint.warnings()):
-        say(f"warning: {path}: joint.{fault}")
+def warn(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
+    """Warn of joints that are hardly meant: that of a case or study, or those of its `variants`."""
+    places = [f"variant {variant.family!r}: joint" for variant in variants] or ["joint"]
+    faults = (f"{place}.{fault}" for place, joint in zip(places, joints, strict=True) for fault in joint.warnings())
+    for fault in dict.fromkeys(faults):
+        say(f"warning: {path}: {fault}")
 
 
 def tell(report: Report) -> None:

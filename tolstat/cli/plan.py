@@ -33,7 +33,7 @@ def plan(
     from tolstat import study
 
     loaded = study.load(study_file, n=n)
-    warn(study_file, loaded.joints)
+    warn(study_file, loaded.joints, loaded.variants)
     announce_compilation()
     made = plans.plan(loaded, workers, pilot)
     typer.echo(as_text(asdict(made)) if as_json else _lines(made))

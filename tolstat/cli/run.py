@@ -101,7 +101,7 @@ def run(
         again = None if retry is None else parse(retry, settings or (), plan)
     if faults:
         raise InputError(faults)
-    warn(study_file, plan.joints)
+    warn(study_file, plan.joints, plan.variants)
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:

@@ -12,7 +12,7 @@ from tolstat.analysis import paper, paper_spectra
 from tolstat.analysis.paper_evidence import Evidence
 from tolstat.joint import Joint
 from tolstat.store import ResultStore
-from tolstat.tables import RESULTANT, Status
+from tolstat.tables import Status
 
 Array = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ class Main:
             tuple(cases[i] for i in self.case),
             self.alpha,
             self.gamma,
-            self.results["contact_max"][:, :, RESULTANT],
+            self.results["contact_max"],
             self.results["psi_max"],
             paper_spectra.amplitudes(self.moduli),
             100.0 * np.array(away) / np.abs(torque),

@@ -22,7 +22,7 @@ from tolstat.store import Counts, verification
 from tolstat.store.reader import BLOCK
 from tolstat.store.verification import Verification
 from tolstat.study.selection import LIMIT_UNITS
-from tolstat.tables import BUSHINGS, ERROR_FIELDS, PINS, RESULTANT, Status
+from tolstat.tables import BUSHINGS, ERROR_FIELDS, PINS, Status
 
 if TYPE_CHECKING:
     from tolstat.store import ResultStore
@@ -280,7 +280,7 @@ def load(results: NDArray[np.void], name: str) -> tuple[FloatArray, str]:
     if part in BUSHINGS and letter in ("F", "T"):
         return results[f"{letter}_max"][:, BUSHINGS.index(part)], "N" if letter == "F" else "N*m"
     if part in PINS and letter == "contact":
-        return results["contact_max"][:, PINS.index(part), RESULTANT], "N"
+        return results["contact_max"][:, PINS.index(part)].max(axis=1), "N"
     if name == "psi":
         return results["psi_max"], "1"
     raise InputError([Fault(f"limits.{name}", "is not a load", "name cross1.F .. fork4.T, pin1.contact or psi")])

@@ -245,7 +245,7 @@ class StudyFile:
     def check_limits(self, output: Output, limits: Mapping[str, float]) -> None:
         """Find limits of loads that are not kept."""
         held = {c.name for c in output.columns}
-        lacking = [kept.needed(load) for load in limits if kept.needed(load) not in held]
+        lacking = [name for load in limits for name in kept.needed(load) if name not in held]
         if lacking:
             found = f"leaves out what [limits] judges by: {', '.join(lacking)}"
             self._fault(("output", "results"), found, "add these, or remove their limits")

@@ -38,7 +38,7 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
         remedy = 'give a study with [tolerances], as of sampling.method = "random"'
         faults.append(Fault(str(study.path), "has no tolerances that joints are drawn from", remedy))
     if not kept.holds(study.output.columns, str(sampling["load"])):
-        remedy = f"add {kept.needed(str(sampling['load']))}"
+        remedy = f"add {', '.join(kept.needed(str(sampling['load'])))}"
         faults.append(Fault(f"{study.path}: output.results", f"leaves out {sampling['load']} of --limit", remedy))
     own = study.sampling.model_dump(include={"seed", "nominal_first"})
     with gather(faults):

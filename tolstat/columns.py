@@ -7,10 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import BUSHINGS, DESIGN_FIELDS, ERROR_FIELDS, LEDGER_FIELDS, PINS, RESULT_FIELDS, Field, Mode
-
-CONTACT_NAMES = ("contact_outer", "contact_inner", "contact_resultant")
-"""Names of a pin's contact forces in columns and traces, in the order of `CONTACTS`."""
+from tolstat.tables import (
+    BUSHINGS,
+    CONTACTS,
+    DESIGN_FIELDS,
+    ERROR_FIELDS,
+    LEDGER_FIELDS,
+    PINS,
+    RESULT_FIELDS,
+    Field,
+    Mode,
+)
 
 
 class Column(NamedTuple):
@@ -40,7 +47,7 @@ def _result_columns() -> tuple[Column, ...]:
             if f.name[:2] in ("F_", "T_"):
                 name = f"{BUSHINGS[index[0]]}.{f.name}"
             elif f.name == "contact_max":
-                name = f"{PINS[index[0]]}.{CONTACT_NAMES[index[1]]}_max"
+                name = f"{PINS[index[0]]}.contact_{CONTACTS[index[1]]}_max"
             elif f.name == "mode_share":
                 name = f"{PINS[index[0]]}.share_{Mode(index[1]).name.lower()}"
             else:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.columns import CONTACT_NAMES, RESULT_COLUMNS, Column
+from tolstat.columns import RESULT_COLUMNS, Column
+from tolstat.tables import CONTACTS
 
 KEY = "output.results"
 """Key in the identity of a study: names of the columns selected; not there where all are kept."""
@@ -58,8 +59,7 @@ def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
 
 def needed(load: str) -> tuple[str, ...]:
     """Columns that a load with a limit (``cross1.F``, ``pin1.contact``, ``psi``) is read from."""
-    pin, _, kind = load.partition(".")
-    return tuple(f"{pin}.{name}_max" for name in CONTACT_NAMES) if kind == "contact" else (f"{load}_max",)
+    return tuple(f"{load}_{of}_max" for of in CONTACTS) if load.endswith(".contact") else (f"{load}_max",)
 
 
 def holds(kept: Iterable[Column], load: str) -> bool:

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.columns import CONTACT_NAMES
 from tolstat.remedy import remedy
 from tolstat.simulation import simulate_rows, warm_up
-from tolstat.tables import BUSHINGS, PINS, Motion, Options, Simulation, Status
+from tolstat.tables import BUSHINGS, CONTACTS, PINS, Motion, Options, Simulation, Status
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,8 +92,8 @@ class CaseResult(NamedTuple):
             for k, load in enumerate(LOADS):
                 columns[f"{bushing}.{load}"] = histories["loads"][:, b, k]
         for p, pin in enumerate(PINS):
-            for i, name in enumerate(CONTACT_NAMES):
-                columns[f"{pin}.{name}"] = histories["contact"][:, p, i]
+            for i, of in enumerate(CONTACTS):
+                columns[f"{pin}.contact_{of}"] = histories["contact"][:, p, i]
         for p, pin in enumerate(PINS):
             columns[f"{pin}.mode"] = histories["mode"][:, p]
         return pd.DataFrame(columns)

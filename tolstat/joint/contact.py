@@ -133,13 +133,19 @@ class Contact(Strict):
             raise refuse(f"a pin of {value:g} m does not go into a hole of {hole:g} m", "give D_P <= D_H")
         return value
 
-    @field_validator(*COEFFICIENTS, "stations")
+    @field_validator(*COEFFICIENTS)
     @classmethod
-    def _belongs(cls, value: object, info: ValidationInfo) -> object:
-        law, of_stations = info.data.get("law"), info.field_name == "stations"
-        if value is not None and law is not None and (law == "stations") != of_stations:
-            instead = "each station has its own coefficients" if not of_stations else 'write law = "stations"'
-            raise refuse(f'has no meaning with law = "{law}"', f"remove it: {instead}" if not of_stations else instead)
+    def _without_stations(cls, value: object, info: ValidationInfo) -> object:
+        if value is not None and info.data.get("law") == "stations":
+            raise refuse('has no meaning with law = "stations"', "remove it: each station has its own coefficients")
+        return value
+
+    @field_validator("stations")
+    @classmethod
+    def _of_their_law(cls, value: object, info: ValidationInfo) -> object:
+        law = info.data.get("law", "stations")  # a law that is none has its own fault
+        if value is not None and law != "stations":
+            raise refuse(f'has no meaning with law = "{law}"', 'write law = "stations"')
         return value
 
     @field_validator("coefficients")

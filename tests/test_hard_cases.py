@@ -52,7 +52,11 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     with ResultStore.open(hard) as store:
         results, design = store.results(), store.design()
         family = np.array([v.family for v in store.variants])[design["variant"]]
+        binding = np.array(store.case_names)[design["case"]] == "tilt of 5 deg"
     assert_honest(results)
+    assert results["status"][binding].tolist() == [Status.NOT_PERIODIC]  # rings for ever, by less than its loads' 0.5 %
+    assert results["closure"][binding] < 5e-3
+    results, family = results[~binding], family[~binding]
     ended = {name: {Status(s).label for s in results["status"][family == name]} for name in family}
     assert ended.pop("85 deg") == {"newton_failed"}
     assert ended.pop("85 deg, 720 steps") == {"not_settled"}

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from tests import stability
 from tests.conftest import LAWS, with_law
 from tolstat import joint as joints
 from tolstat import simulation
@@ -13,6 +16,7 @@ from tolstat.kernel.topology import N_DOF, N_LUMPS, PIN
 from tolstat.kernel.work import DELTA, FORCE, NORMAL, V_NORMAL, make_work
 from tolstat.tables import RESULT, RESULTANT, Options
 
+STUDY = Path(__file__).parent.parent / "studies" / "iso2768_f.toml"
 PINS = slice(6 * PIN, 6 * PIN + 24)
 DAMPING = ("c_cross", "c_fork", "c_d", "c_t")
 
@@ -103,6 +107,31 @@ def test_contacts_do_no_work_around_a_loop(params, random_errors, law):
         blend.append(left[1].max())
     assert done[1] < min(1e-9, 0.01 * done[0])
     assert blend[1] > max(0.1, 0.5 * blend[0])
+
+
+@pytest.mark.parametrize(
+    ("law", "row", "torque", "grows"),
+    [("mode", 861, 100.0, False), ("mode", 39, 1000.0, False), ("uniform", 39, 1000.0, True)],
+)
+def test_no_disturbance_grows_with_the_default_law(law, row, torque, grows):
+    """Eigenvalues of the whole joint along a revolution.
+
+    Row 861 fluttered under a law without a potential. In row 39 at ten times the torque the film of a station that
+    barely touches feeds 3.5 kHz under the law `uniform`: that is seen.
+    """
+    params = stability.rows_of(STUDY, row, law, torque)[-1:]
+    (found,) = stability.growths(params, Options(max_refinements=0, peak_substeps=1))
+    assert found is not None
+    assert (found.rate > 100.0) == grows
+    assert (found.exponent > 1.0) == grows
+    if grows:
+        assert found.frequency == pytest.approx(3500.0, rel=0.05)
+        params["c_t"] = 0.0
+        (without_film,) = stability.growths(params, Options(max_refinements=0, peak_substeps=1))
+        assert without_film is not None
+        assert without_film.rate < 0
+    else:
+        assert found.rate < 0
 
 
 def test_one_end_alone_touches_with_the_point_law_and_both_with_the_uniform_one(params):

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import SIMULATED, Fidelity, Options, Status
+from tolstat.tables import SIMULATED, UNSETTLED, Fidelity, Method, Options, Status
 
 FACTOR = 4
 """Steps of a refinement in one of those before."""
@@ -26,7 +26,8 @@ LIVELY, SMOOTH = 1.5e-3, 1e-3
 to less than shows as roughness, and change little from one refinement to the next before it is resolved."""
 SURE_STEPS = 2880
 """Steps a revolution to which lively joints are refined even if nothing changes."""
-UNRESOLVED = 3e-3
+TOLERANCE, WATCHED = 2e-2, 48
+UNRESOLVED = 3e-2
 """Change in the last refinement allowed that a joint may not exceed."""
 COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")
 """What a joint has cost: all its runs together."""
@@ -49,30 +50,21 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     if options.fidelity != Fidelity.DYNAMIC:
         return
     coarse = max(1.0, AT_STEPS / options.steps_per_rev) ** 2
-    rough = ROUGH * coarse
     lively = (results["psi_max"] > LIVELY) & (results["roughness"] > SMOOTH * coarse)
-    gentle = lively & (results["roughness"] <= rough)
-    unsure = (results["roughness"] > rough) | (lively & (options.steps_per_rev < SURE_STEPS))
-    rows = np.flatnonzero((results["status"] == Status.OK) & unsure)
-    for _ in range(options.max_refinements):
-        finer = options._replace(steps_per_rev=FACTOR * options.steps_per_rev)
-        if not rows.size or finer.steps_per_rev > MOST_STEPS:
-            break
-        found, options = simulate(rows, finer), finer
-        known = np.isin(found["status"], SIMULATED)
-        change = changes(results[rows], found)
-        for name in COUNTS:
-            found[name] += results[name][rows]
-        results["status"][rows[~known]] = Status.NOT_RESOLVED
-        results[rows[known]] = found[known]
-        results["refinement_change"][rows] = change
-        early = options.steps_per_rev < SURE_STEPS
-        still = (change > RESOLVED) | (found["roughness"] > rough) | (lively[rows] & early)
-        # steps that neither damp ringing nor resolve it can keep a joint from settling
-        worth = (found["status"] == Status.OK) | (gentle[rows] & early)
-        rows = rows[known & still & worth]
-    far = results["refinement_change"][rows] > UNRESOLVED
-    results["status"][rows[far & (results["status"][rows] == Status.OK)]] = Status.NOT_RESOLVED
+    unsure = lively | (results["roughness"] > ROUGH * coarse)
+    unsure = np.where(results["status"] == Status.OK, unsure, np.isin(results["status"], UNSETTLED))
+    rows = np.flatnonzero(unsure)
+    if not rows.size or not options.max_refinements:
+        return
+    method, revs = int(Method.TR_BDF2), max(options.max_revs, WATCHED)
+    found, blocks = simulate(rows, options._replace(method=method, rtol=TOLERANCE, max_revs=revs))
+    known = np.isin(found["status"], SIMULATED)
+    for name in COUNTS:
+        found[name] += results[name][rows]
+    results["status"][rows[~known]] = Status.NOT_RESOLVED
+    results[rows[known]] = found[known]
+    far = (found["status"] == Status.OK) & (found["refinement_change"] > UNRESOLVED)
+    results["status"][rows[far]] = Status.NOT_RESOLVED
 
 
 def changes(before: NDArray[np.void], after: NDArray[np.void]) -> NDArray[np.float64]:

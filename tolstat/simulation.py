@@ -122,8 +122,14 @@ def in_lanes(options: Options) -> bool:
     """Whether joints with these settings go in lock-step; all others go one after the other."""
     from numba import config
 
-    bdf2 = options.fidelity == Fidelity.DYNAMIC and options.method == Method.BDF2 and options.rtol == 0
-    return (bdf2 or options.fidelity == Fidelity.QUASISTATIC) and not vars(config)["DISABLE_JIT"]
+    uniform = options.method == Method.BDF2 and options.rtol == 0
+    dynamic = options.fidelity == Fidelity.DYNAMIC and (uniform or follows_error(options))
+    return (dynamic or options.fidelity == Fidelity.QUASISTATIC) and not vars(config)["DISABLE_JIT"]
+
+
+def follows_error(options: Options) -> bool:
+    """Whether the steps of joints with these settings follow the error."""
+    return options.fidelity == Fidelity.DYNAMIC and options.method == Method.TR_BDF2 and options.rtol > 0
 
 
 def simulate_rows(
@@ -150,37 +156,40 @@ def simulate_rows(
     specs = history_specs(options, histories, n_harmonics)
     kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
 
-    def simulate(rows: NDArray[np.intp], settings: Options) -> NDArray[np.void]:
+    def simulate(rows: NDArray[np.intp], settings: Options) -> tuple[NDArray[np.void], NDArray[np.void]]:
         found = np.zeros(len(rows), RESULT).view(np.recarray)
+        revolutions = settings.max_revs if follows_error(settings) else 0
+        blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
         run = _together if in_lanes(settings) else _alone
-        for i, samples in run(params[rows], settings, bool(specs), found):
+        for i, samples in run(params[rows], settings, bool(specs), blocks, found):
             if found[i].status in SIMULATED:
-                grid = samples[:: settings.steps_per_rev // options.steps_per_rev]
-                for name, values in _sample(grid, histories, specs).items():
+                for name, values in _sample(samples, histories, specs).items():
                     kept[name][rows[i]] = values
-        return found.view(np.ndarray)
+        return found.view(np.ndarray), blocks.view(np.ndarray)
 
-    results = simulate(np.arange(len(params)), options)
+    results, _ = simulate(np.arange(len(params)), options)
     refinement.refine(results, options, simulate)
     return Simulation(results, kept)
 
 
 def _alone(
-    params: NDArray[np.void], options: Options, keep: bool, results: NDArray[np.void]
+    params: NDArray[np.void], options: Options, keep: bool, blocks: NDArray[np.void], results: NDArray[np.void]
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints one after the other; gives the samples of each if they are to be kept."""
     from tolstat.kernel.simulate import simulate_joint
 
-    work, state, ring = scratch(options)
+    alone = scratch(options)
     rows = params.view(np.recarray)
     for i in range(len(params)):
-        simulate_joint(rows[i], options, work, state, ring, results[i])
+        simulate_joint(rows[i], options, alone, results[i])
+        if len(blocks):
+            blocks[i] = alone.past.trail.revolution
         if keep:
-            yield i, ring.samples
+            yield i, alone.ring.samples
 
 
 def _together(
-    params: NDArray[np.void], options: Options, keep: bool, results: NDArray[np.void]
+    params: NDArray[np.void], options: Options, keep: bool, blocks: NDArray[np.void], results: NDArray[np.void]
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints in lock-step, those with as many contact stations together; gives their samples if kept."""
     from tolstat.kernel.lockstep import PATIENCE, lockstep
@@ -193,10 +202,13 @@ def _together(
         batch.par.n_stations = part["n_stations"][0]
         words = part.view(np.float64).reshape(len(part), -1)
         samples = make_samples(len(part) if keep else 0, options.steps_per_rev)
+        own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), RESULT).view(np.recarray)
         out = np.zeros(len(part), RESULT).view(np.recarray)
         rows = part.view(np.recarray)
-        lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, out, tally)
+        lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
         results[here] = out
+        if len(blocks):
+            blocks[here] = own
         yield from zip(here.tolist(), samples, strict=False)
 
 

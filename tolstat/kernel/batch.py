@@ -10,8 +10,9 @@ import numpy as np
 from tolstat.kernel._jit import njit
 from tolstat.kernel.lane import WIDTH
 from tolstat.kernel.lane_memory import aligned_zeros, lane_dtype
+from tolstat.kernel.resolve import Pasts, make_pasts
 from tolstat.kernel.settle import make_samples
-from tolstat.kernel.state import AHEAD, FACTORISATIONS, H_OLD, HALVINGS, ITERATIONS, STEPS
+from tolstat.kernel.state import AHEAD, CLOSE, FACTORISATIONS, H_OLD, HALVINGS, ITERATIONS, MEMORY, STAGED, STEPS
 from tolstat.kernel.topology import N_DOF
 from tolstat.kernel.trail import make_notes
 from tolstat.kernel.work import WORK
@@ -20,27 +21,28 @@ from tolstat.tables import PARAM, Options
 MOTION = np.dtype(
     [(name, "f8", N_DOF) for name in ("q", "v", "a", "q0", "v0", "a0", "q1", "v1", "a1", "aux")]
     + [(name, "f8", N_DOF) for name in ("residual", "weight", "ahead")]
-    + [("memory", "f8", 3)]
+    + [("memory", "f8", MEMORY)]
 )
 """What `state.State` is to one joint."""
 
-HOLD, RELAX, CHECK, STEP, LOOK, ANGLE = range(6)
+HOLD, RELAX, CHECK, STEP, LOOK, ANGLE, PART = range(7)
 """What a lane is at: equilibrium by Newton's iteration; in pseudo-time; whether it is there; a step; a step of the
-recorded revolution once more, in parts (`closeup`); the next angle."""
+recorded revolution once more, in parts (`closeup`); the next angle; a part of a step that follows the error (`mesh`)."""
 
 CONTROL = np.dtype(
     [(name, "f8") for name in ("t", "h", "cv", "ca", "before", "iteration", "factorised", "at_roundoff")]
-    + [(name, "f8") for name in ("phase", "live", "fresh", "passed", "origin", "grid", "pseudo")]
+    + [(name, "f8") for name in ("phase", "live", "fresh", "passed", "origin", "grid", "pseudo", "stage", "error", "worst")]
     + [(name, "f8") for name in ("steps", "iterations", "halvings", "factorisations")]
-    + [(name, "i8", WIDTH) for name in ("joint", "k", "level", "done", "tries", "left", "part", "looked")]
+    + [(name, "i8", WIDTH) for name in ("joint", "k", "level", "done", "tries", "left", "part", "looked", "began")]
 )
 """Where a lane is in its joint.
 
 Time and step, Newton's iteration; what it is at; whether it has a joint (1 or 0), is to begin a step or angle, and has
 its trial point accepted then; time at which the step of the output grid began, its length, and the step of pseudo-time,
-s; counters as of State. Row of the joint; grid point or angle that it is on the way to, and there the level of its
+s; stage of a part (0 or 1), its error, and that of the worst part of the step; counters as of State. Row of the joint; grid point or angle that it is on the way to, and there the level of its
 sub-step (of an angle or an equilibrium: ways that have failed) and what is done: parts of a step, revolutions of
-angles; steps in pseudo-time. Of a closer look: steps left to take, the part of the step it is at, and parts recorded.
+angles; steps in pseudo-time. Of a closer look: steps left to take, the part of the step it is at, and parts recorded. Of a step that follows the
+error: the level that it began with.
 """
 
 
@@ -56,6 +58,7 @@ class Batch(NamedTuple):
     samples: np.recarray  # (WIDTH, steps_per_rev) SAMPLE
     fine: np.recarray  # (WIDTH, 3) SAMPLE, as in `settle.Ring`
     notes: np.recarray  # (WIDTH,) NOTES
+    pasts: Pasts
 
 
 def _places():
@@ -82,7 +85,8 @@ def make_batch(options: Options) -> Batch:
     words = pars.view(np.float64).view(np.ndarray)
     samples = make_samples(WIDTH, options.steps_per_rev)
     fine = make_samples(WIDTH, 3)
-    return Batch(pars[0], words, work, kept, motion, control, samples, fine, make_notes(WIDTH))
+    notes, pasts = make_notes(WIDTH), make_pasts(WIDTH, options)
+    return Batch(pars[0], words, work, kept, motion, control, samples, fine, notes, pasts)
 
 
 @njit
@@ -100,7 +104,8 @@ def put_points(lane, state, control, motion):
         motion.q0[i, lane], motion.v0[i, lane], motion.a0[i, lane] = state.q0[i], state.v0[i], state.a0[i]
         motion.q1[i, lane], motion.v1[i, lane] = state.q1[i], state.v1[i]
     motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = state.memory[H_OLD], state.memory[AHEAD]
-    control.passed[lane] = control.factorised[lane] = 0.0
+    motion.memory[CLOSE, lane] = motion.memory[STAGED, lane] = 0.0
+    control.passed[lane] = control.factorised[lane] = control.stage[lane] = 0.0
 
 
 @njit

@@ -6,15 +6,18 @@ joint; `lanes` are its joints, work and motion read as lanes.
 """
 
 from tolstat.kernel._jit import njit
-from tolstat.kernel.batch import ANGLE, CHECK, HOLD, RELAX, STEP, rest
+from tolstat.kernel.batch import ANGLE, CHECK, HOLD, PART, RELAX, STEP, rest
 from tolstat.kernel.closeup import count_in
 from tolstat.kernel.equilibrium import FIRST, GROWTH, HELD, LARGEST, MAX_STEPS, SHRINK, SMALLEST
 from tolstat.kernel.integrate import START_LEVEL, fitting, grown
+from tolstat.kernel.mesh import cells_of, next_level, note_cell
 from tolstat.kernel.quasistatic import angle_time, end_closure
-from tolstat.kernel.settle import foresee, record
-from tolstat.kernel.simulate import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, grid_step, judge
-from tolstat.kernel.state import AHEAD, H_OLD
+from tolstat.kernel.resolve import begin_turns, clear_extremes, follows_error, merge_extremes, revolved
+from tolstat.kernel.settle import foresee, grid_step, record
+from tolstat.kernel.simulate import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, judge
+from tolstat.kernel.state import AHEAD, H_OLD, STAGED
 from tolstat.kernel.topology import N_DOF, PSI
+from tolstat.kernel.trbdf2 import GAMMA
 from tolstat.tables import MAX_ITERATIONS
 
 FROM_GUESS, FROM_ZERO, AT_ANGLE = range(3)
@@ -76,7 +79,10 @@ def depart(lane, par, options, control, motion):
             motion.q1[i, lane] = motion.q0[i, lane]
         control.phase[lane], control.factorised[lane], control.k[lane] = STEP, 0.0, 1
         control.level[lane] = min(START_LEVEL, options.max_halvings)
-        aim(lane, options, control, motion)
+        if follows_error(options):
+            control.phase[lane], control.k[lane] = PART, 0  # for `set_out` to go on with
+        else:
+            aim(lane, options, control, motion)
 
 
 @njit
@@ -211,3 +217,110 @@ def retry(lane, par, options, control, motion):
         motion.memory[AHEAD, lane] = 0.0
         aim(lane, options, control, motion)
     return NOT_SETTLED
+
+
+@njit
+def set_out(lane, par, options, control, motion, past):
+    """Send a lane from its start into the steps that follow the error."""
+    begin_turns(par, options, motion.memory[:, lane], motion.weight[:, lane], past)
+    control.grid[lane] = grid_step(par, options) / cells_of(options.steps_per_rev)
+    leave_for(lane, 1, options, control, motion, past)
+
+
+@njit
+def leave_for(lane, c, options, control, motion, past):
+    """Send a lane that stands at the end of a cell to that of the next one, `c`."""
+    own, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
+    for i in range(N_DOF):
+        past.begun[0, i], past.begun[1, i] = motion.q0[i, lane], motion.v0[i, lane]
+        past.begun[2, i] = motion.a0[i, lane]
+    control.k[lane], control.origin[lane] = c, (c - 1) * control.grid[lane]
+    control.level[lane] = next_level(past.turns.revolution - past.turns.since, own, before) if past.turns.beside == 0 else int(own.level)
+    control.began[lane] = control.level[lane]
+    divide(lane, options, control, past)
+
+
+@njit
+def divide(lane, options, control, past):
+    """Send a lane into the first part of a cell."""
+    control.done[lane] = control.part[lane] = 0
+    control.worst[lane] = 0.0
+    clear_extremes(past.extremes[0])
+    head(lane, 0, options, control)
+
+
+@njit
+def head(lane, stage, options, control):
+    """Send a lane to the end of a stage of the part that it is at."""
+    grid, whole = control.grid[lane], 1 << options.max_halvings
+    h = grid / (1 << control.level[lane])
+    reach = GAMMA if stage == 0 else 1.0
+    control.stage[lane], control.h[lane], control.fresh[lane] = stage, h, 1.0
+    control.t[lane] = control.origin[lane] + grid * (control.done[lane] / whole) + reach * h
+
+
+@njit
+def refuse(lane, options, control, motion, past):
+    """Begin a lane's cell anew in smaller parts; returns a status as `step` does."""
+    control.halvings[lane] += 1
+    control.level[lane] += 1
+    control.factorised[lane] = control.passed[lane] = motion.memory[STAGED, lane] = 0.0
+    if control.level[lane] > options.max_halvings:
+        return NEWTON_FAILED
+    for i in range(N_DOF):
+        motion.q0[i, lane], motion.v0[i, lane] = past.begun[0, i], past.begun[1, i]
+        motion.a0[i, lane] = past.begun[2, i]
+    divide(lane, options, control, past)
+    return NOT_SETTLED
+
+
+@njit
+def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
+    """Go on with a lane that has solved a stage of a part; returns its status, and whether it goes on."""
+    if control.stage[lane] == 0:
+        head(lane, 1, options, control)
+        return NOT_SETTLED, True
+    controlled, whole = past.turns.beside == 0, 1 << options.max_halvings
+    if controlled:
+        control.worst[lane] = max(control.worst[lane], control.error[lane])
+        if not control.error[lane] <= 1:
+            status = refuse(lane, options, control, motion, past)
+            return status, status == NOT_SETTLED
+        record(control.part[lane], lane, True, lanes[0], lanes[1], lanes[2].v, fine)
+        count_in(control.part[lane], fine, past.extremes[0])
+    control.steps[lane] += 1
+    control.done[lane] += whole >> control.level[lane]
+    control.part[lane] += 1
+    motion.memory[STAGED, lane] = control.h[lane]
+    if control.done[lane] < whole:
+        control.passed[lane] = 1.0
+        head(lane, 0, options, control)
+        return NOT_SETTLED, True
+    return arrive(lane, par, lanes, options, control, motion, samples, past, out)
+
+
+@njit
+def arrive(lane, par, lanes, options, control, motion, samples, past, out):
+    """Send a lane on that has reached the end of a cell, and record a grid point that is there; returns as `part` does."""
+    c, turns, status, goes_on = control.k[lane], past.turns, NOT_SETTLED, True
+    for i in range(N_DOF):
+        motion.q0[i, lane], motion.v0[i, lane] = motion.q[i, lane], motion.v[i, lane]
+        motion.a0[i, lane] = motion.a[i, lane]
+    if turns.beside == 0:
+        refused = control.level[lane] > control.began[lane]
+        note_cell(control.level[lane], refused, control.worst[lane], turns.revolution, past.mesh[c % past.mesh.size])
+        merge_extremes(past.extremes[0], past.extremes[1])
+        cells = past.mesh.size // samples.size
+        if c % cells == 0:
+            k = c // cells
+            record(k, lane, True, lanes[0], lanes[1], lanes[2].v, samples)
+            foresee(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
+    if c % past.mesh.size == 0:
+        point = motion.q0[:, lane], motion.v0[:, lane], motion.a0[:, lane]
+        memory, weight, spent = motion.memory[:, lane], motion.weight[:, lane], int(control.iterations[lane])
+        status, goes_on = revolved(point, memory, weight, spent, par, options, samples, past, out)
+        if turns.beside == 1:
+            c -= past.mesh.size
+    if goes_on:
+        leave_for(lane, c + 1, options, control, motion, past)
+    return status, goes_on

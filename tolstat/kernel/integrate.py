@@ -15,11 +15,13 @@ from tolstat.kernel.lane import where
 from tolstat.kernel.state import (
     AHEAD,
     ATTEMPTS_LEFT,
+    CLOSE,
     CV_FACTORISED,
     FACTORISATIONS,
     H_OLD,
     HALVINGS,
     ITERATIONS,
+    STAGED,
     STEPS,
 )
 from tolstat.tables import Method
@@ -74,6 +76,7 @@ def accept(h, state, options):
         state.q1[i], state.v1[i], state.a1[i] = state.q0[i], state.v0[i], state.a0[i]
         state.q0[i], state.v0[i], state.a0[i] = state.q[i], state.v[i], state.a[i]
     state.memory[H_OLD], state.memory[AHEAD] = h, 0.0
+    state.memory[STAGED] = h if options.method == TR_BDF2 else 0.0
     state.counters[STEPS] += 1
 
 
@@ -155,6 +158,7 @@ def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding
             if not now < 1e300 or iteration == options.newton_max_iter:
                 break
             fresh = state.memory[CV_FACTORISED] != cv or (iteration > 0 and now > SLOW * before)
+            last = now <= state.memory[CLOSE] and not fresh
             if fresh:
                 state.memory[CV_FACTORISED] = cv
                 state.counters[FACTORISATIONS] += 1
@@ -173,6 +177,8 @@ def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding
             negligible = small(cv, ca, fresh, options, work, state)
             if negligible == LOST:
                 break
+            if last:
+                return True
         state.memory[CV_FACTORISED] = 0.0
         return False
 
@@ -217,7 +223,7 @@ def build_advance(newton):
                 level = grown(level, done, whole, error)
             else:
                 level += 1
-                state.memory[AHEAD] = 0.0
+                state.memory[AHEAD] = state.memory[STAGED] = 0.0
                 state.counters[HALVINGS] += 1
                 if level > options.max_halvings:
                     return False

@@ -261,6 +261,15 @@ def where(condition, a, b):
     return a if condition else b
 
 
+def retain(condition, new, old):
+    """`new` where the condition holds, else `old`, which lies where the result goes.
+
+    The whole is written, as it is cheap. `where` would become a store of some lanes, which takes many cycles on some
+    processors.
+    """
+    return new if condition else old
+
+
 def any_of(condition):
     """Whether the condition holds in any lane."""
     return condition
@@ -276,6 +285,24 @@ def _where(condition, a, b):
     if condition == MASK:
         return lambda condition, a, b: _select(condition, a, b)
     return lambda condition, a, b: a if condition else b
+
+
+@intrinsic
+def _fenced_select(typingctx, mask, new, old):
+    def codegen(context, builder, sig, args):
+        fence = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(DOUBLES, [DOUBLES]), f"llvm.arithmetic.fence.v{WIDTH}f64"
+        )
+        return builder.select(args[0], args[1], builder.call(fence, [args[2]]))
+
+    return LANE(MASK, LANE, LANE), codegen
+
+
+@overload(retain, inline="never")
+def _retain(condition, new, old):
+    if condition == MASK:
+        return lambda condition, new, old: _fenced_select(condition, new, old)
+    return lambda condition, new, old: new if condition else old
 
 
 @overload(any_of)

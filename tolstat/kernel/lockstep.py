@@ -9,19 +9,22 @@ every bit of the result.
 """
 
 from tolstat.kernel._jit import njit
-from tolstat.kernel.batch import ANGLE, HOLD, LOOK, STEP, empty, get_counters, put_joint, put_points, put_start, rest
+from tolstat.kernel.batch import ANGLE, HOLD, LOOK, PART, STEP, empty, get_counters, put_joint, put_points, put_start, rest
 from tolstat.kernel.borrow import borrowed
 from tolstat.kernel.closeup import STEPS as STEPS_AGAIN
 from tolstat.kernel.closeup import on_a_peak, roughen, switches
-from tolstat.kernel.course import advance, aim, depart, find, glance, retry, step, turn
+from tolstat.kernel.course import advance, aim, depart, find, glance, part, refuse, retry, set_out, step, turn
 from tolstat.kernel.equilibrium import HELD
 from tolstat.kernel.lane import WIDTH, any_of, bits_of, count_of, where
 from tolstat.kernel.lane_memory import as_lanes
+from tolstat.kernel.mesh import cells_of, load_error
 from tolstat.kernel.quasistatic import angle_time, speed_ratios
+from tolstat.kernel.resolve import Past, follows_error
 from tolstat.kernel.rounds import begin, correct, renew, verdict
-from tolstat.kernel.settle import summarise
+from tolstat.kernel.settle import grid_step, summarise
 from tolstat.kernel.simulate import (
     DYNAMIC,
+    NEWTON_FAILED,
     NOT_SETTLED,
     OK,
     QUASISTATIC,
@@ -31,7 +34,7 @@ from tolstat.kernel.simulate import (
     clear_results,
     conclude,
     describe,
-    grid_step,
+    finish,
     inside_model,
     is_finite,
     recall,
@@ -39,6 +42,7 @@ from tolstat.kernel.simulate import (
     rigid_guess,
     simulate_joint,
 )
+from tolstat.kernel.trail import Trail
 
 PATIENCE = 3
 """Lanes that make a new tangent together: it costs as much for one as for all, and those that wait stand still."""
@@ -56,7 +60,7 @@ def leave(lane, good, rows, options, alone, batch, samples, results):
 
     Where that has not been `good`: a joint that has not settled is begun anew, alone; a closer look is ended.
     """
-    work, state, ring = alone
+    work, state, ring, _ = alone
     control, joint, own = batch.control, batch.control.joint[lane], samples_of(lane, batch, samples)
     par, out, k = rows[joint], results[joint], 0
     if control.phase[lane] == LOOK:
@@ -68,7 +72,7 @@ def leave(lane, good, rows, options, alone, batch, samples, results):
         summarise(own, out)
         good = is_finite(out)
         if good:
-            conclude(batch.notes[lane], out)
+            conclude(OK, options, batch.notes[lane], out)
         control.left[lane] = control.looked[lane] = 0
     if good:
         closer = options.fidelity == DYNAMIC and options.peak_substeps > 1
@@ -77,18 +81,32 @@ def leave(lane, good, rows, options, alone, batch, samples, results):
         if control.looked[lane] > 0:
             roughen(own, out)
         get_counters(lane, batch, state.counters)
-        describe(OK, options, state.counters, out)
+        describe(OK, options, state.counters, batch.pasts.mesh[lane], out)
     else:
-        simulate_joint(par, options, work, state, ring, out)
+        simulate_joint(par, options, alone, out)
         for s in range(own.size):
             own[s] = ring.samples[s]
     empty(lane, batch)
 
 
 @njit
+def end(lane, status, options, alone, batch, blocks, results):
+    """Empty a lane whose joint has come to its end with steps that follow the error."""
+    joint, counters = batch.control.joint[lane], alone.state.counters
+    cells = cells_of(options.steps_per_rev)
+    get_counters(lane, batch, counters)
+    failed = (batch.control.k[lane] + cells - 1) // cells if status == NEWTON_FAILED else -1
+    finish(status, failed, options, counters, batch.pasts.mesh[lane], results[joint])
+    for r in range(blocks.shape[1]):
+        if joint < len(blocks):
+            blocks[joint, r] = batch.pasts.revolution[lane, r]
+    empty(lane, batch)
+
+
+@njit
 def look(lane, k, par, options, alone, batch, samples, out):
     """Send a lane to the next step, from the one to sample `k` on, that `closeup.look_closer` takes again, if any."""
-    work, state, _ = alone
+    work, state, _, _ = alone
     control, n, h = batch.control, options.steps_per_rev, grid_step(par, options)
     while k <= n:
         if k < n and switches(k, samples) and on_a_peak(k, samples, out):
@@ -111,7 +129,7 @@ def look(lane, k, par, options, alone, batch, samples, out):
 @njit
 def enter(lane, joint, rows, words, options, alone, batch, samples, results):
     """Put a joint into a lane, to find its equilibrium from where all pins just touch."""
-    work, state, _ = alone
+    work, state, _, _ = alone
     par, control, motion = rows[joint], batch.control, batch.motion
     clear_results(results[joint])
     control.joint[lane], control.phase[lane] = joint, HOLD
@@ -126,6 +144,11 @@ def enter(lane, joint, rows, words, options, alone, batch, samples, results):
         acceleration(0.0, state.q0, state.v0, par, options, work, state.a0)
         put_start(lane, state, control, motion)
         depart(lane, par, options, control, motion)
+        if control.phase[lane] == PART:
+            all_past = batch.pasts
+            trail = Trail(all_past.modulus[lane], all_past.revolution[lane], all_past.notes[lane])
+            past = Past(trail, all_past.turns[lane], all_past.extremes[lane], all_past.begun[lane], all_past.mesh[lane])
+            set_out(lane, par, options, control, motion, past)
     else:
         rigid_guess(control.t[lane], par, work, state)
         put_start(lane, state, control, motion)
@@ -142,7 +165,7 @@ def fill(lane, queued, rows, words, options, alone, batch, samples, results):
 
 
 @njit
-def lockstep(rows, words, options, patience, alone, batch, samples, results, tally):
+def lockstep(rows, words, options, patience, alone, batch, samples, blocks, results, tally):
     """Simulate joints with one number of contact stations; row i of the results is joint i.
 
     Parameters
@@ -152,7 +175,7 @@ def lockstep(rows, words, options, patience, alone, batch, samples, results, tal
     words : ndarray, shape (n, words)
         The same memory as doubles.
     options : Options
-        Numerical settings; quasi-static, or dynamic with BDF2 and without error control.
+        Numerical settings; quasi-static, or dynamic with BDF2 or with steps that follow the error.
     patience : int
         Lanes that need a new tangent wait until there are so many of them; no result depends on it.
     alone : Scratch
@@ -161,17 +184,22 @@ def lockstep(rows, words, options, patience, alone, batch, samples, results, tal
         Of the lanes; nothing is carried over from one call to the next.
     samples : ndarray of SAMPLE, shape (n, steps_per_rev) or (0, steps_per_rev)
         Written where there is room: the last revolution of every joint.
+    blocks : ndarray of RESULT, shape (n, revolutions) or (0, revolutions)
+        Written where there is room: statistics of the last revolutions of every joint whose steps follow the error;
+        revolution r (from 0) at r modulo their number.
     results : ndarray of RESULT, shape (n,)
         Written.
     tally : ndarray of int, shape (3,)
         Added to: rounds, lanes with a joint in them, rounds with new tangents.
     """
     rows, words, samples, results = borrowed(rows), borrowed(words), borrowed(samples), borrowed(results)
+    blocks = borrowed(blocks)
     alone, batch = borrowed(alone), borrowed(batch)
     par, work, kept = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.kept)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
     lanes, own, at = (par, work, motion), batch.motion, batch.control
-    queued = 0
+    pasts = batch.pasts
+    queued, controlled = 0, follows_error(options)
     for lane in range(WIDTH):
         put_joint(lane, words[0], batch)
         empty(lane, batch)
@@ -180,7 +208,7 @@ def lockstep(rows, words, options, patience, alone, batch, samples, results, tal
         if any_of(control.fresh > 0):
             begin(options, motion, control)
         residual(control.t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
-        solved, failed, stale, moving, now = verdict(options, motion, control)
+        solved, failed, stale, moving, last, now = verdict(options, motion, control)
         tally[0] += 1
         tally[1] += count_of(control.live > 0)
         waiting = count_of(stale)
@@ -190,25 +218,42 @@ def lockstep(rows, words, options, patience, alone, batch, samples, results, tal
             control.before = where(stale, now, control.before)
             failed, moving = failed | (stale & ~good), moving | (stale & good)
         failed = failed | correct(moving, kept, motion, control)
+        solved = solved | last
+        if controlled and any_of(solved & (control.stage > 0)):
+            control.error = load_error(control.h, par, motion)
         acting = bits_of(solved | failed)
         arrived = bits_of(solved)
         for lane in range(WIDTH):
             if (acting >> lane) & 1 == 0:
                 continue
             joint, phase, status = at.joint[lane], at.phase[lane], NOT_SETTLED
+            here, goes_on = samples_of(lane, batch, samples), True
+            trail = Trail(pasts.modulus[lane], pasts.revolution[lane], pasts.notes[lane])
+            past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1 == 0:
-                status = retry(lane, rows[joint], options, at, own)
+                if phase == PART:
+                    status = refuse(lane, options, at, own, past)
+                    goes_on = status == NOT_SETTLED
+                else:
+                    status = retry(lane, rows[joint], options, at, own)
+            elif phase == PART:
+                fine, out = batch.fine[lane], results[joint]
+                status, goes_on = part(lane, rows[joint], lanes, options, at, own, here, fine, past, out)
             elif phase == ANGLE:
-                here = samples_of(lane, batch, samples)
                 status = turn(lane, rows[joint], lanes, options, at, own, here, results[joint])
             elif phase < STEP:
                 find(lane, rows[joint], options, at, own)
             elif advance(lane, options, at, own):
                 if phase == STEP:
-                    here = samples_of(lane, batch, samples)
                     status = step(lane, lanes, options, at, own, here, batch.notes[lane], results[joint])
                 else:
                     status = glance(lane, rows[joint], lanes, options, at, own, batch.fine[lane], results[joint])
-            if status != NOT_SETTLED:
+            if at.phase[lane] == PART and at.k[lane] == 0:
+                set_out(lane, rows[joint], options, at, own, past)
+            if not goes_on:
+                end(lane, status, options, alone, batch, blocks, results)
+            elif status != NOT_SETTLED:
                 leave(lane, status == OK, rows, options, alone, batch, samples, results)
-                queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)
+            else:
+                continue
+            queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)

@@ -1,17 +1,19 @@
 """What a round of the lock-step does to all lanes at once: trial points, verdicts, tangents, corrections."""
 
-from tolstat.kernel import bdf2
+from tolstat.kernel import bdf2, trbdf2
 from tolstat.kernel._jit import njit
 from tolstat.kernel.batch import CHECK
 from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, ENOUGH, FAR, HELD
 from tolstat.kernel.integrate import ROUNDOFF, SLOW, scaled_size
-from tolstat.kernel.lane import where
+from tolstat.kernel.lane import retain, where
 from tolstat.kernel.quasistatic import extrapolate, keep
+from tolstat.kernel.resolve import follows_error
 from tolstat.kernel.simulate import QUASISTATIC, assemble, eliminate, solve
-from tolstat.kernel.state import AHEAD, H_OLD
+from tolstat.kernel.state import AHEAD, CLOSE, H_OLD, STAGED
 from tolstat.kernel.topology import N_DOF
 
 formula, trial = bdf2.formula, bdf2.trial
+first_and_second, first, second = trbdf2.formula, trbdf2.first, trbdf2.second
 
 
 @njit
@@ -22,14 +24,32 @@ def begin_steps(begins, passed, motion, control):
     known = motion.memory[AHEAD] > 0
     for i in range(N_DOF):
         q, v, a, q0, v0 = motion.q[i], motion.v[i], motion.a[i], motion.q0[i], motion.v0[i]
-        before = where(passed, q0, motion.q1[i]), where(passed, v0, motion.v1[i])
-        last = where(passed, q, q0), where(passed, v, v0), where(passed, a, motion.a0[i])
+        before = retain(passed, q0, motion.q1[i]), retain(passed, v0, motion.v1[i])
+        last = retain(passed, q, q0), retain(passed, v, v0), retain(passed, a, motion.a0[i])
         motion.q1[i], motion.v1[i] = before
         motion.q0[i], motion.v0[i], motion.a0[i] = last
         guess = trial(h, of, last, before, known, motion.ahead[i])
-        motion.q[i] = where(begins, guess[0], q)
-        motion.v[i] = where(begins, guess[1], v)
-        motion.a[i] = where(begins, guess[2], a)
+        motion.q[i] = retain(begins, guess[0], q)
+        motion.v[i] = retain(begins, guess[1], v)
+        motion.a[i] = retain(begins, guess[2], a)
+    control.cv = where(begins, of[0], control.cv)
+    control.ca = where(begins, of[0] * of[0], control.ca)
+
+
+@njit
+def begin_parts(begins, passed, motion, control):
+    """The same in lanes that begin a stage of a part of a step that follows the error."""
+    of, later = first_and_second(control.h, motion.memory[STAGED]), control.stage > 0
+    held = begins & later
+    for i in range(N_DOF):
+        q, v, a = motion.q[i], motion.v[i], motion.a[i]
+        last = retain(passed, q, motion.q0[i]), retain(passed, v, motion.v0[i]), retain(passed, a, motion.a0[i])
+        motion.q0[i], motion.v0[i], motion.a0[i] = last
+        one, two = first(of, last, motion.aux[i]), second(of, last, (q, v, a))
+        motion.v1[i], motion.aux[i] = retain(held, v, motion.v1[i]), retain(held, a, motion.aux[i])
+        motion.q[i] = retain(begins, where(later, two[0], one[0]), q)
+        motion.v[i] = retain(begins, where(later, two[1], one[1]), v)
+        motion.a[i] = retain(begins, where(later, two[2], one[2]), a)
     control.cv = where(begins, of[0], control.cv)
     control.ca = where(begins, of[0] * of[0], control.ca)
 
@@ -50,6 +70,8 @@ def begin(options, motion, control):
     begins, passed = control.fresh > 0, control.passed > 0
     if options.fidelity == QUASISTATIC:
         begin_angles(begins, passed, motion, control)
+    elif follows_error(options):
+        begin_parts(begins, passed, motion, control)
     else:
         begin_steps(begins, passed, motion, control)
     control.iteration = where(begins, 0.0, control.iteration)
@@ -61,7 +83,7 @@ def begin(options, motion, control):
 def verdict(options, motion, control):
     """Which lanes have solved what they are at, have failed to, need a new tangent, or are to be corrected: four masks.
 
-    The fifth value is the size of the residuals.
+    The fifth mask tells which of the last need no other look; the sixth value is the size of the residuals.
     """
     now = scaled_size(control.cv, control.ca, motion)
     finite, live, checked = now < 1e300, control.live > 0, control.phase == CHECK
@@ -72,7 +94,8 @@ def verdict(options, motion, control):
     slow = (control.iteration > 0) & (now > SLOW * control.before)
     stale = going & ((control.factorised != control.cv) | slow)
     control.before = where(going & ~stale, now, control.before)
-    return solved, failed, stale, going & ~stale, now
+    moving = going & ~stale
+    return solved, failed, stale, moving, moving & (now <= motion.memory[CLOSE]), now
 
 
 @njit
@@ -81,7 +104,7 @@ def keep_blocks(mask, new, old):
     for b in range(new.shape[0]):
         for i in range(new.shape[1]):
             for j in range(new.shape[2]):
-                old[b, i, j] = where(mask, new[b, i, j], old[b, i, j])
+                old[b, i, j] = retain(mask, new[b, i, j], old[b, i, j])
 
 
 @njit
@@ -89,7 +112,7 @@ def keep_rows(mask, new, old):
     """Copy vectors, shape (n, m), in the lanes of the mask."""
     for b in range(new.shape[0]):
         for i in range(new.shape[1]):
-            old[b, i] = where(mask, new[b, i], old[b, i])
+            old[b, i] = retain(mask, new[b, i], old[b, i])
 
 
 @njit
@@ -122,9 +145,9 @@ def correct(mask, kept, motion, control):
     step = largest = 0.0 * control.cv
     for i in range(N_DOF):
         change = where(mask, kept.solution[i], 0.0)
-        motion.q[i] = where(mask, motion.q[i] + change, motion.q[i])
-        motion.v[i] = where(mask, motion.v[i] + control.cv * change, motion.v[i])
-        motion.a[i] = where(mask, motion.a[i] + control.ca * change, motion.a[i])
+        motion.q[i] = retain(mask, motion.q[i] + change, motion.q[i])
+        motion.v[i] = retain(mask, motion.v[i] + control.cv * change, motion.v[i])
+        motion.a[i] = retain(mask, motion.a[i] + control.ca * change, motion.a[i])
         step, largest = max(step, abs(change)), max(largest, abs(motion.q[i]))
     lost = mask & (control.cv == HELD) & (largest > FAR)
     control.at_roundoff = where(mask & (step <= ROUNDOFF * largest), 1.0, 0.0)

@@ -8,10 +8,9 @@ import numpy as np
 from tolstat.kernel._jit import njit
 from tolstat.kernel.borrow import fetch
 from tolstat.kernel.lane import pick
-from tolstat.kernel.state import make_state_record
 from tolstat.kernel.topology import N_DOF, PSI
-from tolstat.kernel.trail import Trail, make_trail
-from tolstat.kernel.vector import copy, larger
+from tolstat.kernel.trail import make_notes
+from tolstat.kernel.vector import larger
 from tolstat.kernel.work import FORCE
 from tolstat.tables import CONTACTS
 
@@ -46,15 +45,19 @@ class Ring(NamedTuple):
     """The last revolution of a joint, and what else is remembered of it."""
 
     samples: np.recarray  # (steps_per_rev,) SAMPLE
-    trail: Trail  # of the revolutions before
-    shadow: np.record  # State of a neighbour of the joint, see `classify`
+    notes: np.record  # NOTES: closure errors
     fine: np.recarray  # (3,) SAMPLE, see `closeup`
 
 
-def make_ring(steps_per_rev: int, max_revs: int) -> Ring:
+def make_ring(steps_per_rev: int) -> Ring:
     """Allocate, filled with NaN."""
-    samples, fine = make_samples(1, steps_per_rev)[0], make_samples(1, 3)[0]
-    return Ring(samples, make_trail(steps_per_rev, max_revs), make_state_record(N_DOF), fine)
+    return Ring(make_samples(1, steps_per_rev)[0], make_notes(1)[0], make_samples(1, 3)[0])
+
+
+@njit
+def grid_step(par, options):
+    """Length of a step of the output grid, s."""
+    return 2 * math.pi / (abs(par.omega) * options.steps_per_rev)
 
 
 @njit
@@ -120,19 +123,6 @@ def foresee(k, q, v, ahead, samples):
             here.v[i] = v[i]
         here.q[i] = q[i]
     return 1.0 if known else 0.0
-
-
-@njit
-def keep(k, ring):
-    """Keep what `record` has kept of grid point `k`, and at the end of a revolution its statistics, beyond it."""
-    n, trail = ring.samples.size, ring.trail
-    s, r = k % n, ((k - 1) // n) % trail.revolution.size
-    stride = -(-n // trail.modulus.shape[1])
-    if s % stride == 0:
-        for b in range(8):
-            copy(ring.samples[s].modulus[b], trail.modulus[r, s // stride, b])
-    if s == 0:
-        summarise(ring.samples, trail.revolution[r])
 
 
 @njit

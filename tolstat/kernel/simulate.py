@@ -7,15 +7,18 @@ import numpy as np
 
 from tolstat.kernel import dynamics, integrate, linsolve, tangent
 from tolstat.kernel._jit import njit
-from tolstat.kernel.classify import build_classify
+from tolstat.kernel.adaptive import build_resolve
 from tolstat.kernel.closeup import build_closeup
 from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium, near
 from tolstat.kernel.guess import rigid_guess
 from tolstat.kernel.ideal_loads import ideal_loads
 from tolstat.kernel.quasistatic import angle_time, build_quasistatic, end_closure, speed_ratios
-from tolstat.kernel.settle import Ring, closure_error, foresee, keep, make_ring, record, summarise
+from tolstat.kernel.mesh import parts_of
+from tolstat.kernel.resolve import Past, follows_error, make_past
+from tolstat.kernel.scale import set_weight, typical_force
+from tolstat.kernel.settle import Ring, closure_error, foresee, grid_step, make_ring, record, summarise
 from tolstat.kernel.state import AHEAD, FACTORISATIONS, HALVINGS, ITERATIONS, STEPS, make_state_record
-from tolstat.kernel.topology import N_DOF, N_LUMPS, PSI
+from tolstat.kernel.topology import N_DOF
 from tolstat.kernel.trail import closure_trend, note_closure
 from tolstat.kernel.work import make_work
 from tolstat.tables import CONTACTS, MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
@@ -27,8 +30,6 @@ RAMP = int(Start.RAMP)
 DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)
 CHECKS_PER_REV = 12
 """How often a revolution the closure error is looked at, once two revolutions are recorded."""
-SMALLEST_FORCE = 1e-3
-"""Scale (N) of the stopping test of a joint that neither turns nor carries."""
 
 residual, acceleration = dynamics.residual, dynamics.acceleration
 assemble, eliminate, solve = tangent.assemble, linsolve.factorise, linsolve.solve
@@ -53,7 +54,6 @@ substeps, advance = integrate.build_advance(newton)
 static_newton = integrate.build_newton(residual, factorise_static, solve, small=near)
 hold, relax, equilibrium = build_equilibrium(residual, newton, static_newton, integrate.scaled_size, rigid_guess)
 revolution = build_quasistatic(hold, relax, record)
-classify = build_classify(advance)
 recall, look_closer = build_closeup(advance, acceleration)
 reset = integrate.reset
 
@@ -71,17 +71,6 @@ def inside_model(par):
     for pin in range(4):
         good = good and par.clearance[pin] >= 0
     return good
-
-
-@njit
-def set_weight(par, state):
-    """Weights of residuals: 1 / (pins' tangential force T_r/(2R) or a pin's centrifugal force, times R for torques)."""
-    weight = 1 / max(abs(par.torque) / (2 * par.R), par.pin_mass * par.omega**2 * par.R, SMALLEST_FORCE)
-    for body in range(N_LUMPS):
-        for k in range(3):
-            state.weight[6 * body + k] = weight
-            state.weight[6 * body + 3 + k] = weight / par.R
-    state.weight[PSI] = weight / par.R
 
 
 @njit
@@ -105,7 +94,7 @@ def clear_results(out):
 @njit
 def clear(par, state, samples, notes):
     """Make ready for another joint."""
-    set_weight(par, state)
+    set_weight(typical_force(par), par, state.weight)
     state.q0[:] = 0.0
     state.v0[:] = 0.0
     state.a0[:] = 0.0
@@ -116,18 +105,21 @@ def clear(par, state, samples, notes):
 
 
 @njit
-def run(par, options, work, state, ring, out):
+def run(par, options, alone, out):
     """Fill the ring at the fidelity asked for; return a status.
 
     ``out.closure`` and ``out.revolutions`` are written, and ``out.failed_step`` where a step failed.
     """
+    work, state, ring, past = alone
     if not inside_model(par):
         return OUTSIDE_MODEL
-    clear(par, state, ring.samples, ring.trail.notes)
+    clear(par, state, ring.samples, ring.notes)
     if options.fidelity == IDEAL:
         return run_ideal(par, work, state, ring, out)
     if options.fidelity == QUASISTATIC:
         return run_quasistatic(par, options, work, state, ring, out)
+    if follows_error(options):
+        return resolve(par, options, work, state, ring, past, out)
     return run_dynamic(par, options, work, state, ring, out)
 
 
@@ -172,10 +164,7 @@ def begin(par, options, work, state):
     state.counters[ITERATIONS], state.counters[FACTORISATIONS] = iterations, factorisations
 
 
-@njit
-def grid_step(par, options):
-    """Length of a step of the output grid, s."""
-    return 2 * math.pi / (abs(par.omega) * options.steps_per_rev)
+resolve = build_resolve(newton, begin)
 
 
 @njit
@@ -196,16 +185,13 @@ def run_dynamic(par, options, work, state, ring, out):
     """Integrate until settled."""
     begin(par, options, work, state)
     n, h = options.steps_per_rev, grid_step(par, options)
-    half = n * (options.max_revs - options.max_revs // 2)
     for k in range(1, options.max_revs * n + 1):
         if not advance((k - 1) * h, h, par, options, work, state):
             out.failed_step = k
             return NEWTON_FAILED
         record(k, 0, k > n or options.max_revs == 1, par, work, state.v0, ring.samples)
         state.memory[AHEAD] = foresee(k, state.q0, state.v0, state.ahead, ring.samples)
-        if k > half:
-            keep(k, ring)
-        status = judge(k, state.counters[ITERATIONS], options, ring.samples, ring.trail.notes, out)
+        status = judge(k, state.counters[ITERATIONS], options, ring.samples, ring.notes, out)
         if status == NEWTON_FAILED:
             out.failed_step = k
         if status != NOT_SETTLED:
@@ -223,23 +209,37 @@ def is_finite(out):
 
 
 @njit
-def describe(status, options, counters, out):
+def describe(status, options, counters, mesh, out):
     """Write how a joint ended."""
     out.status = status
-    out.settled, out.steps_per_rev = status == OK, options.steps_per_rev
+    out.settled = status == OK
+    out.steps_per_rev = parts_of(mesh) if follows_error(options) else options.steps_per_rev
     out.steps, out.newton_iterations = counters[STEPS], counters[ITERATIONS]
     out.halvings, out.factorisations = counters[HALVINGS], counters[FACTORISATIONS]
 
 
 @njit
-def conclude(notes, out):
-    """Write what only a joint that has settled has."""
-    out.closure_trend, _ = closure_trend(0.0, notes)
-    out.motion, out.period = PERIODIC, 1
+def finish(status, failed, options, counters, mesh, out):
+    """Write how a joint ended, and at which step (-1: at none) one without results has `failed`."""
+    if status not in (OK, NOT_SETTLED, NOT_PERIODIC):
+        clear_results(out)
+        if failed > 0:
+            out.failed_step = failed
+            out.failed_theta = 2 * math.pi * ((failed - 1) % options.steps_per_rev) / options.steps_per_rev
+    describe(status, options, counters, mesh, out)
 
 
 @njit
-def simulate_joint(par, options, work, state, ring, out):
+def conclude(status, options, notes, out):
+    """Write how the closure error fell, of a joint that has not settled in the second half of its revolutions."""
+    since = 0.0 if status == OK else 0.5 * options.max_revs
+    out.closure_trend, _ = closure_trend(since, notes)
+    if status == OK:
+        out.motion, out.period = PERIODIC, 1
+
+
+@njit
+def simulate_joint(par, options, alone, out):
     """Simulate one joint.
 
     Parameters
@@ -248,34 +248,26 @@ def simulate_joint(par, options, work, state, ring, out):
         The joint.
     options : Options
         Numerical settings.
-    work, state : record of WORK, State
-        Scratch; nothing is carried over from one joint to the next.
-    ring : Ring
-        Samples of the last revolution.
+    alone : Scratch
+        Nothing is carried over from one joint to the next. The ring holds the last revolution.
     out : record of RESULT
         Written: status, and NaN in what was not computed.
     """
+    work, state, ring, past = alone
     clear_results(out)
     state.counters[:] = 0
-    status = run(par, options, work, state, ring, out)
+    controlled = follows_error(options)
+    status = run(par, options, alone, out)
     failed = out.failed_step
-    if status in (OK, NOT_SETTLED):
+    if status in (OK, NOT_SETTLED) and not controlled:
         summarise(ring.samples, out)
         if not is_finite(out):
             status, failed = NOT_FINITE, state.counters[STEPS]
-    if status == OK:
-        conclude(ring.trail.notes, out)
-        if options.fidelity == DYNAMIC and options.peak_substeps > 1:
+    if status in (OK, NOT_SETTLED) and not controlled:
+        conclude(status, options, ring.notes, out)
+        if status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1:
             look_closer(par, options, work, state, ring.samples, ring.fine, out)
-    elif status == NOT_SETTLED:
-        if options.fidelity == DYNAMIC:
-            status = classify(par, options, work, state, ring, out)
-    else:
-        clear_results(out)
-        if failed > 0:
-            out.failed_step = failed
-            out.failed_theta = 2 * math.pi * ((failed - 1) % options.steps_per_rev) / options.steps_per_rev
-    describe(status, options, state.counters, out)
+    finish(status, failed, options, state.counters, past.mesh, out)
 
 
 class Scratch(NamedTuple):
@@ -284,8 +276,9 @@ class Scratch(NamedTuple):
     work: np.record
     state: np.record
     ring: Ring
+    past: Past
 
 
 def make_scratch(options: Options) -> Scratch:
     """Allocate the work arrays of a process."""
-    return Scratch(make_work(), make_state_record(N_DOF), make_ring(options.steps_per_rev, options.max_revs))
+    return Scratch(make_work(), make_state_record(N_DOF), make_ring(options.steps_per_rev), make_past(options))

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 STEPS, ITERATIONS, HALVINGS, FACTORISATIONS, ATTEMPTS_LEFT = 0, 1, 2, 3, 4
-H_OLD, CV_FACTORISED, AHEAD = 0, 1, 2
+H_OLD, CV_FACTORISED, AHEAD, STAGED, CLOSE, TOLERANCE, FORCE, TORQUE = range(8)
+MEMORY = 8
 
 
 class State(NamedTuple):
@@ -24,7 +25,9 @@ class State(NamedTuple):
     residual: np.ndarray
     weight: np.ndarray  # 1 / the size of each residual that counts as 1
     ahead: np.ndarray  # change of q to expect of the next step, where something better than a Taylor series is known
-    memory: np.ndarray  # (3,) last accepted step, cv of the tangent in use (0: none), whether to use `ahead` (1)
+    memory: np.ndarray  # (8,) last accepted step; cv of the tangent in use (0: none); whether to use `ahead` (1); length
+    # of that step if its first stage is kept (else 0); residual that one more iteration is sure to make small enough;
+    # of a joint whose steps follow the error: its tolerance, and the force (N) and torque (N m) that it is relative to
     counters: np.ndarray  # (5,) steps, Newton iterations, halvings, factorisations, attempts at a step still allowed
 
 
@@ -39,7 +42,7 @@ def make_state(n: int) -> State:
 def layout(n: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Type and shape of each array."""
     arrays: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(State._fields[:13], ("f8", (n,)))
-    return arrays | {"memory": ("f8", (3,)), "counters": ("i8", (5,))}
+    return arrays | {"memory": ("f8", (MEMORY,)), "counters": ("i8", (5,))}
 
 
 def make_state_record(n: int) -> np.record:

@@ -1,8 +1,7 @@
 """What is remembered of a joint that takes long to settle: closure errors, and whole revolutions to compare.
 
-A joint that settles early writes no more than one number a check here. Of one that does not, the last revolutions are
-kept (`MOST_KEPT` at most, half of ``max_revs`` at most): moduli of their loads, for closure errors over several
-revolutions, and the statistics of each.
+A joint that settles writes no more than one number a check here. Of one whose steps follow the error (`resolve`) whole
+revolutions are kept: moduli of their loads, for closure errors over several revolutions, and the statistics of each.
 """
 
 import math
@@ -14,8 +13,6 @@ from tolstat.kernel._jit import njit
 from tolstat.kernel.vector import copy, larger
 from tolstat.tables import CONTACTS, RESULT
 
-MOST_KEPT = 16
-"""Revolutions."""
 MOST_ANGLES = 360
 """Input angles a revolution at which moduli are kept."""
 MOST_CHECKS = 192
@@ -34,15 +31,17 @@ class Trail(NamedTuple):
     notes: np.record  # NOTES
 
 
-def make_trail(steps_per_rev: int, max_revs: int) -> Trail:
-    """Allocate."""
-    kept = max(1, min(max_revs // 2, MOST_KEPT))
+def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
+    """Allocate what `trail_of` makes the trails of, for `kept` revolutions."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
-    return Trail(
-        np.full((kept, angles, 8, 2), np.nan),
-        np.zeros(kept, RESULT).view(np.recarray),
-        make_notes(1)[0],
-    )
+    modulus = np.full((joints, kept, angles, 8, 2), np.nan)
+    return modulus, np.zeros((joints, kept), RESULT).view(np.recarray), make_notes(joints)
+
+
+def make_trail(steps_per_rev: int, kept: int) -> Trail:
+    """Allocate for one joint."""
+    modulus, revolution, notes = make_trails(1, steps_per_rev, kept)
+    return Trail(modulus[0], revolution[0], notes[0])
 
 
 def make_notes(joints: int) -> np.recarray:
@@ -125,13 +124,13 @@ def combine(last, count, trail, out):
                 out.F_max[b], out.F_mean[b], out.F_range[b] = top, total / count, top - low
             else:
                 out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / count, top - low
-    out.psi_max = first.psi_max
+    out.psi_max, out.roughness = first.psi_max, first.roughness
     for pin in range(4):
         copy(first.contact_max[pin], out.contact_max[pin])
     out.mode_share[:] = 0.0
     for r in range(last - count + 1, last + 1):
         one = trail.revolution[r % kept]
-        out.psi_max = max(out.psi_max, one.psi_max)
+        out.psi_max, out.roughness = max(out.psi_max, one.psi_max), max(out.roughness, one.roughness)
         for pin in range(4):
             for i in range(len(CONTACTS)):
                 out.contact_max[pin, i] = max(out.contact_max[pin, i], one.contact_max[pin, i])

@@ -16,10 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat import joint, sampling, simulation, study
-from tolstat.kernel import classify, first_order
-from tolstat.kernel._jit import closure
-from tolstat.kernel.simulate import advance, begin, clear, grid_step, make_scratch
-from tolstat.kernel.state import CV_FACTORISED
+from tolstat.kernel import first_order
+from tolstat.kernel._jit import closure, njit
+from tolstat.kernel.integrate import reset
+from tolstat.kernel.resolve import APART, lever
+from tolstat.kernel.settle import grid_step
+from tolstat.kernel.simulate import advance, begin, clear, make_scratch
+from tolstat.kernel.state import CV_FACTORISED, H_OLD, make_state_record
 from tolstat.kernel.topology import N_DOF
 from tolstat.kernel.work import WORK
 from tolstat.tables import RESULT, SIMULATED, Options, Status
@@ -101,23 +104,59 @@ def _revolution(first, par, options, work, state):
     return good
 
 
+@njit
+def set_apart(state, shadow, R):
+    """Choose the first difference of the two states: `APART`, in all unknowns."""
+    share = APART / math.sqrt(state.q0.size)
+    for i in range(state.q0.size):
+        lever = lever(i, R)
+        shadow.q0[i] = state.q0[i] + (share if i % 2 == 0 else -share) / lever
+        shadow.v0[i], shadow.a0[i], shadow.weight[i] = state.v0[i], state.a0[i], state.weight[i]
+    reset(shadow)
+
+
+@njit
+def draw_near(state, shadow, factor):
+    """Scale the difference of the two states; the neighbour's past follows from the joint's and from it."""
+    h = state.memory[H_OLD]
+    for i in range(state.q0.size):
+        dq, dv = factor * (shadow.q0[i] - state.q0[i]), factor * (shadow.v0[i] - state.v0[i])
+        da = factor * (shadow.a0[i] - state.a0[i])
+        shadow.q0[i], shadow.v0[i], shadow.a0[i] = state.q0[i] + dq, state.v0[i] + dv, state.a0[i] + da
+        shadow.q1[i] = state.q1[i] + dq - h * (dv - 0.5 * h * da)
+        shadow.v1[i] = state.v1[i] + dv - h * da
+        shadow.a1[i], shadow.aux[i] = state.a1[i] + da, state.aux[i] + da
+    shadow.memory[H_OLD] = h
+
+
+@njit
+def distance(state, shadow, h, R):
+    """Distance of two states, m: positions, and what their speeds add in a step; rotations at the radius R."""
+    square = 0.0
+    for i in range(state.q0.size):
+        lever = lever(i, R)
+        dq, dv = shadow.q0[i] - state.q0[i], h * (shadow.v0[i] - state.v0[i])
+        square += lever * lever * (dq * dq + dv * dv)
+    return math.sqrt(square)
+
+
 def exponent(params: Table, options: Options, settling: int, revolutions: int) -> float:
     """Largest Lyapunov exponent of one joint, per revolution, after `settling` of them; NaN where a step fails."""
-    work, state, ring = make_scratch(options)
-    par, shadow, n = params.view(np.recarray)[0], ring.shadow, options.steps_per_rev
-    clear(par, state, ring.samples, ring.trail.notes)
+    work, state, ring, _ = make_scratch(options)
+    par, shadow, n = params.view(np.recarray)[0], make_state_record(N_DOF), options.steps_per_rev
+    clear(par, state, ring.samples, ring.notes)
     begin(par, options, work, state)
     for r in range(settling):
         if not _revolution(r * n, par, options, work, state):
             return math.nan
-    classify.set_apart(state, shadow, par.R)
+    set_apart(state, shadow, par.R)
     growth, factor = 0.0, 1.0
     for r in range(revolutions):
-        classify.draw_near(state, shadow, factor)
+        draw_near(state, shadow, factor)
         if not all(_revolution((settling + r) * n, par, options, work, one) for one in (state, shadow)):
             return math.nan
-        apart = max(classify.distance(state, shadow, grid_step(par, options), par.R), classify.APART * 1e-6)
-        factor = classify.APART / apart
+        apart = max(distance(state, shadow, grid_step(par, options), par.R), APART * 1e-6)
+        factor = APART / apart
         if r >= ALIGNING:
             growth -= math.log(factor)
     return growth / (revolutions - ALIGNING)

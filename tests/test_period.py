@@ -80,7 +80,7 @@ def test_two_joints_that_differ_by_nothing_to_speak_of(params, joint, options, f
 
 
 def test_trend_is_the_line_through_the_logarithms():
-    trail = make_trail(180, 20)
+    trail = make_trail(180, 10)
     rng = np.random.default_rng(1)
     revs = np.arange(24, 241) / 12
     logs = -0.3 * revs + rng.normal(0, 0.02, revs.size)
@@ -94,7 +94,7 @@ def test_trend_is_the_line_through_the_logarithms():
 
 
 def test_closure_over_several_revolutions_finds_the_period():
-    trail = make_trail(36, 20)
+    trail = make_trail(36, 10)
     rng = np.random.default_rng(2)
     three = rng.uniform(1, 2, (3, 36, 8, 2))
     for r in range(20):
@@ -108,7 +108,7 @@ def test_closure_over_several_revolutions_finds_the_period():
 
 
 def test_combined_statistics_are_those_of_all_revolutions():
-    trail = make_trail(36, 20)
+    trail = make_trail(36, 10)
     rng = np.random.default_rng(3)
     samples = rng.uniform(1, 2, (5, 36, 8))
     for r, values in zip(range(15, 20), samples, strict=True):

@@ -336,13 +336,13 @@ def test_nothing_is_allocated_per_step():
     code = """
 from numba.core.runtime import _nrt_python, rtsys
 _nrt_python.memsys_enable_stats()
-work, state, ring = simulate.make_scratch(Options())
+alone = simulate.make_scratch(Options())
 out = np.zeros(1, RESULT).view(np.recarray)
 counts = []
 for revolutions in (2, 2, 4):
     before = rtsys.get_allocation_stats().alloc
     options = Options(max_revs=revolutions, settle_tol=1e-12)
-    simulate.simulate_joint(par[0], options, work, state, ring, out[0])
+    simulate.simulate_joint(par[0], options, alone, out[0])
     counts.append(rtsys.get_allocation_stats().alloc - before)
     assert out[0].steps > 150 * revolutions
 print(counts)

@@ -25,7 +25,7 @@ from tolstat.study import Study, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
-from tolstat.tables import Status
+from tolstat.tables import VALID, Status
 from tolstat.tolerance import Distribution, Normal, Rayleigh
 
 EXAMPLE = 'write --limit "P(cross1.F > 700 N) < 0.001"'
@@ -270,7 +270,7 @@ def _asked(
 def _above(results: NDArray[np.void], said: Statement) -> NDArray[np.bool_]:
     """Which joints are above a limit in any load, or have no valid load."""
     largest = np.max([source.load(results, name)[0] for name in said.loads], axis=0)
-    valid = (results["status"] == Status.OK) & np.isfinite(largest)
+    valid = np.isin(results["status"], VALID) & np.isfinite(largest)
     return np.asarray(~valid | (largest > said.level))
 
 

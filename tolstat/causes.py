@@ -20,7 +20,7 @@ from tolstat.schema import did_you_mean
 from tolstat.store import ResultStore
 from tolstat.study import Study
 from tolstat.study.selection import LIMIT_UNITS, columns_of
-from tolstat.tables import Status
+from tolstat.tables import VALID
 from tolstat.tolerance import score
 
 TAIL = 0.9
@@ -156,7 +156,7 @@ def _of_joints(
     """Causes, with the errors of the joints that are looked at from a function of their places."""
     values, unit = source.load(campaign.results, by)
     status = campaign.results["status"]
-    rows = np.flatnonzero((status == Status.OK) & np.isfinite(values))
+    rows = np.flatnonzero(np.isin(status, VALID) & np.isfinite(values))
     needed = max(JOINTS, len(study.tolerances) + 2 * regression.GROUPS)
     if rows.size < needed or np.ptp(values[rows]) == 0:
         found = f"has {rows.size} joints with a valid load that scatters"
@@ -195,7 +195,7 @@ def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: b
     campaign = source.read(store, source.LOAD_FIELDS, ())
     values, unit = source.load(campaign.results, by)
     status = campaign.results["status"]
-    valid = (status == Status.OK) & np.isfinite(values)
+    valid = np.isin(status, VALID) & np.isfinite(values)
     if log and values[valid].min(initial=np.inf) <= 0:
         raise InputError([Fault("--log", f"{by} is not positive in all joints", "leave it out")])
     load = np.full(len(values), np.nan)

@@ -18,7 +18,7 @@ from tolstat.report import source
 from tolstat.schema import did_you_mean
 from tolstat.store import ResultStore
 from tolstat.study.selection import LIMIT_UNITS
-from tolstat.tables import Status
+from tolstat.tables import VALID, Status
 
 SHARES = (0.5, 0.9, 0.99)
 """Quantiles that are compared."""
@@ -198,7 +198,7 @@ def _cut(side: source.Campaign, rows: np.ndarray[tuple[int], np.dtype[np.intp]])
 
 def _valid(side: source.Campaign, name: str) -> tuple[FloatArray, str]:
     values, unit = source.load(side.results, name)
-    return np.where(side.results["status"] == Status.OK, values, np.nan), unit
+    return np.where(np.isin(side.results["status"], VALID), values, np.nan), unit
 
 
 def _names(sides: Sides, by: Sequence[str], limited: Sequence[str]) -> list[str]:

@@ -102,7 +102,7 @@ def follow(joint: NDArray[np.void], options: Options, steps: int) -> Trajectory:
 
     row = joint.view(np.recarray)[0]
     points = np.full((steps + 1, 3, N_DOF), np.nan)
-    work, state, _ = make_scratch(options)
+    work, state, *_ = make_scratch(options)
     status = Status(trajectory.follow(row, options, work, state, points))
     h = 2.0 * math.pi / (abs(float(row["omega"])) * options.steps_per_rev)
     reached = int(np.isfinite(points[:, 0, 0]).sum())

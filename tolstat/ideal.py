@@ -109,7 +109,7 @@ def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
 
     angles = np.atleast_1d(np.asarray(theta, float))
     row: Any = par.view(np.recarray)[0]
-    work, state, _ = make_scratch(Options())
+    work, state, *_ = make_scratch(Options())
     load, contact = np.empty((angles.size, 8, 6)), np.empty((angles.size, 4))
     for i, angle in enumerate(angles):
         ideal_loads(angle, row, state, work)

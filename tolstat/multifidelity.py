@@ -28,7 +28,7 @@ from tolstat.store import ResultStore
 from tolstat.study import Study
 from tolstat.study.model import Solver
 from tolstat.study.selection import LIMIT_UNITS
-from tolstat.tables import Status
+from tolstat.tables import VALID
 
 SHARES = (0.5, 0.9, 0.99)
 TIMED = 64
@@ -216,7 +216,8 @@ def _read(paths: tuple[Path, Path]) -> tuple[Campaign, Campaign]:
 def _pairs(campaigns: tuple[Campaign, Campaign], name: str, costs: tuple[float, float]) -> Pairs:
     """A load of each joint, NaN where it is not valid. Both files are of one study and seed: row i is one joint."""
     high, low = (
-        np.where(held.results["status"] == Status.OK, source.load(held.results, name)[0], np.nan) for held in campaigns
+        np.where(np.isin(held.results["status"], VALID), source.load(held.results, name)[0], np.nan)
+        for held in campaigns
     )
     return Pairs(high, low, *costs)
 

@@ -33,7 +33,7 @@ from tolstat.store import ResultStore
 from tolstat.store.integrity import DIGEST
 from tolstat.store.reader import BLOCK
 from tolstat.study import Study
-from tolstat.tables import FAILED, SIMULATED, UNSETTLED, Fidelity, Method, Start, Status
+from tolstat.tables import FAILED, SIMULATED, UNSETTLED, VALID, Fidelity, Method, Start, Status
 from tolstat.tolerance import score
 
 JOINTS = 20_000
@@ -116,7 +116,7 @@ def gather(store: ResultStore, accepted: float = np.nan, again: int = angles.JOI
     notes = [note for note in (fidelity.sentence(store.options, store.fidelity), _stopped(store)) if note]
     found: tuple[list[Causes], list[AgainstAngle], list[Worst]] = ([], [], [])
     lost_errors = None
-    if campaign.method != "sweep" and campaign.count(Status.OK):
+    if campaign.method != "sweep" and campaign.count(*VALID):
         with _noting(notes, "causes and worst joints are left out", store.path):
             study = recall(store)
             if campaign.weights is None and not study.groups:
@@ -176,7 +176,7 @@ def read(store: ResultStore) -> tuple[Campaign, NDArray[np.float64]]:
         rows = slice(first + skip, min(first + BLOCK, len(campaign.results)) + skip)
         shares = store.results(rows, ("mode_share",))["mode_share"]
         here = slice(first, first + len(shares))
-        valid = campaign.results["status"][here] == Status.OK
+        valid = np.isin(campaign.results["status"][here], VALID)
         weights = valid.astype(float) if campaign.weights is None else np.where(valid, campaign.weights[here], 0.0)
         modes += np.tensordot(weights[valid], shares[valid], 1)
         total += weights.sum()

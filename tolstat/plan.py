@@ -16,7 +16,7 @@ from tolstat.campaign import choose_fidelity
 from tolstat.executor import available_workers
 from tolstat.joint import perturb
 from tolstat.recorded import perturbed, settings, variants
-from tolstat.report.source import load
+from tolstat.report.source import ends, load
 from tolstat.sampling import dimensions, draw, origin_blocks
 from tolstat.simulation import history_specs, simulate_rows
 from tolstat.store.histories import attach_scales, create_dataset
@@ -186,7 +186,7 @@ def _width(share: float, n: int) -> float:
 def _limits(study: Study, results: NDArray[np.void]) -> list[LimitPlan]:
     plans = []
     for name, level in study.limits.items():
-        found = exceedance.at(load(results, name)[0], results["status"], level, CONFIDENCE)
+        found = exceedance.at(load(results, name)[0], results["status"], level, CONFIDENCE, ends=ends(results, name))
         valid = found.n - found.n_failed - found.n_unsettled
         nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))

@@ -29,7 +29,7 @@ from tolstat.store import ResultStore
 from tolstat.study import Study, subset_of
 from tolstat.study.model import Subset
 from tolstat.study.selection import limit_of
-from tolstat.tables import Status
+from tolstat.tables import VALID
 
 MANY = 2000
 """Joints of a stage from which on it is worth starting worker processes: some seconds of work."""
@@ -264,6 +264,6 @@ def _loads(question: Subset, out: Path, stage: range, joints: Candidates) -> tup
         found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
         raise StoreError(str(Fault(str(out), found, "run it anew with another --out")))
     values = load(results, question.load)[0].copy()
-    lost = (results["status"] != Status.OK) | ~np.isfinite(values)
+    lost = ~np.isin(results["status"], VALID) | ~np.isfinite(values)
     values[lost] = math.inf if question.unresolved == "above" else -math.inf
     return values, int(lost.sum())

@@ -105,9 +105,10 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
     par = params.view(np.recarray)[0]
     options = options._replace(fidelity=int(Fidelity.DYNAMIC))
-    work, state, ring = make_scratch(options)
+    alone = make_scratch(options)
+    work, state = alone.work, alone.state
     settled = np.zeros(1, RESULT)
-    simulate_joint(par, options, work, state, ring, settled.view(np.recarray)[0])
+    simulate_joint(par, options, alone, settled.view(np.recarray)[0])
     period = 2 * np.pi / abs(float(par.omega))
     t0, y0 = period * (float(settled["revolutions"][0]) % 1.0), np.concatenate([state.q0, state.v0])
     if from_start:
@@ -146,7 +147,7 @@ def _start(par: np.record, options: Options) -> FloatArray:
     from tolstat.kernel.simulate import make_scratch
     from tolstat.kernel.trajectory import follow
 
-    work, state, _ = make_scratch(options)
+    work, state, *_ = make_scratch(options)
     point = np.empty((1, 3, len(state.q)))
     follow(par, options, work, state, point)
     return point[0, :2].ravel()

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.refinement import FACTOR
 from tolstat.tables import MAX_ITERATIONS, STATUS_TEXT, Motion, Status
 
 ALLOWED_REVS, ALLOWED_STEPS = 1000, 20_000
@@ -37,15 +36,17 @@ def remedy(row: np.void, options: Mapping[str, Any]) -> str:
         return _of_failure(row, options)
     if status == Status.NOT_RESOLVED:
         return _of_steps(row, options)
+    if status == Status.STATIONARY and motion == Motion.SUBHARMONIC:
+        return f"repeats every {row['period']} revolutions, which the results cover"
+    if status == Status.STATIONARY:
+        return f"never repeats: largest loads are those of {options['duration']} revolutions, with an interval"
     if motion == Motion.SLOW:
         return _of_slow(row, options)
-    if motion == Motion.SUBHARMONIC:
-        return f"repeats every {row['period']} revolutions, which the results cover"
     if motion in (Motion.QUASI_PERIODIC, Motion.CHAOTIC):
         kind = motion.label.replace("_", "-")
-        return f"{kind}: no setting settles it; more solver.max_revs make the largest loads more certain"
+        return f"{kind}, and its largest loads still change: try a larger solver.max_revs"
     if status == Status.NOT_SETTLED:
-        return "give more solver.max_revs: 10 tell what motion it is"
+        return "give more solver.max_revs, and solver.max_refinements above 0 to be told what motion it is"
     return STATUS_TEXT[status]
 
 
@@ -58,13 +59,11 @@ def _of_failure(row: np.void, options: Mapping[str, Any]) -> str:
 
 
 def _of_steps(row: np.void, options: Mapping[str, Any]) -> str:
-    steps, change = int(row["steps_per_rev"]), float(row["refinement_change"])
+    change = float(row["refinement_change"])
     if not math.isfinite(change):
-        return f"fails at {FACTOR * steps} steps a revolution: try solver.max_halvings = 20"
-    found = f"largest loads change by {change:.1%} up to {steps} steps a revolution"
-    if FACTOR * steps > ALLOWED_STEPS:
-        return f"{found}: no setting resolves them"
-    return f"{found}: try solver.max_refinements = {int(options['max_refinements']) + 1}"
+        return "fails with steps that follow the error: try solver.max_halvings = 20"
+    more = int(options["max_refinements"]) + 1
+    return f"largest loads change by {change:.1%} with the last tolerance: try solver.max_refinements = {more}"
 
 
 def _of_slow(row: np.void, options: Mapping[str, Any]) -> str:

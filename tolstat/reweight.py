@@ -20,7 +20,7 @@ from tolstat.store import ResultStore
 from tolstat.study import Study
 from tolstat.study.change import changed
 from tolstat.study.selection import columns_of
-from tolstat.tables import Status
+from tolstat.tables import VALID, Status
 from tolstat.tolerance import Distribution, score
 
 OUTSIDE = 1e-4
@@ -155,7 +155,7 @@ def _log_ratios(
 
 def _row(campaign: source.Campaign, weights: Weights, name: str, level: float, confidence: float) -> dict[str, object]:
     values, unit = source.load(campaign.results, name)
-    valid = (campaign.results["status"] == Status.OK) & np.isfinite(values)
+    valid = np.isin(campaign.results["status"], VALID) & np.isfinite(values)
     found = reweight.share_above(values[valid], _part(weights, valid), level, confidence, campaign.iid)
     counted = weights.values[valid & (values > level)].sum()
     before = campaign.above(values, level, confidence).estimate
@@ -168,7 +168,7 @@ def _quantiles(campaign: source.Campaign, weights: Weights, confidence: float) -
     rows = []
     for name in source.LOADS:
         values, unit = source.load(campaign.results, name)
-        valid = (campaign.results["status"] == Status.OK) & np.isfinite(values)
+        valid = np.isin(campaign.results["status"], VALID) & np.isfinite(values)
         part = _part(weights, valid)
         for share in (0.5, 0.9, 0.99):
             found = reweight.quantile(values[valid], part, share, confidence, campaign.iid)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import rainflow, refinement
+from tolstat import rainflow, refinement, stationary
 from tolstat.tables import (
     CONTACTS,
     PARAM,
@@ -169,6 +169,7 @@ def simulate_rows(
 
     results, _ = simulate(np.arange(len(params)), options)
     refinement.refine(results, options, simulate)
+    stationary.fill_ends(results)
     return Simulation(results, kept)
 
 

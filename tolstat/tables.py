@@ -45,6 +45,7 @@ class Status(IntEnum):
     CRASHED = 8
     INVALID_INPUT = 9
     NOT_RESOLVED = 10
+    STATIONARY = 11
 
     @property
     def label(self) -> str:
@@ -55,7 +56,10 @@ class Status(IntEnum):
 UNSETTLED = (Status.NOT_SETTLED, Status.NOT_PERIODIC, Status.NOT_RESOLVED)
 """States of a joint whose results others would not repeat: other revolutions, or finer steps."""
 
-SIMULATED = (Status.OK, *UNSETTLED)
+VALID = (Status.OK, Status.STATIONARY)
+"""States of a joint whose largest loads count; of a stationary one they have an interval."""
+
+SIMULATED = (*VALID, *UNSETTLED)
 """States of a joint that has results."""
 
 FAILED = tuple(s for s in Status if s not in SIMULATED and s != Status.PENDING)
@@ -64,12 +68,15 @@ FAILED = tuple(s for s in Status if s not in SIMULATED and s != Status.PENDING)
 STATUS_TEXT = {
     Status.PENDING: "not simulated yet",
     Status.OK: "settled; results valid",
-    Status.NOT_SETTLED: "closure error still above solver.settle_tol after solver.max_revs; results are those of the "
-    "last revolution",
-    Status.NOT_PERIODIC: "steady, but not the same in each revolution: sub-harmonic, quasi-periodic or chaotic, "
-    "see motion; results are those of the whole period, or of up to the last 16 revolutions",
+    Status.NOT_SETTLED: "closure error still above solver.settle_tol after all revolutions, and largest loads that "
+    "still change; results are those of the last revolutions",
+    Status.NOT_PERIODIC: "not the same in each revolution: quasi-periodic or chaotic, see motion, and not stationary; "
+    "results are those of the last revolutions",
     Status.NOT_RESOLVED: "settled, but its largest loads still change with finer steps (refinement_change); results "
     "are those of the finest steps taken",
+    Status.STATIONARY: "never the same in each revolution, but its largest loads are as large in the first half of the "
+    "revolutions watched as in the second: results are the largest of solver.duration revolutions, estimated, with an "
+    "interval (lower, upper); of a sub-harmonic joint those of its whole period",
     Status.TIMEOUT: "took longer than the time allowed to a joint; results are NaN",
     Status.CRASHED: "its process died with it twice; results are NaN",
     Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
@@ -183,6 +190,7 @@ class Options(NamedTuple):
     fidelity: int = int(Fidelity.DYNAMIC)
     peak_substeps: int = 16
     max_refinements: int = 2
+    duration: int = 100
 
 
 class HistorySpec(NamedTuple):
@@ -307,7 +315,14 @@ def _load_fields() -> list[Field]:
         for stat, text in (("max", "largest"), ("mean", "mean"), ("range", "largest less smallest")):
             description = f"{text} modulus of the bushing {noun} over the revolutions that count"
             fields.append(Field(f"{load}_{stat}", unit, description, shape=(8,)))
+        fields += _ends(load, unit, f"modulus of the bushing {noun}", (8,))
     return fields
+
+
+def _ends(load: str, unit: str, noun: str, shape: tuple[int, ...]) -> tuple[Field, ...]:
+    """Interval of a largest load."""
+    text = f"end of the 95 % interval of the largest {noun} of a stationary joint; of one that is ok the largest itself"
+    return tuple(Field(f"{load}_{end}", unit, f"{end} {text}", shape=shape) for end in ("lower", "upper"))
 
 
 RESULT_FIELDS = (
@@ -321,9 +336,9 @@ RESULT_FIELDS = (
     Field("failed_step", "1", "step of the output grid at which the joint failed, from 1; -1 if it did not", "i4"),
     Field("failed_theta", "rad", "input angle at the start of that step, less whole revolutions"),
     Field("revolutions", "1", "revolutions integrated, the recorded one included"),
-    Field("steps_per_rev", "1", "steps a revolution of the results: more than solver.steps_per_rev if refined", "i4"),
+    Field("steps_per_rev", "1", "steps of the last revolution: others than solver.steps_per_rev if refined", "i4"),
     Field("roughness", "1", "largest bend of a load between three samples, relative to the largest load of the kind"),
-    Field("refinement_change", "1", "largest change of a largest load by the last refinement, relative to its kind's"),
+    Field("refinement_change", "1", "largest change of a largest load by the last tolerance, relative to its kind's"),
     Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),
     Field("newton_iterations", "1", "Newton iterations", "i4"),
     Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),
@@ -335,8 +350,10 @@ RESULT_FIELDS = (
         "largest contact force of the pin: of its outermost station, of its innermost one, resultant of all stations",
         shape=(4, len(CONTACTS)),
     ),
+    *_ends("contact", "N", "contact force", (4, len(CONTACTS))),
     Field("mode_share", "1", "share of the revolutions that count in each contact mode", shape=(4, 4)),
     Field("psi_max", "1", "largest |Psi|, relative error of the speed ratio, eq. (13)"),
+    *_ends("psi", "1", "|Psi|", ()),
 )
 
 DESIGN_FIELDS = (

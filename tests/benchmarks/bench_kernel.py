@@ -31,7 +31,7 @@ def snaps(these):
 
 @pytest.mark.parametrize("part", Once._fields)
 def test_part_of_one_joint(benchmark, these, snaps, part):
-    work, state, _ = simulation.scratch(these.options)
+    work, state, *_ = simulation.scratch(these.options)
     snap = snaps[0]
     state.q[:], state.v[:], state.a[:] = snap.q, snap.v, snap.a
     par = snap.params.view(np.recarray)[0]

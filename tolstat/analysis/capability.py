@@ -65,7 +65,14 @@ class Capability:
         return 1e6 * self.above.estimate, 1e6 * self.above.outer_lower, 1e6 * self.above.outer_upper
 
 
-def at(values: ArrayLike, status: ArrayLike, limit: float, confidence: float = 0.95, iid: bool = True) -> Capability:
+def at(
+    values: ArrayLike,
+    status: ArrayLike,
+    limit: float,
+    confidence: float = 0.95,
+    iid: bool = True,
+    ends: tuple[ArrayLike, ArrayLike] | None = None,
+) -> Capability:
     """Capability of one load.
 
     Parameters
@@ -78,6 +85,8 @@ def at(values: ArrayLike, status: ArrayLike, limit: float, confidence: float = 0
         Of the intervals.
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not.
+    ends : tuple of array_like, shape (n,), optional
+        Interval of each load, see `exceedance.curve`.
 
     Returns
     -------
@@ -97,7 +106,7 @@ def at(values: ArrayLike, status: ArrayLike, limit: float, confidence: float = 0
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    above = exceedance.at(values, status, limit, confidence, iid)
+    above = exceedance.at(values, status, limit, confidence, iid, ends)
     valid = exceedance.sort_out(values, status).valid
     blank = (np.nan, np.nan, np.nan)
     scatters = valid.size > 1 and np.ptp(valid) > 0

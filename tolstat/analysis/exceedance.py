@@ -3,7 +3,8 @@
 Two kinds of doubt are kept apart. *Sampling*: other joints could have been drawn; the Clopper–Pearson
 interval covers it, for independent samples only. *Unresolved joints*: a joint that failed or did not
 settle has no valid load; counting all of them below the level, then all of them above it, bounds what they
-could change. Neither is ever dropped in silence.
+could change. Neither is ever dropped in silence. So it is with a stationary joint, whose largest load has an interval:
+at a level inside it the joint counts below, then above.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.tables import UNSETTLED, Status
+from tolstat.tables import UNSETTLED, VALID, Status
 
 FloatArray = NDArray[np.float64]
 Table = NDArray[np.void]
@@ -39,7 +40,8 @@ class Exceedance:
     lower, upper : float
         Clopper–Pearson interval of the valid joints; NaN when the samples are not independent.
     bound_lower, bound_upper : float
-        Share of all `n` joints above the level when every unresolved joint is below it, and above it.
+        Share of all `n` joints above the level when every joint in doubt is below it, and above it: unresolved ones,
+        and stationary ones in whose interval the level is.
     outer_lower, outer_upper : float
         Lower Clopper–Pearson end of ``bound_lower`` and upper end of ``bound_upper``: covers both kinds of
         doubt. NaN when the samples are not independent.
@@ -107,7 +109,7 @@ def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
     if load.ndim != 1 or load.shape != state.shape:
         raise ValueError(f"values {load.shape} and status {state.shape} must be of one length")
     unsettled = np.isin(state, UNSETTLED)
-    valid = (state == Status.OK) & np.isfinite(load)
+    valid = np.isin(state, VALID) & np.isfinite(load)
     failed = ~valid & ~unsettled & (state != Status.PENDING)
     return Sample(np.sort(load[valid]), int(failed.sum()), int(unsettled.sum()))
 
@@ -227,7 +229,14 @@ def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
     return float(high)
 
 
-def at(values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0.95, iid: bool = True) -> Exceedance:
+def at(
+    values: ArrayLike,
+    status: ArrayLike,
+    level: float,
+    confidence: float = 0.95,
+    iid: bool = True,
+    ends: tuple[ArrayLike, ArrayLike] | None = None,
+) -> Exceedance:
     """Share of the joints whose load is above one level.
 
     Parameters
@@ -241,6 +250,8 @@ def at(values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not (Sobol', Latin
         hypercube, sweep), since Clopper–Pearson holds for independent samples only.
+    ends
+        As in `curve`.
 
     Returns
     -------
@@ -256,7 +267,7 @@ def at(values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0
     >>> found.bound_lower, found.bound_upper
     (0.25, 0.5)
     """
-    row = curve(values, status, [level], confidence, iid)[0]
+    row = curve(values, status, [level], confidence, iid, ends)[0]
     return Exceedance(*row.tolist())
 
 
@@ -266,6 +277,7 @@ def curve(
     levels: ArrayLike | None = None,
     confidence: float = 0.95,
     iid: bool = True,
+    ends: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> NDArray[np.void]:
     """Share of the joints above each of many levels: the table of P(load > x).
 
@@ -276,6 +288,8 @@ def curve(
     levels : array_like, shape (m,), optional
         Levels in the unit of the values. By default every value that a valid joint has, ascending; between
         two of them the share does not change, so that the table is the whole step curve.
+    ends : tuple of array_like, shape (n,), optional
+        Interval of each load, lower and upper end; without it no load has a doubt.
 
     Returns
     -------
@@ -294,16 +308,24 @@ def curve(
         raise ValueError("a level is NaN")
     n_valid = sample.valid.size
     count = n_valid - np.searchsorted(sample.valid, x, side="right")
+    least, most = (_count_above(end, values, status, x) for end in ends or (values, values))
     table = np.zeros(x.shape, CURVE)
     table["level"], table["count"] = x, count
     table["n"], table["n_failed"], table["n_unsettled"] = sample.n, sample.n_failed, sample.n_unsettled
     table["estimate"] = count / n_valid if n_valid else np.nan
-    table["bound_lower"] = count / sample.n if sample.n else 0.0
-    table["bound_upper"] = (count + sample.n_unresolved) / sample.n if sample.n else 1.0
+    table["bound_lower"] = least / sample.n if sample.n else 0.0
+    table["bound_upper"] = (most + sample.n_unresolved) / sample.n if sample.n else 1.0
     for name in ("lower", "upper", "outer_lower", "outer_upper"):
         table[name] = np.nan
     if iid:
         table["lower"], table["upper"] = clopper_pearson(count, n_valid, confidence)
-        table["outer_lower"] = clopper_pearson(count, sample.n, confidence)[0]
-        table["outer_upper"] = clopper_pearson(count + sample.n_unresolved, sample.n, confidence)[1]
+        table["outer_lower"] = clopper_pearson(least, sample.n, confidence)[0]
+        table["outer_upper"] = clopper_pearson(most + sample.n_unresolved, sample.n, confidence)[1]
     return table
+
+
+def _count_above(ends: ArrayLike, values: ArrayLike, status: ArrayLike, levels: FloatArray) -> NDArray[np.intp]:
+    """Valid joints one end of whose load is above each level."""
+    own = np.where(np.isfinite(ends), ends, values)
+    valid = sort_out(np.where(np.isfinite(values), own, np.nan), status).valid
+    return valid.size - np.searchsorted(valid, levels, side="right")

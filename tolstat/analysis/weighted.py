@@ -18,7 +18,7 @@ from scipy.special import betaincinv
 from tolstat.analysis.exceedance import CURVE, Exceedance, FloatArray, Table, clopper_pearson
 from tolstat.analysis.quantile import Quantile
 from tolstat.analysis.reweight import smooth
-from tolstat.tables import UNSETTLED, Status
+from tolstat.tables import UNSETTLED, VALID, Status
 
 LEAST_EFFECTIVE = 20.0
 """Effective number of joints above a level below which its share is to be taken with care."""
@@ -105,12 +105,13 @@ def curve(
     weights: ArrayLike,
     levels: ArrayLike | None = None,
     confidence: float = 0.95,
+    ends: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> Table:
     """Share of the joints above each of many levels, see `exceedance.curve`.
 
     Parameters
     ----------
-    values, status, levels, confidence
+    values, status, levels, confidence, ends
         As there.
     weights : array_like, shape (n,)
         Weight of each joint; independent draws, mean 1.
@@ -134,7 +135,14 @@ def curve(
     table = np.zeros(x.shape, CURVE)
     table["level"], table["count"] = x, w.size - first
     table["n"], table["n_failed"], table["n_unsettled"] = w.size + lost.size, sample.failed.size, sample.unsettled.size
-    valid, least, most = (_Sums.at(first, w, *rest) for rest in ((none, none), (lost, none), (none, lost)))
+    valid, least, most = (
+        _Sums.at(*above, *rest)
+        for above, rest in (
+            ((first, w), (none, none)),
+            (_above(ends[0] if ends else values, values, status, weights, x), (lost, none)),
+            (_above(ends[1] if ends else values, values, status, weights, x), (none, lost)),
+        )
+    )
     table["estimate"], (table["lower"], table["upper"]) = valid.share, valid.interval(confidence)
     table["bound_lower"], (table["outer_lower"], _) = least.share, least.interval(confidence)
     table["bound_upper"], (_, table["outer_upper"]) = most.share, most.interval(confidence)
@@ -216,6 +224,15 @@ def quantile(
     return Quantile(*numbers, estimate, *ends, *bounds)
 
 
+def _above(
+    ends: ArrayLike, values: ArrayLike, status: ArrayLike, weights: ArrayLike, levels: FloatArray
+) -> tuple[NDArray[np.intp], FloatArray]:
+    """Where the valid joints begin one end of whose load is above each level, and the weights of all in that order."""
+    own = np.where(np.isfinite(values), np.where(np.isfinite(ends), ends, values), np.nan)
+    sample = _sort_out(own, status, weights)
+    return np.searchsorted(sample.loads, levels, side="right"), sample.weights
+
+
 def _sort_out(values: ArrayLike, status: ArrayLike, weights: ArrayLike) -> _Sample:
     load, state, w = np.asarray(values, dtype=float), np.asarray(status), np.asarray(weights, dtype=float)
     if load.ndim != 1 or not load.shape == state.shape == w.shape:
@@ -223,7 +240,7 @@ def _sort_out(values: ArrayLike, status: ArrayLike, weights: ArrayLike) -> _Samp
     if not (np.isfinite(w) & (w >= 0)).all():
         raise ValueError("a weight is negative or no number")
     unsettled = np.isin(state, UNSETTLED)
-    valid = (state == Status.OK) & np.isfinite(load)
+    valid = np.isin(state, VALID) & np.isfinite(load)
     failed = ~valid & ~unsettled & (state != Status.PENDING)
     order = np.argsort(load[valid], kind="stable")
     return _Sample(load[valid][order], w[valid][order], w[failed], w[unsettled])

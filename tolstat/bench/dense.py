@@ -66,7 +66,7 @@ def systems(snaps: Sequence[Snapshot], options: Options) -> Iterator[tuple[NDArr
     """Tangent and right-hand side of each state, dense."""
     from tolstat.kernel.simulate import assemble, residual
 
-    work, state, _ = simulation.scratch(options)
+    work, state, *_ = simulation.scratch(options)
     for snap in snaps:
         par = snap.params.view(np.recarray)[0]
         state.q[:], state.v[:], state.a[:] = snap.q, snap.v, snap.a

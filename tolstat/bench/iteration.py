@@ -66,10 +66,11 @@ def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
     from tolstat.kernel.simulate import simulate_joint
 
     params, options = these
-    work, state, ring = simulation.scratch(options)
+    scratch = simulation.scratch(options)
+    state = scratch.state
     out = np.zeros(1, RESULT).view(np.recarray)
     for i in range(min(n, len(params))):
-        simulate_joint(params.view(np.recarray)[i], options, work, state, ring, out[0])
+        simulate_joint(params.view(np.recarray)[i], options, scratch, out[0])
         h = 2 * np.pi / (abs(float(params["omega"][i])) * options.steps_per_rev)
         cv = 1.5 / h
         t = float(out["revolutions"][0]) * options.steps_per_rev * h
@@ -103,9 +104,9 @@ def _tally(these: Sample) -> NDArray[np.int64]:
     batch.par.n_stations = params["n_stations"][0]
     words = params.view(np.float64).reshape(len(params), -1)
     out = np.zeros(len(params), RESULT).view(np.recarray)
-    samples = make_samples(0, options.steps_per_rev)
+    samples, blocks = make_samples(0, options.steps_per_rev), np.zeros((0, 0), RESULT).view(np.recarray)
     rows = params.view(np.recarray)
-    lockstep(rows, words, options, PATIENCE, simulation.scratch(options), batch, samples, out, tally)
+    lockstep(rows, words, options, PATIENCE, simulation.scratch(options), batch, samples, blocks, out, tally)
     return tally
 
 
@@ -177,7 +178,7 @@ def _tasks(these: Sample, snaps: list[Snapshot]) -> dict[str, Callable[[], objec
 
     params, options = these
     scratch = simulation.scratch(options)
-    work, state, _ = scratch
+    work, state, *_ = scratch
     batch = into_lanes(snaps, options)
     rows = [snap.params.view(np.recarray)[0] for snap in snaps]
     tangents = list(systems(snaps, options))

@@ -98,9 +98,9 @@ def alone(params: Table, options: Options) -> NDArray[np.void]:
 
     results = np.zeros(len(params), RESULT).view(np.recarray)
     rows = params.view(np.recarray)
-    work, state, ring = simulation.scratch(options)
+    scratch = simulation.scratch(options)
     for i in range(len(params)):
-        simulate_joint(rows[i], options, work, state, ring, results[i])
+        simulate_joint(rows[i], options, scratch, results[i])
     return results
 
 

@@ -27,11 +27,14 @@ MOTION = np.dtype(
 
 HOLD, RELAX, CHECK, STEP, LOOK, ANGLE, PART = range(7)
 """What a lane is at: equilibrium by Newton's iteration; in pseudo-time; whether it is there; a step; a step of the
-recorded revolution once more, in parts (`closeup`); the next angle; a part of a step that follows the error (`mesh`)."""
+recorded revolution once more, in parts (`closeup`); the next angle; a part of a cell of the `mesh`."""
 
 CONTROL = np.dtype(
     [(name, "f8") for name in ("t", "h", "cv", "ca", "before", "iteration", "factorised", "at_roundoff")]
-    + [(name, "f8") for name in ("phase", "live", "fresh", "passed", "origin", "grid", "pseudo", "stage", "error", "worst")]
+    + [
+        (name, "f8")
+        for name in ("phase", "live", "fresh", "passed", "origin", "grid", "pseudo", "stage", "error", "worst")
+    ]
     + [(name, "f8") for name in ("steps", "iterations", "halvings", "factorisations")]
     + [(name, "i8", WIDTH) for name in ("joint", "k", "level", "done", "tries", "left", "part", "looked", "began")]
 )
@@ -39,10 +42,10 @@ CONTROL = np.dtype(
 
 Time and step, Newton's iteration; what it is at; whether it has a joint (1 or 0), is to begin a step or angle, and has
 its trial point accepted then; time at which the step of the output grid began, its length, and the step of pseudo-time,
-s; stage of a part (0 or 1), its error, and that of the worst part of the step; counters as of State. Row of the joint; grid point or angle that it is on the way to, and there the level of its
-sub-step (of an angle or an equilibrium: ways that have failed) and what is done: parts of a step, revolutions of
-angles; steps in pseudo-time. Of a closer look: steps left to take, the part of the step it is at, and parts recorded. Of a step that follows the
-error: the level that it began with.
+s; stage of a part of a cell (0 or 1), its error, and that of the cell's worst part; counters as of State. Row of the
+joint; grid point, cell or angle that it is on the way to, and there the level of its sub-step (of an angle or an
+equilibrium: ways that have failed) and what is done: parts of a step, revolutions of angles; steps in pseudo-time. Of a
+closer look: steps left to take, the part of the step it is at, and parts recorded. Level that a cell began with.
 """
 
 

@@ -20,6 +20,8 @@ from tolstat.kernel.topology import N_DOF, PSI
 from tolstat.kernel.trbdf2 import GAMMA
 from tolstat.tables import MAX_ITERATIONS
 
+GIVEN_UP = -1
+"""Beside the states of a joint: it has made all its revolutions and has not settled."""
 FROM_GUESS, FROM_ZERO, AT_ANGLE = range(3)
 """From where a lane goes in pseudo-time; at an angle, the third way to hold it: from the angle before, relaxed."""
 
@@ -125,8 +127,10 @@ def step(lane, lanes, options, control, motion, samples, notes, out):
     record(k, lane, k > options.steps_per_rev, lanes[0], lanes[1], lanes[2].v, samples)
     motion.memory[AHEAD, lane] = foresee(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
     status = judge(k, int(control.iterations[lane]), options, samples, notes, out)
-    if status != NOT_SETTLED or k == options.max_revs * options.steps_per_rev:
-        return OK if status == OK else NEWTON_FAILED
+    if status != NOT_SETTLED:
+        return status
+    if k == options.max_revs * options.steps_per_rev:
+        return GIVEN_UP
     control.k[lane], control.origin[lane] = k + 1, k * control.grid[lane]
     aim(lane, options, control, motion)
     return NOT_SETTLED
@@ -235,7 +239,9 @@ def leave_for(lane, c, options, control, motion, past):
         past.begun[0, i], past.begun[1, i] = motion.q0[i, lane], motion.v0[i, lane]
         past.begun[2, i] = motion.a0[i, lane]
     control.k[lane], control.origin[lane] = c, (c - 1) * control.grid[lane]
-    control.level[lane] = next_level(past.turns.revolution - past.turns.since, own, before) if past.turns.beside == 0 else int(own.level)
+    turns = past.turns
+    again = next_level(turns.revolution - turns.since, own, before)
+    control.level[lane] = again if turns.beside == 0 else int(own.level)
     control.began[lane] = control.level[lane]
     divide(lane, options, control, past)
 
@@ -301,7 +307,7 @@ def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
 
 @njit
 def arrive(lane, par, lanes, options, control, motion, samples, past, out):
-    """Send a lane on that has reached the end of a cell, and record a grid point that is there; returns as `part` does."""
+    """Send a lane on that has reached the end of a cell; a grid point there is recorded. Returns as `part` does."""
     c, turns, status, goes_on = control.k[lane], past.turns, NOT_SETTLED, True
     for i in range(N_DOF):
         motion.q0[i, lane], motion.v0[i, lane] = motion.q[i, lane], motion.v[i, lane]

@@ -3,17 +3,29 @@
 A round evaluates the residual of every lane once, at whatever trial point the lane has arrived at; then each lane is
 corrected, gets a new tangent, or goes on: from the search for an equilibrium to its first step, from sub-step to
 sub-step, from grid point to grid point, or from angle to angle. Lanes never wait for each other's convergence, and a
-lane whose joint is finished takes the next one from the queue. A joint that has not settled, or whose step or angle has
-failed for good, is begun anew alone, as `simulate` does it. What a lane does depends on its own joint only; so does
-every bit of the result.
+lane whose joint is finished takes the next one from the queue. A joint whose step or angle has failed for good is begun
+anew alone, as `simulate` does it, unless its steps follow the error. What a lane does depends on its own joint only;
+so does every bit of the result.
 """
 
 from tolstat.kernel._jit import njit
-from tolstat.kernel.batch import ANGLE, HOLD, LOOK, PART, STEP, empty, get_counters, put_joint, put_points, put_start, rest
+from tolstat.kernel.batch import (
+    ANGLE,
+    HOLD,
+    LOOK,
+    PART,
+    STEP,
+    empty,
+    get_counters,
+    put_joint,
+    put_points,
+    put_start,
+    rest,
+)
 from tolstat.kernel.borrow import borrowed
 from tolstat.kernel.closeup import STEPS as STEPS_AGAIN
 from tolstat.kernel.closeup import on_a_peak, roughen, switches
-from tolstat.kernel.course import advance, aim, depart, find, glance, part, refuse, retry, set_out, step, turn
+from tolstat.kernel.course import GIVEN_UP, advance, aim, depart, find, glance, part, refuse, retry, set_out, step, turn
 from tolstat.kernel.equilibrium import HELD
 from tolstat.kernel.lane import WIDTH, any_of, bits_of, count_of, where
 from tolstat.kernel.lane_memory import as_lanes
@@ -55,33 +67,36 @@ def samples_of(lane, batch, samples):
 
 
 @njit
-def leave(lane, good, rows, options, alone, batch, samples, results):
+def leave(lane, status, rows, options, alone, batch, samples, results):
     """Go on with a lane whose joint has settled, or has taken a step once more: to its next closer look, or out.
 
-    Where that has not been `good`: a joint that has not settled is begun anew, alone; a closer look is ended.
+    A joint that has not settled goes as it is. Where a step has failed, the joint is begun anew, alone; a closer look
+    is ended.
     """
-    work, state, ring, _ = alone
+    _, state, ring, _ = alone
     control, joint, own = batch.control, batch.control.joint[lane], samples_of(lane, batch, samples)
     par, out, k = rows[joint], results[joint], 0
+    good = status in (OK, GIVEN_UP)
     if control.phase[lane] == LOOK:
         control.left[lane] = control.left[lane] if good else 0
-        good, k = True, control.k[lane] + 1
+        good, status, k = True, OK, control.k[lane] + 1
     elif good:
         if options.fidelity == QUASISTATIC:
             speed_ratios(par, own)
         summarise(own, out)
         good = is_finite(out)
         if good:
-            conclude(OK, options, batch.notes[lane], out)
+            status = OK if status == OK else NOT_SETTLED
+            conclude(status, options, batch.notes[lane], out)
         control.left[lane] = control.looked[lane] = 0
     if good:
-        closer = options.fidelity == DYNAMIC and options.peak_substeps > 1
+        closer = status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1
         if closer and look(lane, k, par, options, alone, batch, own, out):
             return
         if control.looked[lane] > 0:
             roughen(own, out)
         get_counters(lane, batch, state.counters)
-        describe(OK, options, state.counters, batch.pasts.mesh[lane], out)
+        describe(status, options, state.counters, batch.pasts.mesh[lane], out)
     else:
         simulate_joint(par, options, alone, out)
         for s in range(own.size):
@@ -135,7 +150,7 @@ def enter(lane, joint, rows, words, options, alone, batch, samples, results):
     control.joint[lane], control.phase[lane] = joint, HOLD
     put_joint(lane, words[joint], batch)
     if not inside_model(par):
-        leave(lane, False, rows, options, alone, batch, samples, results)
+        leave(lane, NEWTON_FAILED, rows, options, alone, batch, samples, results)
         return
     clear(par, state, samples_of(lane, batch, samples), batch.notes[lane])
     control.origin[lane], control.grid[lane] = 0.0, grid_step(par, options)
@@ -253,7 +268,7 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
             if not goes_on:
                 end(lane, status, options, alone, batch, blocks, results)
             elif status != NOT_SETTLED:
-                leave(lane, status == OK, rows, options, alone, batch, samples, results)
+                leave(lane, status, rows, options, alone, batch, samples, results)
             else:
                 continue
             queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)

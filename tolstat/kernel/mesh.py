@@ -32,7 +32,7 @@ goes with the third power of its length, or less where contacts switch."""
 FIRST_LEVEL = 2
 """Of the first cell of the first revolution."""
 SHAPING = 3
-"""Revolutions with one tolerance after which cells get finer only: changes of the mesh disturb a motion that settles."""
+"""Revolutions with one tolerance after which cells get finer only: a mesh that changes disturbs a settling motion."""
 UNKNOWN = 255
 """Level of a cell that has not been taken yet."""
 NEWTON_SHARE, SETTLE_SHARE = 0.01, 0.3
@@ -72,7 +72,7 @@ def cells_of(steps_per_rev):
 
 @njit
 def next_level(revolutions, own, before):
-    """Level to begin a cell with after so many whole revolutions with this tolerance; `before` is the cell before it."""
+    """Level to begin a cell with, after so many `revolutions` with this tolerance; `before` is the cell before it."""
     one = before if own.level == UNKNOWN else own
     if one.level == UNKNOWN:
         return FIRST_LEVEL
@@ -116,7 +116,7 @@ def parts_of(mesh):
 
 @njit
 def set_scale(largest_force, largest_torque, closure, options, par, memory, weight):
-    """Let errors be relative to these loads (N, N m), and residuals only as small as it takes to see a `closure` error."""
+    """Let errors be relative to these loads (N, N m), and residuals as small as it takes to see a `closure` error."""
     memory[FORCE], memory[TORQUE] = largest_force, largest_torque
     share = min(NEWTON_SHARE * memory[TOLERANCE], SETTLE_SHARE * closure)
     small = max(options.newton_tol * typical_force(par), share * largest_force)

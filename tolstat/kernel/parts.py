@@ -47,7 +47,7 @@ def repeat_in_lanes(part, times, options, batch):
 @njit
 def start(rows, options, alone):
     """Bring every joint of `rows` to its start."""
-    work, state, ring = alone
+    work, state, ring, _ = alone
     for i in range(len(rows)):
         clear(rows[i], state, ring.samples, ring.trail.notes)
         begin(rows[i], options, work, state)
@@ -56,7 +56,7 @@ def start(rows, options, alone):
 @njit
 def guess(rows, alone):
     """Do what of the start of every joint of `rows` is not done in lanes."""
-    work, state, ring = alone
+    work, state, ring, _ = alone
     for i in range(len(rows)):
         clear(rows[i], state, ring.samples, ring.trail.notes)
         rigid_guess(0.0, rows[i], work, state)

@@ -84,8 +84,10 @@ class Past(NamedTuple):
 
 
 class Pasts(NamedTuple):
-    """The same of several joints, each array with a leading axis of joints; kernels return no records, so that each
-    takes one joint's out by itself."""
+    """The same of several joints, each array with a leading axis of joints.
+
+    Kernels return no records: who needs one joint's makes a `Past` of it.
+    """
 
     modulus: np.ndarray
     revolution: np.recarray
@@ -99,7 +101,7 @@ class Pasts(NamedTuple):
 def make_pasts(joints: int, options: Options) -> Pasts:
     """Allocate."""
     trails = make_trails(joints, options.steps_per_rev, revolutions_kept(options))
-    turns, extremes = (np.zeros(shape, dtype).view(np.recarray) for shape, dtype in ((joints, TURNS), ((joints, 2), RESULT)))
+    turns, extremes = np.zeros(joints, TURNS).view(np.recarray), np.zeros((joints, 2), RESULT).view(np.recarray)
     cells = options.steps_per_rev * cells_of(options.steps_per_rev)
     mesh = np.zeros((joints, cells), CELL).view(np.recarray)
     return Pasts(*trails, turns, extremes, np.zeros((joints, 3, N_DOF)), mesh)

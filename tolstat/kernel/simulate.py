@@ -12,8 +12,8 @@ from tolstat.kernel.closeup import build_closeup
 from tolstat.kernel.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium, near
 from tolstat.kernel.guess import rigid_guess
 from tolstat.kernel.ideal_loads import ideal_loads
-from tolstat.kernel.quasistatic import angle_time, build_quasistatic, end_closure, speed_ratios
 from tolstat.kernel.mesh import parts_of
+from tolstat.kernel.quasistatic import angle_time, build_quasistatic, end_closure, speed_ratios
 from tolstat.kernel.resolve import Past, follows_error, make_past
 from tolstat.kernel.scale import set_weight, typical_force
 from tolstat.kernel.settle import Ring, closure_error, foresee, grid_step, make_ring, record, summarise

@@ -7,6 +7,9 @@ import numpy as np
 STEPS, ITERATIONS, HALVINGS, FACTORISATIONS, ATTEMPTS_LEFT = 0, 1, 2, 3, 4
 H_OLD, CV_FACTORISED, AHEAD, STAGED, CLOSE, TOLERANCE, FORCE, TORQUE = range(8)
 MEMORY = 8
+"""Places in ``State.memory``: last accepted step; cv of the tangent in use (0: none); whether to use `ahead` (1);
+length of that step if its first stage is kept (else 0); residual that one more iteration is sure to make small enough;
+of steps that follow the error: tolerance, and the force (N) and the torque (N m) that errors are relative to."""
 
 
 class State(NamedTuple):
@@ -25,9 +28,7 @@ class State(NamedTuple):
     residual: np.ndarray
     weight: np.ndarray  # 1 / the size of each residual that counts as 1
     ahead: np.ndarray  # change of q to expect of the next step, where something better than a Taylor series is known
-    memory: np.ndarray  # (8,) last accepted step; cv of the tangent in use (0: none); whether to use `ahead` (1); length
-    # of that step if its first stage is kept (else 0); residual that one more iteration is sure to make small enough;
-    # of a joint whose steps follow the error: its tolerance, and the force (N) and torque (N m) that it is relative to
+    memory: np.ndarray  # (8,) see `H_OLD` and so on
     counters: np.ndarray  # (5,) steps, Newton iterations, halvings, factorisations, attempts at a step still allowed
 
 

@@ -42,8 +42,8 @@ def formula(h, staged):
 def first(of, last, staged):
     """Trial values (q, v, a) of an unknown in the first stage that obey its formula.
 
-    `of`: what `formula` has returned; `last`: values at the start; `staged`: acceleration at the first stage of the last
-    step.
+    `of`: what `formula` has returned; `last`: values at the start; `staged`: acceleration at the first stage of the
+    last step.
     """
     cv, (ahead, cubic, since), _ = of
     q = last[0] + ahead * (last[1] + (0.5 * ahead * last[2] + cubic * (since * (last[2] - staged))))

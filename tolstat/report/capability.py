@@ -10,7 +10,7 @@ import pandas as pd
 
 from tolstat.analysis import capability, extreme
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.report.source import Campaign, load
+from tolstat.report.source import Campaign, ends, load
 from tolstat.report.text import align
 
 TOGETHER = "all limits"
@@ -35,19 +35,22 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
         quantiles) and ``cpk_normal`` with their ends, ``normal_p``, ``needed``. The last row, `TOGETHER`, is for the
         largest of the loads over their limits.
     """
-    status = campaign.results["status"]
+    status, table = campaign.results["status"], campaign.results
     columns = {name: load(campaign.results, name) for name in campaign.limits}
-    asked = [(name, unit, values, campaign.limits[name]) for name, (values, unit) in columns.items()]
-    asked.append((TOGETHER, "1", _utilization([values for values, _ in columns.values()], campaign), 1.0))
+    intervals = {name: ends(table, name) for name in columns}
+    asked = [(name, unit, values, intervals[name], campaign.limits[name]) for name, (values, unit) in columns.items()]
+    utilization = _utilization([values for values, _ in columns.values()], campaign)
+    least, most = (_utilization([both[k] for both in intervals.values()], campaign) for k in (0, 1))
+    asked.append((TOGETHER, "1", utilization, (least, most), 1.0))
     rows = []
-    for name, unit, loads, limit in asked:
-        c = capability.at(loads, status, limit, confidence, campaign.iid)
+    for name, unit, loads, interval, limit in asked:
+        c = capability.at(loads, status, limit, confidence, campaign.iid, interval)
         row = {"load": name, "unit": unit, "limit": limit, "n": c.above.n}
         row |= {key: getattr(c.above, key) for key in ("n_failed", "n_unsettled", "count")}
         for key in ("good", "ppm"):
             row |= dict(zip((key, f"{key}_lower", f"{key}_upper"), getattr(c, key), strict=True))
-        ends = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
-        row |= {key: getattr(c, key) for key in (*ends, "normal_p", "needed")}
+        names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
+        row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
         rows.append(row)
     return pd.DataFrame(rows)
 

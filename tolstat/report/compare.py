@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import difference, exceedance
 from tolstat.report import style
 from tolstat.report.text import UNITS, align, csv
-from tolstat.tables import Status
+from tolstat.tables import VALID
 
 if TYPE_CHECKING:
     from tolstat.compare import Change, Comparison, Sides
@@ -52,7 +52,7 @@ def note(found: Comparison, a: str, b: str) -> str:
         lines.append(f"{len(found.switched)} times a joint has changed the side of a limit")
     else:
         lines.append(f"{len(sides.a.results)} and {len(sides.b.results)} joints with random numbers of their own")
-    lost = int(sum((side.results["status"] != Status.OK).sum() for side in (sides.a, sides.b)))
+    lost = int(sum((~np.isin(side.results["status"], VALID)).sum() for side in (sides.a, sides.b)))
     if lost:
         lines.append(f"{lost} joints without a valid load: left out, and counted both ways in the bounds of the CSV")
     if not sides.iid:

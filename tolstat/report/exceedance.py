@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from tolstat.analysis import exceedance, weighted
 from tolstat.analysis.accuracy import KIND_OF, KINDS, OBSERVABLES, size
 from tolstat.report import accuracy, style
-from tolstat.report.source import Campaign, load
-from tolstat.tables import Status
+from tolstat.report.source import Campaign, ends, load
+from tolstat.tables import VALID, Status
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
 BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
@@ -49,7 +49,7 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
     numerical = accuracy.usual(campaign.verification) if campaign.verification else {}
     for name, level in campaign.limits.items():
         values, unit = load(campaign.results, name)
-        share = campaign.above(values, level, confidence)
+        share = campaign.above(values, level, confidence, ends(campaign.results, name))
         head = {"load": name, "unit": unit, "nominal": nominal(campaign, name)}
         budget = _budget(campaign, name, level, confidence, numerical)
         rows.append({**head, **asdict(share), "confidence": confidence, **budget})
@@ -74,7 +74,8 @@ def _budget(
     shift = error * size(campaign.results, name)
     if np.isnan(error):
         return {"numerical_error": error} | dict.fromkeys(BUDGET, np.nan)
-    low, high = (campaign.above(values + s, level, confidence) for s in (-shift, shift))
+    least, most = ends(campaign.results, name)
+    low, high = (campaign.above(values + s, level, confidence, (least + s, most + s)) for s in (-shift, shift))
     bounds = (low.estimate, high.estimate, low.outer_lower, high.outer_upper)
     return {"numerical_error": error, **dict(zip(BUDGET, bounds, strict=True))}
 
@@ -128,7 +129,7 @@ def note(campaign: Campaign) -> str:
         text = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
     else:
         text = "no intervals: Clopper–Pearson holds for independent samples only"
-    if campaign.count(Status.OK) + campaign.count(Status.PENDING) < len(campaign.results):
+    if campaign.count(*VALID) + campaign.count(Status.PENDING) < len(campaign.results):
         text += "; light bands: with the others counted below and above every x"
     return text
 
@@ -183,7 +184,7 @@ def curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple[
         even = np.linspace(0, levels.size - 1, most // 2).round().astype(int)
         levels = levels[np.union1d(top, even)]
     below = np.nextafter(levels[:1], -np.inf)  # where every valid joint is above
-    return campaign.curve(values, np.concatenate([below, levels]), confidence), unit
+    return campaign.curve(values, np.concatenate([below, levels]), confidence, ends(campaign.results, name)), unit
 
 
 def panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: float = 0.95) -> None:

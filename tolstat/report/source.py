@@ -22,7 +22,7 @@ from tolstat.store import Counts, verification
 from tolstat.store.reader import BLOCK
 from tolstat.store.verification import Verification
 from tolstat.study.selection import LIMIT_UNITS
-from tolstat.tables import BUSHINGS, ERROR_FIELDS, PINS, Status
+from tolstat.tables import BUSHINGS, ERROR_FIELDS, PINS, VALID, Status
 
 if TYPE_CHECKING:
     from tolstat.store import ResultStore
@@ -68,6 +68,10 @@ class Axis(NamedTuple):
     values: FloatArray
 
 
+Ends = tuple[FloatArray, FloatArray]
+"""Lower and upper end of the largest load of each joint."""
+
+
 @dataclass(frozen=True)
 class Campaign:
     """A campaign as reports see it; row i of both tables is one joint.
@@ -105,16 +109,18 @@ class Campaign:
     columns: tuple[Column, ...] = RESULT_COLUMNS
     weights: FloatArray | None = None
 
-    def curve(self, values: FloatArray, levels: ArrayLike | None, confidence: float) -> NDArray[np.void]:
+    def curve(
+        self, values: FloatArray, levels: ArrayLike | None, confidence: float, ends: Ends | None = None
+    ) -> NDArray[np.void]:
         """Share of the joints above each level, see `exceedance.curve`, each joint counted by its weight."""
         status = self.results["status"]
         if self.weights is None:
-            return exceedance.curve(values, status, levels, confidence, self.iid)
-        return weighted.curve(values, status, self.weights, levels, confidence)
+            return exceedance.curve(values, status, levels, confidence, self.iid, ends)
+        return weighted.curve(values, status, self.weights, levels, confidence, ends)
 
-    def above(self, values: FloatArray, level: float, confidence: float) -> Exceedance:
+    def above(self, values: FloatArray, level: float, confidence: float, ends: Ends | None = None) -> Exceedance:
         """Share of the joints above one level; see `curve`."""
-        return Exceedance(*self.curve(values, [level], confidence)[0].tolist())
+        return Exceedance(*self.curve(values, [level], confidence, ends)[0].tolist())
 
     def quantile(self, values: FloatArray, share: float, confidence: float) -> Quantile:
         """Load that a share of the joints stays at or below, see `quantile.at`, each joint counted by its weight."""
@@ -198,7 +204,7 @@ def read(
     errors, results = store.errors(fields=errors_of), store.results(fields=fields)
     nominal, weights = results[:0], store.origin()["weight"] if store.sampling["method"] == "importance" else None
     if store.sampling["nominal_first"] and store.rows.start == 0:
-        nominal = results[:1][results["status"][:1] == Status.OK]
+        nominal = results[:1][np.isin(results["status"][:1], VALID)]
         errors, results = errors[1:], results[1:]
         weights = None if weights is None else weights[1:]
     method = str(store.sampling["method"])
@@ -284,6 +290,24 @@ def load(results: NDArray[np.void], name: str) -> tuple[FloatArray, str]:
     if name == "psi":
         return results["psi_max"], "1"
     raise InputError([Fault(f"limits.{name}", "is not a load", "name cross1.F .. fork4.T, pin1.contact or psi")])
+
+
+def ends(results: NDArray[np.void], name: str) -> Ends:
+    """Interval of the largest load of each joint, by its name as in `load`: a doubt that stationary joints have.
+
+    Returns
+    -------
+    lower, upper : ndarray, shape (n,)
+        SI; NaN for joints without.
+    """
+    part, _, letter = name.partition(".")
+    if part in BUSHINGS:
+        lower, upper = (results[f"{letter}_{end}"][:, BUSHINGS.index(part)] for end in ("lower", "upper"))
+    elif part in PINS:
+        lower, upper = (results[f"contact_{end}"][:, PINS.index(part)].max(axis=1) for end in ("lower", "upper"))
+    else:
+        lower, upper = results["psi_lower"], results["psi_upper"]
+    return lower, upper
 
 
 def swept_axes(campaign: Campaign) -> list[Axis]:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 FILETYPE = "tolstat campaign"
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 LONGEST_FIXED = 32_000
 """Bytes of the longest text that is an attribute of fixed length: HDF5 allows some 64 kB."""
 OVERHEAD = 800

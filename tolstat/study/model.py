@@ -38,7 +38,10 @@ class Solver(Strict):
     peak_substeps : int
         Parts of a step where a contact switches on a load's peak, see `kernel.closeup`; 1 looks no closer.
     max_refinements : int
-        Times that the steps of a joint may be divided by four, see `refinement`; 0 leaves them as they are.
+        Times that the tolerance of a joint whose steps follow the error may be tightened, see `refinement`; 0 leaves
+        all joints at `steps_per_rev`.
+    duration : int
+        Revolutions over which the largest loads of a joint that never repeats are told, see `stationary`.
     """
 
     fidelity: Literal["dynamic", "quasistatic", "ideal", "auto"] = "dynamic"
@@ -54,6 +57,7 @@ class Solver(Strict):
     rho_inf: Annotated[Number, Field(ge=0, le=1)] = _DEFAULTS.rho_inf
     peak_substeps: Annotated[int, Field(strict=True, ge=1, le=64)] = _DEFAULTS.peak_substeps
     max_refinements: Annotated[int, Field(strict=True, ge=0, le=4)] = _DEFAULTS.max_refinements
+    duration: Annotated[int, Field(strict=True, ge=1, le=1_000_000_000)] = _DEFAULTS.duration
 
     @model_validator(mode="after")
     def _auto(self) -> Self:
@@ -78,6 +82,7 @@ class Solver(Strict):
             rho_inf=self.rho_inf,
             peak_substeps=self.peak_substeps,
             max_refinements=self.max_refinements,
+            duration=self.duration,
             fidelity=int(Fidelity.DYNAMIC if self.fidelity == "auto" else Fidelity[self.fidelity.upper()]),
         )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tolstat.report.page import basis, causes, joints, loads, verdict
 from tolstat.report.page.blocks import Page, Section
 from tolstat.report.page.findings import Findings
-from tolstat.tables import FAILED, UNSETTLED, Status
+from tolstat.tables import FAILED, UNSETTLED, VALID
 
 __all__ = ["Findings", "Page", "compose"]
 
@@ -24,7 +24,7 @@ def compose(found: Findings) -> Page:
     """
     campaign = found.campaign
     sections: list[Section] = [verdict.section(found)]
-    valid = campaign.count(Status.OK) > 0
+    valid = campaign.count(*VALID) > 0
     if campaign.method == "sweep":
         sections.append(basis.sweep_section(found))
     elif campaign.listed and valid:

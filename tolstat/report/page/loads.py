@@ -17,6 +17,7 @@ from tolstat.report.page import drawing
 from tolstat.report.page.blocks import Block, Panel, Panels, Reader, Section, Table, Text
 from tolstat.report.page.findings import Findings
 from tolstat.report.source import Campaign, load
+from tolstat.report.source import ends as intervals
 
 STEPS = 240
 """Loads at which the reader has an answer, some more or less: they are round."""
@@ -149,7 +150,7 @@ def readings(campaign: Campaign) -> dict[str, Any]:
         limit = campaign.limits.get(name)
         x = _round_loads(float(valid[0]), float(valid[-1]), limit)
         start = limit if limit is not None else campaign.quantile(values, 0.9, 0.95).estimate
-        table = campaign.curve(values, x, 0.95)
+        table = campaign.curve(values, x, 0.95, intervals(campaign.results, name))
         ends = ("lower", "upper", "outer_lower", "outer_upper") if campaign.iid else ("bound_lower", "bound_upper")
         found[name] = {
             "unit": text.UNITS.get(unit, unit),

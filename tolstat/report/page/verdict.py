@@ -15,7 +15,7 @@ from tolstat.report.page import drawing
 from tolstat.report.page.blocks import Block, Card, Cards, Panel, Panels, Section, Table, Text
 from tolstat.report.page.findings import Findings
 from tolstat.store import Counts
-from tolstat.tables import Status
+from tolstat.tables import VALID
 
 WORDS = {"yes": "kept", "no": "not kept", "open": "open"}
 
@@ -95,7 +95,7 @@ def _basis(found: Findings) -> list[Card]:
     counts = Counts.of(campaign.results["status"])
     pending = counts.total - counts.done
     note = counts.shortfall + (f", {pending} still pending" if pending else "")
-    whole = campaign.count(Status.OK) == counts.total
+    whole = campaign.count(*VALID) == counts.total
     cards = [Card(str(counts.done), "joints simulated", note, "" if whole else "open")]
     if campaign.verification:
         kinds = {name.rpartition(".")[2] for name in found.leading}

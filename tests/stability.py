@@ -109,8 +109,8 @@ def set_apart(state, shadow, R):
     """Choose the first difference of the two states: `APART`, in all unknowns."""
     share = APART / math.sqrt(state.q0.size)
     for i in range(state.q0.size):
-        lever = lever(i, R)
-        shadow.q0[i] = state.q0[i] + (share if i % 2 == 0 else -share) / lever
+        radius = lever(i, R)
+        shadow.q0[i] = state.q0[i] + (share if i % 2 == 0 else -share) / radius
         shadow.v0[i], shadow.a0[i], shadow.weight[i] = state.v0[i], state.a0[i], state.weight[i]
     reset(shadow)
 
@@ -134,9 +134,9 @@ def distance(state, shadow, h, R):
     """Distance of two states, m: positions, and what their speeds add in a step; rotations at the radius R."""
     square = 0.0
     for i in range(state.q0.size):
-        lever = lever(i, R)
+        radius = lever(i, R)
         dq, dv = shadow.q0[i] - state.q0[i], h * (shadow.v0[i] - state.v0[i])
-        square += lever * lever * (dq * dq + dv * dv)
+        square += radius * radius * (dq * dq + dv * dv)
     return math.sqrt(square)
 
 

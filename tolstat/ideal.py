@@ -79,6 +79,30 @@ def pin_force(theta: ArrayLike, alpha: float, torque: float, radius: float) -> A
     return cross_couple(theta, alpha, torque) / (2 * radius)
 
 
+def reversal_torque(params: NDArray[np.void]) -> Array:
+    """Torque below which the inertia of the output shaft turns the load around twice a revolution.
+
+    The shaft and the two arms on it, moment of inertia J, are accelerated by w^2 dr/dtheta, r being the speed ratio
+    (eq. 2). Where J w^2 max|dr/dtheta| exceeds the resisting torque, the joint drives and is driven in turn: its pins
+    cross their clearances and hit.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (n,)
+        Joints.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        N m.
+    """
+    inertia = params["Js"] + 2 * (params["arm_mass"] * params["R"] ** 2 + params["arm_inertia"][:, 2])
+    theta = np.linspace(0, np.pi, 361)
+    sine, cosine = np.sin(params["alpha"])[:, None], np.cos(params["alpha"])[:, None]
+    steepest = np.abs(cosine * sine**2 * np.sin(2 * theta) / (1 - (sine * np.cos(theta)) ** 2) ** 2).max(axis=1)
+    return np.asarray(inertia * params["omega"] ** 2 * steepest)
+
+
 def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
     """Loads of all bushings and contact forces of the ideal joint at its operating point.
 

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat import ideal
 from tolstat.analysis import exceedance, quantile
 from tolstat.campaign import choose_fidelity
 from tolstat.executor import available_workers
@@ -32,6 +33,8 @@ PILOT = 128
 SHARES = (0.5, 0.1, 0.01)
 """Exceedances for which the width of the interval is told."""
 QUANTILES = (0.95, 0.99, 0.999)
+ORDINARY = 600.0
+"""Newton iterations of a joint that does not rattle: of `studies/iso2768_f.toml` with the default settings."""
 CONFIDENCE = 0.95
 
 
@@ -57,6 +60,26 @@ class LimitPlan:
     above: int
     of: int
     width: float
+
+
+@dataclass(frozen=True)
+class Reversals:
+    """Joints of the pilot whose torque reverses, so that they rattle: see `ideal.reversal_torque`.
+
+    Attributes
+    ----------
+    joints : int
+        Such joints.
+    torque : float
+        Largest torque at which one of them would not, N m; NaN without any.
+    cost : float
+        Newton iterations of such a joint in those of one whose torque does not reverse; without any of these, in
+        `ORDINARY`.
+    """
+
+    joints: int
+    torque: float
+    cost: float
 
 
 @dataclass(frozen=True)
@@ -89,6 +112,8 @@ class Plan:
         Exceedance to the width of its interval; empty where samples are not independent.
     limits : list of LimitPlan
         The study's limits; empty likewise.
+    reversals : Reversals
+        Joints that rattle.
     wilks : dict of float to int
         Quantile to the joints that its one-sided bound needs at least.
     """
@@ -107,6 +132,7 @@ class Plan:
     widths: dict[float, float]
     limits: list[LimitPlan]
     wilks: dict[float, int]
+    reversals: Reversals
 
 
 def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
@@ -151,7 +177,18 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, simulation.results[valid]) if iid else [],
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
+        reversals=_reversals(params, simulation.results),
     )
+
+
+def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals:
+    torque = ideal.reversal_torque(params)
+    here = np.abs(params["torque"]) < torque
+    if not here.any():
+        return Reversals(0, np.nan, np.nan)
+    iterations = results["newton_iterations"]
+    others = float(iterations[~here].mean()) if not here.all() else ORDINARY
+    return Reversals(int(here.sum()), float(torque[here].max()), float(iterations[here].mean()) / max(others, 1.0))
 
 
 def _errors(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:

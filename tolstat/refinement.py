@@ -1,7 +1,7 @@
 """Joints that the uniform steps do not resolve, once more with steps that follow the error.
 
-These are joints that have not settled, and those that have whose loads have bends or whose motion is lively. A joint
-whose largest loads still change with the last tolerance is unresolved, and is said to be.
+These are joints that have not settled, and those whose steps err by too much. A joint whose largest loads still change
+with the last tolerance is unresolved, and is said to be.
 """
 
 from __future__ import annotations
@@ -19,12 +19,9 @@ TOLERANCE = 0.04
 tighter one is an eighth (`kernel.resolve.TIGHTER`)."""
 WATCHED = 48
 """Revolutions after which a joint that has not repeated is given up, if `max_revs` is less."""
-ROUGH, AT_STEPS = 0.02, 180
-"""Roughness above which a joint is refined, and the steps a revolution up to which the bends of smooth loads decide it:
-they go with the square of a step."""
-LIVELY, SMOOTH = 1.5e-3, 1e-3
-"""|Psi| and roughness above which deviations from the ideal motion are lively: their ringing can be damped at few steps
-to less than shows as roughness."""
+STEP_ERROR = 0.08
+"""Mean error of the uniform steps above which a joint is refined. Its largest loads err by less, since ringing that the
+steps do not resolve decays: of 2048 joints at 10, 30 and 100 N m all that were more than 1 % off are above it."""
 UNRESOLVED = 0.05
 """Change by the last tolerance that a joint may not exceed. TR-BDF2 leaves a third of it as error, or less."""
 COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")
@@ -48,9 +45,7 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     """
     if options.fidelity != Fidelity.DYNAMIC or not options.max_refinements:
         return
-    coarse = max(1.0, AT_STEPS / options.steps_per_rev) ** 2
-    lively = (results["psi_max"] > LIVELY) & (results["roughness"] > SMOOTH * coarse)
-    unsure = (results["status"] == Status.OK) & (lively | (results["roughness"] > ROUGH * coarse))
+    unsure = (results["status"] == Status.OK) & (results["step_error"] > STEP_ERROR)
     rows = np.flatnonzero(unsure | np.isin(results["status"], UNSETTLED))
     if not rows.size:
         return

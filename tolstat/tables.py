@@ -337,7 +337,9 @@ RESULT_FIELDS = (
     Field("failed_theta", "rad", "input angle at the start of that step, less whole revolutions"),
     Field("revolutions", "1", "revolutions integrated, the recorded one included"),
     Field("steps_per_rev", "1", "steps of the last revolution: others than solver.steps_per_rev if refined", "i4"),
-    Field("roughness", "1", "largest bend of a load between three samples, relative to the largest load of the kind"),
+    Field(
+        "step_error", "1", "mean estimated error of the uniform steps, as a load relative to the largest of its kind"
+    ),
     Field("refinement_change", "1", "largest change of a largest load by the last tolerance, relative to its kind's"),
     Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),
     Field("newton_iterations", "1", "Newton iterations", "i4"),

@@ -45,6 +45,7 @@ def _lines(made: Plan) -> str:
         f"dimensions: {made.dimensions}",
         f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
         *([made.fidelity] if made.fidelity else []),
+        *_rattle(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
         f"time: {_duration(made.seconds)} on {made.workers} cores",
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
@@ -57,6 +58,15 @@ def _lines(made: Plan) -> str:
     ]
     lines += [f"joints for a 95 % bound of the {100 * q:g} % quantile: {n}" for q, n in made.wilks.items()]
     return "\n".join(lines)
+
+
+def _rattle(made: Plan) -> list[str]:
+    """Warning of joints that rattle, if there are any."""
+    found = made.reversals
+    if not found.joints:
+        return []
+    who = f"warning: the torque reverses in {found.joints} of {made.pilot} joints, since inertia needs up to"
+    return [f"{who} {found.torque:.3g} N*m: they rattle, and one costs {found.cost:.2g} times as much as others"]
 
 
 def _duration(seconds: float) -> str:

@@ -10,7 +10,7 @@ import math
 
 from tolstat.kernel._jit import closure, njit
 from tolstat.kernel.integrate import UNLIMITED
-from tolstat.kernel.settle import extremes, peak, record
+from tolstat.kernel.settle import peak, record
 from tolstat.kernel.state import ATTEMPTS_LEFT, H_OLD
 from tolstat.tables import CONTACTS
 
@@ -86,26 +86,6 @@ def count_in(j, fine, out):
     out.psi_max = max(out.psi_max, abs(here.psi))
 
 
-@njit
-def gain(samples, out):
-    """Largest height of a load that the samples have missed, relative to the largest load of the kind."""
-    worst = 0.0
-    for kind in (0, 1):
-        largest = out.F_max if kind == 0 else out.T_max
-        missed = size = 0.0
-        for b in range(8):
-            seen, _ = extremes(samples.modulus[:, b, kind])
-            missed, size = max(missed, largest[b] - seen), max(size, largest[b])
-        worst = max(worst, missed / size if size > 0 else 0.0)
-    return worst
-
-
-@njit
-def roughen(samples, out):
-    """Let what the samples have missed of peaks count as roughness: twice, as it would bend a curve between three."""
-    out.roughness = max(out.roughness, 2 * gain(samples, out))
-
-
 def build_closeup(advance, acceleration):
     """Bind a stepping scheme and the equations of motion.
 
@@ -121,8 +101,7 @@ def build_closeup(advance, acceleration):
         Makes recorded sample `s` the last accepted point, the grid's steps being `h` long.
     look_closer : jitted function (par, options, work, state, samples, fine, out) -> None
         Takes the steps about switches on peaks of the recorded revolution again, each in ``options.peak_substeps``, and
-        extends the extremes in `out`, a row of RESULT. What it takes is counted in ``state.counters``. A peak that the
-        samples have missed counts as roughness: twice its height, as it would bend the curve between three samples.
+        extends the extremes in `out`, a row of RESULT. What it takes is counted in ``state.counters``.
     """
 
     @closure
@@ -159,7 +138,5 @@ def build_closeup(advance, acceleration):
                 record(j, 0, True, par, work, state.v0, fine)
                 count_in(j, fine, out)
                 j += 1
-        if j > 0:
-            roughen(samples, out)
 
     return recall, look_closer

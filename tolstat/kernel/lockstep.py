@@ -24,7 +24,7 @@ from tolstat.kernel.batch import (
 )
 from tolstat.kernel.borrow import borrowed
 from tolstat.kernel.closeup import STEPS as STEPS_AGAIN
-from tolstat.kernel.closeup import on_a_peak, roughen, switches
+from tolstat.kernel.closeup import on_a_peak, switches
 from tolstat.kernel.course import GIVEN_UP, advance, aim, depart, find, glance, part, refuse, retry, set_out, step, turn
 from tolstat.kernel.equilibrium import HELD
 from tolstat.kernel.lane import WIDTH, any_of, bits_of, count_of, where
@@ -87,14 +87,12 @@ def leave(lane, status, rows, options, alone, batch, samples, results):
         good = is_finite(out)
         if good:
             status = OK if status == OK else NOT_SETTLED
-            conclude(status, options, batch.notes[lane], out)
+            conclude(status, par, options, batch.notes[lane], own, out)
         control.left[lane] = control.looked[lane] = 0
     if good:
         closer = status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1
         if closer and look(lane, k, par, options, alone, batch, own, out):
             return
-        if control.looked[lane] > 0:
-            roughen(own, out)
         get_counters(lane, batch, state.counters)
         describe(status, options, state.counters, batch.pasts.mesh[lane], out)
     else:

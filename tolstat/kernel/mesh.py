@@ -17,9 +17,9 @@ import numpy as np
 from tolstat.kernel import trbdf2
 from tolstat.kernel._jit import njit
 from tolstat.kernel.dynamics import mass_of
-from tolstat.kernel.scale import set_weight, typical_force
+from tolstat.kernel.scale import set_weight, stiffness, typical_force
 from tolstat.kernel.state import CLOSE, FORCE, TOLERANCE, TORQUE
-from tolstat.kernel.topology import ARM, N_LUMPS, PSI
+from tolstat.kernel.topology import N_LUMPS, PSI
 
 errors = trbdf2.errors
 CELLS = 720
@@ -50,10 +50,8 @@ def load_error(h, par, state):
     worst = 0.0 * force
     k = 0.0 * force
     for body in range(N_LUMPS):
-        bushing = par.k_cross if body < ARM else par.k_fork
         mass, inertia = mass_of(body, par)
-        k = (bushing[0] + bushing[1] + bushing[2]) / 3
-        k_turn = (bushing[3] + bushing[4] + bushing[5]) / 3
+        k, k_turn = stiffness(body, par)
         mean_inertia = (inertia[0] + inertia[1] + inertia[2]) / 3
         of = (force * k, force * math.sqrt(k * mass), torque * k_turn, torque * math.sqrt(k_turn * mean_inertia))
         for j in range(6):

@@ -1,7 +1,7 @@
 """How large the forces of a joint are before anything of its motion is known, and residuals relative to that."""
 
 from tolstat.kernel._jit import njit
-from tolstat.kernel.topology import N_LUMPS, PSI
+from tolstat.kernel.topology import ARM, N_LUMPS, PSI
 
 SMALLEST_FORCE = 1e-3
 """Scale (N) of the stopping test of a joint that neither turns nor carries."""
@@ -11,6 +11,13 @@ SMALLEST_FORCE = 1e-3
 def typical_force(par):
     """Pins' tangential force T_r/(2R) or a pin's centrifugal force, the larger one, N."""
     return max(abs(par.torque) / (2 * par.R), par.pin_mass * par.omega**2 * par.R, SMALLEST_FORCE)
+
+
+@njit
+def stiffness(body, par):
+    """Mean stiffness (N/m, N m/rad) of the bushing that a lump is held by: that of pins for the hub."""
+    k = par.k_cross if body < ARM else par.k_fork
+    return (k[0] + k[1] + k[2]) / 3, (k[3] + k[4] + k[5]) / 3
 
 
 @njit

@@ -16,7 +16,7 @@ from tolstat.kernel.mesh import parts_of
 from tolstat.kernel.quasistatic import angle_time, build_quasistatic, end_closure, speed_ratios
 from tolstat.kernel.resolve import Past, follows_error, make_past
 from tolstat.kernel.scale import set_weight, typical_force
-from tolstat.kernel.settle import Ring, closure_error, foresee, grid_step, make_ring, record, summarise
+from tolstat.kernel.settle import Ring, closure_error, foresee, grid_step, make_ring, record, step_error, summarise
 from tolstat.kernel.state import AHEAD, FACTORISATIONS, HALVINGS, ITERATIONS, STEPS, make_state_record
 from tolstat.kernel.topology import N_DOF
 from tolstat.kernel.trail import closure_trend, note_closure
@@ -80,7 +80,7 @@ def clear_results(out):
     out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
     out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
     out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = out.psi_max = nan
-    out.roughness = out.refinement_change = nan
+    out.step_error = out.refinement_change = nan
     for b in range(8):
         out.F_max[b] = out.F_mean[b] = out.F_range[b] = nan
         out.T_max[b] = out.T_mean[b] = out.T_range[b] = nan
@@ -230,8 +230,10 @@ def finish(status, failed, options, counters, mesh, out):
 
 
 @njit
-def conclude(status, options, notes, out):
-    """Write how the closure error fell, of a joint that has not settled in the second half of its revolutions."""
+def conclude(status, par, options, notes, samples, out):
+    """Write the error of the steps, and how the closure error fell: in the second half, where it is not small yet."""
+    if options.fidelity == DYNAMIC:
+        out.step_error = step_error(par, samples, out)
     since = 0.0 if status == OK else 0.5 * options.max_revs
     out.closure_trend, _ = closure_trend(since, notes)
     if status == OK:
@@ -264,7 +266,7 @@ def simulate_joint(par, options, alone, out):
         if not is_finite(out):
             status, failed = NOT_FINITE, state.counters[STEPS]
     if status in (OK, NOT_SETTLED) and not controlled:
-        conclude(status, options, ring.notes, out)
+        conclude(status, par, options, ring.notes, ring.samples, out)
         if status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1:
             look_closer(par, options, work, state, ring.samples, ring.fine, out)
     finish(status, failed, options, state.counters, past.mesh, out)

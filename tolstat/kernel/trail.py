@@ -124,13 +124,13 @@ def combine(last, count, trail, out):
                 out.F_max[b], out.F_mean[b], out.F_range[b] = top, total / count, top - low
             else:
                 out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / count, top - low
-    out.psi_max, out.roughness = first.psi_max, first.roughness
+    out.psi_max = first.psi_max
     for pin in range(4):
         copy(first.contact_max[pin], out.contact_max[pin])
     out.mode_share[:] = 0.0
     for r in range(last - count + 1, last + 1):
         one = trail.revolution[r % kept]
-        out.psi_max, out.roughness = max(out.psi_max, one.psi_max), max(out.roughness, one.roughness)
+        out.psi_max = max(out.psi_max, one.psi_max)
         for pin in range(4):
             for i in range(len(CONTACTS)):
                 out.contact_max[pin, i] = max(out.contact_max[pin, i], one.contact_max[pin, i])

@@ -31,6 +31,9 @@ Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 MOST_KEPT = 12_000
 """Samples that are in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
 
+NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
+"""Where no statistics of single revolutions are asked for."""
+
 
 def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
     """Describe the load histories that are kept of each joint.
@@ -161,7 +164,7 @@ def simulate_rows(
         revolutions = settings.max_revs if follows_error(settings) else 0
         blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
         run = _together if in_lanes(settings) else _alone
-        for i, samples in run(params[rows], settings, bool(specs), blocks, found):
+        for i, samples in run(params[rows], settings, bool(specs), found, blocks):
             if found[i].status in SIMULATED:
                 for name, values in _sample(samples, histories, specs).items():
                     kept[name][rows[i]] = values
@@ -174,7 +177,11 @@ def simulate_rows(
 
 
 def _alone(
-    params: NDArray[np.void], options: Options, keep: bool, blocks: NDArray[np.void], results: NDArray[np.void]
+    params: NDArray[np.void],
+    options: Options,
+    keep: bool,
+    results: NDArray[np.void],
+    blocks: NDArray[np.void] = NO_BLOCKS,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints one after the other; gives the samples of each if they are to be kept."""
     from tolstat.kernel.simulate import simulate_joint
@@ -190,7 +197,11 @@ def _alone(
 
 
 def _together(
-    params: NDArray[np.void], options: Options, keep: bool, blocks: NDArray[np.void], results: NDArray[np.void]
+    params: NDArray[np.void],
+    options: Options,
+    keep: bool,
+    results: NDArray[np.void],
+    blocks: NDArray[np.void] = NO_BLOCKS,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints in lock-step, those with as many contact stations together; gives their samples if kept."""
     from tolstat.kernel.lockstep import PATIENCE, lockstep

@@ -49,7 +49,7 @@ def start(rows, options, alone):
     """Bring every joint of `rows` to its start."""
     work, state, ring, _ = alone
     for i in range(len(rows)):
-        clear(rows[i], state, ring.samples, ring.trail.notes)
+        clear(rows[i], state, ring.samples, ring.notes)
         begin(rows[i], options, work, state)
 
 
@@ -58,7 +58,7 @@ def guess(rows, alone):
     """Do what of the start of every joint of `rows` is not done in lanes."""
     work, state, ring, _ = alone
     for i in range(len(rows)):
-        clear(rows[i], state, ring.samples, ring.trail.notes)
+        clear(rows[i], state, ring.samples, ring.notes)
         rigid_guess(0.0, rows[i], work, state)
 
 

@@ -38,7 +38,7 @@ first one anyway: it need not settle with every one."""
 ENOUGH = 0.03
 """Closure error at which a joint has settled in any case, in units of the last change of its largest loads: a tenth of
 their error."""
-RESOLVED = 4e-2
+RESOLVED = 2e-2
 """Change of the largest loads by a tighter tolerance at which it is the last, relative to the largest of their kind. A
 method of order 2 leaves a third of it as error."""
 SETTLING = 16

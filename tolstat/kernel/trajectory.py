@@ -4,6 +4,7 @@ import math
 
 from tolstat.kernel import dynamics, integrate
 from tolstat.kernel._jit import njit
+from tolstat.kernel.scale import set_weight, typical_force
 from tolstat.kernel.simulate import (
     NEWTON_FAILED,
     OK,
@@ -12,7 +13,6 @@ from tolstat.kernel.simulate import (
     advance,
     equilibrium,
     inside_model,
-    set_weight,
 )
 
 residual, acceleration, reset = dynamics.residual, dynamics.acceleration, integrate.reset
@@ -35,7 +35,7 @@ def follow(par, options, work, state, points):
     """
     if not inside_model(par):
         return OUTSIDE_MODEL
-    set_weight(par, state)
+    set_weight(typical_force(par), par, state.weight)
     state.q0[:] = 0.0
     state.v0[:] = 0.0
     state.a0[:] = 0.0

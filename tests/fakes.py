@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from tests.environment import environment as environment
-from tolstat import campaign, kept
+from tolstat import campaign, kept, stationary
 from tolstat.columns import Column
 from tolstat.execution import Stages
 from tolstat.study.model import Sampling
@@ -158,6 +158,7 @@ def simulate(
     for i, name in enumerate(n for n in RESULT.names if RESULT[n].base == np.float64):
         shape = (len(params),) + (1,) * len(RESULT[name].shape)
         results[name] = np.where(x > 3, np.nan, np.sin(x + i)).reshape(shape)
+    stationary.fill_ends(results)
     return Simulation(results, {name: history(spec, x) for name, spec in specs_of(histories).items()})
 
 

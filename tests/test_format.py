@@ -283,14 +283,14 @@ def test_a_released_file_lacks_nothing_that_is_asked_for() -> None:
         assert set(store.to_pandas().columns) >= {c.name for c in ERROR_COLUMNS + RESULT_COLUMNS}
 
 
-@pytest.mark.parametrize(("version", "remedy"), [(2, "run its study again"), (4, "use a newer tolstat")])
+@pytest.mark.parametrize(("version", "remedy"), [(3, "run its study again"), (5, "use a newer tolstat")])
 def test_another_schema_is_refused_in_one_sentence(tmp_path: Path, version: int, remedy: str) -> None:
     path = tmp_path / "other.h5"
     shutil.copy(GOLDEN[-1], path)
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = version
         integrity.seal(file)
-    with pytest.raises(StoreError, match=rf"schema version {version}, this tolstat reads 3\n.*{remedy}"):
+    with pytest.raises(StoreError, match=rf"schema version {version}, this tolstat reads 4\n.*{remedy}"):
         ResultStore.open(path)
 
 

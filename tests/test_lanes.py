@@ -9,7 +9,7 @@ import pytest
 
 from tests.conftest import LAWS
 from tolstat import joint as joints
-from tolstat import simulation
+from tolstat import simulation, stationary
 from tolstat.kernel import lockstep
 from tolstat.kernel._jit import closure
 from tolstat.kernel.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
@@ -120,6 +120,7 @@ def assert_same(a, b):
 def alone(params, options):
     results = np.zeros(len(params), simulation.RESULT).view(np.recarray)
     samples = [own.copy() for _, own in simulation._alone(params, options, True, results)]
+    stationary.fill_ends(results)
     return results, samples
 
 

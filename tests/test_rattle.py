@@ -124,26 +124,26 @@ def test_what_becomes_stationary() -> None:
     result = ended(48, Motion.CHAOTIC)
     stationary.tell(result, watched(steady)[None], 100)
     stationary.fill_ends(result)
-    assert result["F_lower"][0, 0] < result["F_max"][0, 0] < result["F_upper"][0, 0] < 112
+    assert 0.9 < result["F_lower"][0] < 1 < result["F_upper"][0] < 1.05
+    assert 105 < result["F_max"][0, 0] < 111
     rolled = ended(50, Motion.CHAOTIC)  # revolution r lies at r modulo 48
     stationary.tell(rolled, np.roll(watched(steady), 2)[None], 100)
     assert rolled["F_max"].tobytes() == result["F_max"].tobytes()
     twice = ended(48, Motion.SUBHARMONIC)
     stationary.tell(twice, watched(drift)[None], 100)
     stationary.fill_ends(twice)
-    assert (twice["status"][0], twice["F_lower"][0, 0], twice["F_upper"][0, 0]) == (Status.STATIONARY, 5.0, 5.0)
+    assert (twice["status"][0], twice["F_lower"][0], twice["F_upper"][0]) == (Status.STATIONARY, 1.0, 1.0)
 
 
 def test_ends_of_other_joints() -> None:
     results = np.zeros(2, RESULT)
     results["status"], results["F_max"] = (Status.OK, Status.NOT_SETTLED), 7.0
     stationary.fill_ends(results)
-    assert (results["F_lower"][0] == 7.0).all()
-    assert (results["F_upper"][0] == 7.0).all()
-    assert np.isnan(results["F_lower"][1]).all()
+    assert (results["F_lower"][0], results["contact_upper"][0]) == (1.0, 1.0)
+    assert np.isnan(results["F_lower"][1])
 
 
-@pytest.mark.parametrize("power", [2.0, 1.0, 0.5, 0.25])
+@pytest.mark.parametrize("power", [2.0, 1.0, 0.5])
 def test_the_largest_of_many_lies_in_the_interval(power: float) -> None:
     """Bounded loads whose density ends with a peak, a step, or gently at the largest; 95 % asked for."""
     rng = np.random.default_rng(2)

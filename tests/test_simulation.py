@@ -14,7 +14,7 @@ from tolstat import ideal, joint, simulation, study, trace
 from tolstat.kernel import dynamics
 from tolstat.kernel.work import FORCE, make_work
 from tolstat.simulation import restore, simulate_rows
-from tolstat.tables import RESULT, RESULTANT, Method, Mode, Options, Start, Status
+from tolstat.tables import RESULT, RESULTANT, SIMULATED, SIMULATED, Method, Mode, Options, Start, Status
 
 OPTIONS = Options()
 TWIST = {"pin1__tilt_z": 0.005, "pin3__offset_t": 3e-5, "hole2__tilt_t": -0.004, "hole4__offset_e": 4e-5}
@@ -182,7 +182,7 @@ def test_ramp_and_static_start_settle_to_the_same_revolution(params):
 
 
 METHODS = pytest.mark.parametrize("method", list(Method))
-TIGHT = {"settle_tol": 1e-7, "newton_tol": 1e-9, "max_revs": 40}
+TIGHT = {"settle_tol": 1e-7, "newton_tol": 1e-9, "max_revs": 40, "max_refinements": 0}
 
 
 @METHODS
@@ -238,12 +238,12 @@ def test_what_the_model_has_no_meaning_for_is_marked(params, errors):
 
 
 def test_not_settled_is_said_and_results_kept(params):
-    row = simulate_rows(params(alpha=0.2), OPTIONS._replace(max_revs=2, settle_tol=1e-15)).results[0]
+    row = simulate_rows(params(alpha=0.2), OPTIONS._replace(max_revs=2, settle_tol=1e-15, max_refinements=0)).results[0]
     assert row["status"] == Status.NOT_SETTLED
     assert row["settled"] == 0
     assert row["closure"] > 1e-15
     assert np.isfinite(row["F_max"]).all()
-    alone = simulate_rows(params(), OPTIONS._replace(max_revs=1)).results[0]
+    alone = simulate_rows(params(), OPTIONS._replace(max_revs=1, max_refinements=0)).results[0]
     assert alone["status"] == Status.NOT_SETTLED
     assert np.isnan(alone["closure"])
 
@@ -258,7 +258,7 @@ def test_failure_of_newton_is_said_and_nothing_invented(params):
 
 def test_a_joint_without_torque_ends(params):
     row = simulate_rows(params(alpha=0.2, torque=0.0), OPTIONS._replace(max_revs=4)).results[0]
-    assert row["status"] in (Status.OK, Status.NOT_SETTLED)
+    assert row["status"] in SIMULATED
     assert np.isfinite(row["F_max"]).all()
 
 

@@ -44,10 +44,12 @@ def _result_columns() -> tuple[Column, ...]:
     columns = []
     for f in RESULT_FIELDS:
         for index in np.ndindex(*f.shape):
-            if f.name[:2] in ("F_", "T_"):
+            if not f.shape:
+                name = f.name
+            elif f.name[:2] in ("F_", "T_"):
                 name = f"{BUSHINGS[index[0]]}.{f.name}"
-            elif f.name.startswith("contact_"):
-                name = f"{PINS[index[0]]}.contact_{CONTACTS[index[1]]}_{f.name.removeprefix('contact_')}"
+            elif f.name == "contact_max":
+                name = f"{PINS[index[0]]}.contact_{CONTACTS[index[1]]}_max"
             elif f.name == "mode_share":
                 name = f"{PINS[index[0]]}.share_{Mode(index[1]).name.lower()}"
             else:

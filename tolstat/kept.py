@@ -16,24 +16,15 @@ from tolstat.tables import CONTACTS
 
 KEY = "output.results"
 """Key in the identity of a study: names of the columns selected; not there where all are kept."""
-_LARGEST = ("F", "T", "contact", "psi")
-CHOSEN_FROM = (
-    *(f"{load}_{of}" for load in _LARGEST for of in ("max", "lower", "upper")),
-    *("F_mean", "F_range", "T_mean", "T_range", "mode_share"),
-)
+CHOSEN_FROM = ("F_max", "F_mean", "F_range", "T_max", "T_mean", "T_range", "contact_max", "mode_share", "psi_max")
 """Fields of the results that a study can do without."""
 NAMES = tuple(c.name for c in RESULT_COLUMNS)
 
 
 def chosen(names: Iterable[str]) -> list[str] | None:
-    """Those of the columns `names` that are not kept anyway, in the order of the table; None if nothing is left out.
-
-    With a largest load go the ends of its interval.
-    """
+    """Those of the columns `names` that are not kept anyway, in the order of the table; None if nothing is left out."""
     optional = [c.name for c in RESULT_COLUMNS if c.field in CHOSEN_FROM]
-    asked = set(names)
-    asked |= {name.removesuffix("max") + end for name in asked if name.endswith("_max") for end in ("lower", "upper")}
-    found = [name for name in optional if name in asked]
+    found = [name for name in optional if name in set(names)]
     return None if found == optional else found
 
 

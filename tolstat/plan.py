@@ -71,15 +71,15 @@ class Reversals:
     joints : int
         Such joints.
     torque : float
-        Largest torque at which one of them would not, N m; NaN without any.
+        Least torque at which none of them would, N m; None without any.
     cost : float
         Newton iterations of such a joint in those of one whose torque does not reverse; without any of these, in
         `ORDINARY`.
     """
 
     joints: int
-    torque: float
-    cost: float
+    torque: float | None
+    cost: float | None
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals
     torque = ideal.reversal_torque(params)
     here = np.abs(params["torque"]) < torque
     if not here.any():
-        return Reversals(0, np.nan, np.nan)
+        return Reversals(0, None, None)
     iterations = results["newton_iterations"]
     others = float(iterations[~here].mean()) if not here.all() else ORDINARY
     return Reversals(int(here.sum()), float(torque[here].max()), float(iterations[here].mean()) / max(others, 1.0))

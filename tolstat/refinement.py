@@ -19,9 +19,10 @@ TOLERANCE = 0.04
 tighter one is an eighth (`kernel.resolve.TIGHTER`)."""
 WATCHED = 48
 """Revolutions after which a joint that has not repeated is given up, if `max_revs` is less."""
-STEP_ERROR = 0.08
+STEP_ERROR, AT_STEPS = 0.08, 180
 """Mean error of the uniform steps above which a joint is refined. Its largest loads err by less, since ringing that the
-steps do not resolve decays."""
+steps do not resolve decays. With fewer steps a revolution than these it is larger for smooth motion, as it goes with the
+third power of a step."""
 LIVELY, LIVELY_ERROR = 1.5e-3, 1e-3
 """|Psi| above which the output shaft swings about the ideal motion, and the mean error above which such a joint is
 refined: a swing remembers errors for long, and steps of BDF2 damp it. Both were found with 2759 joints that were
@@ -49,7 +50,8 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     """
     if options.fidelity != Fidelity.DYNAMIC or not options.max_refinements:
         return
-    allowed = np.where(results["psi_max"] > LIVELY, LIVELY_ERROR, STEP_ERROR)
+    coarse = max(1.0, AT_STEPS / options.steps_per_rev) ** 3
+    allowed = np.where(results["psi_max"] > LIVELY, LIVELY_ERROR, STEP_ERROR) * coarse
     unsure = (results["status"] == Status.OK) & (results["step_error"] > allowed)
     rows = np.flatnonzero(unsure | np.isin(results["status"], UNSETTLED))
     if not rows.size:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import Motion, Status
+from tolstat.tables import LARGEST, VALID, Motion, Status
 
 SETTLING = 1 / 3
 """Share of the revolutions watched that is left out at their beginning."""
@@ -34,8 +34,6 @@ STEPS = 0.005
 
 FloatArray = NDArray[np.float64]
 Table = NDArray[np.void]
-LARGEST = {"F": "F_max", "T": "T_max", "contact": "contact_max", "psi": "psi_max"}
-"""Field of the largest load by the beginning of the fields of its interval."""
 
 
 class Interval(NamedTuple):
@@ -47,7 +45,7 @@ class Interval(NamedTuple):
 
 
 def tell(results: Table, blocks: Table, duration: int) -> None:
-    """Make joints stationary that are; write the intervals of all largest loads.
+    """Make joints stationary that are; write their largest loads, and for each kind the widest interval of any of them.
 
     Parameters
     ----------
@@ -68,15 +66,16 @@ def tell(results: Table, blocks: Table, duration: int) -> None:
         if len(watched) < FEWEST or not is_stationary(watched):
             continue
         results["status"][i] = Status.STATIONARY
-        for load, field in LARGEST.items():
-            values = watched[field].reshape(len(watched), -1)
-            found = largest(values, duration)
-            for name, numbers in zip((field, f"{load}_lower", f"{load}_upper"), found, strict=True):
-                results[name][i] = numbers.reshape(results[name][i].shape)
+        for load in LARGEST:
+            own = results[f"{load}_max"]
+            median, lower, upper = largest(watched[f"{load}_max"].reshape(len(watched), -1), duration)
+            own[i] = median.reshape(own[i].shape)
+            size = np.where(median > 0, median, 1.0)
+            results[f"{load}_lower"][i], results[f"{load}_upper"][i] = (lower / size).min(), (upper / size).max()
 
 
 def fill_ends(results: Table) -> None:
-    """Write the ends of joints that repeat, where the largest load has no doubt; NaN elsewhere.
+    """Write the ends of joints that repeat: 1, as there is no doubt of them; NaN of joints without a valid load.
 
     Parameters
     ----------
@@ -84,11 +83,10 @@ def fill_ends(results: Table) -> None:
         Joints; ends of stationary ones that never repeat are left as they are.
     """
     never = (results["status"] == Status.STATIONARY) & (results["motion"] != Motion.SUBHARMONIC)
-    sure = np.isin(results["status"], (Status.OK, Status.STATIONARY)) & ~never
-    for load, field in LARGEST.items():
+    for load in LARGEST:
         for end in ("lower", "upper"):
-            results[f"{load}_{end}"][~never] = np.nan
-            results[f"{load}_{end}"][sure] = results[field][sure]
+            own = results[f"{load}_{end}"]
+            own[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
 
 
 def is_stationary(watched: Table) -> bool:

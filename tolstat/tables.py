@@ -309,20 +309,27 @@ PARAM_FIELDS = (
 """What the kernel needs of one joint. Pin fields are indexed by pin, hole fields by arm (hole k: arm k)."""
 
 
+LARGEST = {"F": "bushing force", "T": "bushing torque", "contact": "contact force", "psi": "|Psi|"}
+"""Kinds of largest loads: results hold them as ``F_max`` and so on."""
+
+
 def _load_fields() -> list[Field]:
     fields = []
     for load, unit, noun in (("F", "N", "force"), ("T", "N*m", "torque")):
         for stat, text in (("max", "largest"), ("mean", "mean"), ("range", "largest less smallest")):
             description = f"{text} modulus of the bushing {noun} over the revolutions that count"
             fields.append(Field(f"{load}_{stat}", unit, description, shape=(8,)))
-        fields += _ends(load, unit, f"modulus of the bushing {noun}", (8,))
     return fields
 
 
-def _ends(load: str, unit: str, noun: str, shape: tuple[int, ...]) -> tuple[Field, ...]:
-    """Interval of a largest load."""
-    text = f"end of the 95 % interval of the largest {noun} of a stationary joint; of one that is ok the largest itself"
-    return tuple(Field(f"{load}_{end}", unit, f"{end} {text}", shape=shape) for end in ("lower", "upper"))
+def _ends() -> list[Field]:
+    """Interval of the largest loads of each kind."""
+    fields = []
+    for load, noun in LARGEST.items():
+        for end in ("lower", "upper"):
+            text = f"{end} end of the interval of the largest {noun} of a stationary joint, in units of it; of others 1"
+            fields.append(Field(f"{load}_{end}", "1", text))
+    return fields
 
 
 RESULT_FIELDS = (
@@ -352,10 +359,9 @@ RESULT_FIELDS = (
         "largest contact force of the pin: of its outermost station, of its innermost one, resultant of all stations",
         shape=(4, len(CONTACTS)),
     ),
-    *_ends("contact", "N", "contact force", (4, len(CONTACTS))),
     Field("mode_share", "1", "share of the revolutions that count in each contact mode", shape=(4, 4)),
     Field("psi_max", "1", "largest |Psi|, relative error of the speed ratio, eq. (13)"),
-    *_ends("psi", "1", "|Psi|", ()),
+    *_ends(),
 )
 
 DESIGN_FIELDS = (

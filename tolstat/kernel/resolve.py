@@ -177,9 +177,13 @@ def merge_extremes(one, out):
 
 @njit
 def keep_revolution(samples, extremes, trail, r):
-    """Keep revolution `r` (from 0): its statistics, and moduli to compare later ones with."""
+    """Keep revolution `r` (from 0): its statistics, and moduli to compare later ones with.
+
+    Its largest and smallest loads are those of all parts: parabolas through samples of the grid would overshoot spikes.
+    """
     own = trail.revolution[r % trail.revolution.size]
     summarise(samples, own)
+    clear_extremes(own)
     merge_extremes(extremes, own)
     clear_extremes(extremes)
     stride = -(-samples.size // trail.modulus.shape[1])

@@ -38,7 +38,7 @@ METHODS = {
 }
 LOADS = tuple(f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT")
 """The loads that every report shows, where they are kept: force and torque of each bushing."""
-LOAD_FIELDS = ("status", "F_max", "T_max", "contact_max", "psi_max")
+LOAD_FIELDS = ("status", *(f"{load}_{of}" for load in ("F", "T", "contact", "psi") for of in ("max", "lower", "upper")))
 """Fields of the results that every load with a limit is read from, and the joints' status."""
 _ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 _DISPLAY = {
@@ -300,14 +300,9 @@ def ends(results: NDArray[np.void], name: str) -> Ends:
     lower, upper : ndarray, shape (n,)
         SI; NaN for joints without.
     """
-    part, _, letter = name.partition(".")
-    if part in BUSHINGS:
-        lower, upper = (results[f"{letter}_{end}"][:, BUSHINGS.index(part)] for end in ("lower", "upper"))
-    elif part in PINS:
-        lower, upper = (results[f"contact_{end}"][:, PINS.index(part)].max(axis=1) for end in ("lower", "upper"))
-    else:
-        lower, upper = results["psi_lower"], results["psi_upper"]
-    return lower, upper
+    values, _ = load(results, name)
+    kind = name.rpartition(".")[2]
+    return values * results[f"{kind}_lower"], values * results[f"{kind}_upper"]
 
 
 def swept_axes(campaign: Campaign) -> list[Axis]:

@@ -14,11 +14,12 @@ from tolstat.report import build, cases
 from tolstat.simulation import simulate_rows
 from tolstat.store import ResultStore, verification
 from tolstat.store.verification import Check, Verification
-from tolstat.tables import FAILED, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
+from tolstat.tables import FAILED, LARGEST, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
 
 STUDIES = Path(__file__).parent.parent / "studies"
 FLOATS = [f.name for f in RESULT_FIELDS if f.dtype == "f8"]
-MAY_BE_NAN = {"closure_trend", "lyapunov", "failed_theta", "refinement_change"}
+ENDS = {f"{load}_{end}" for load in LARGEST for end in ("lower", "upper")}
+MAY_BE_NAN = {"closure_trend", "lyapunov", "failed_theta", "refinement_change", "step_error"} | ENDS
 
 
 def assert_honest(results: np.ndarray) -> None:
@@ -36,14 +37,18 @@ def assert_honest(results: np.ndarray) -> None:
     assert ((results["failed_step"] > 0) == (results["status"] == Status.NEWTON_FAILED)).all()
 
 
+DEAREST = ("no damping, nor by the method", "0 N m", "1 N m", "70 deg", "85 deg, 720 steps", "5000 rpm", "Js x 1e4")
+"""Variants whose joints rattle or ring for ever; their classes are in docs/numerics.md."""
+
+
 @pytest.fixture(scope="module")
 def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Result file of the study, without the dearest two joints."""
+    """Result file of the study, without the dearest variants."""
     folder = tmp_path_factory.mktemp("hard")
-    text = (STUDIES / "hard_cases.toml").read_text(encoding="utf-8")
-    assert "solver = { steps_per_rev = 720 }" in text
-    text = text.replace("solver = { steps_per_rev = 720 }", "solver = { steps_per_rev = 720, max_revs = 2 }")
-    (folder / "hard.toml").write_text(text, encoding="utf-8")
+    head, *blocks = (STUDIES / "hard_cases.toml").read_text(encoding="utf-8").split("[[variant]]")
+    kept = [block for block in blocks if not any(f'name = "{name}"\n' in block for name in DEAREST)]
+    assert len(kept) == len(blocks) - len(DEAREST)
+    (folder / "hard.toml").write_text("[[variant]]".join([head, *kept]), encoding="utf-8")
     campaign.run(study.load(folder / "hard.toml"), folder / "hard.h5", workers=1)
     return folder / "hard.h5"
 
@@ -52,18 +57,15 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     with ResultStore.open(hard) as store:
         results, design = store.results(), store.design()
         family = np.array([v.family for v in store.variants])[design["variant"]]
-        binding = np.array(store.case_names)[design["case"]] == "tilt of 5 deg"
+        case = np.array(store.case_names)[design["case"]]
     assert_honest(results)
-    assert results["status"][binding].tolist() == [Status.NOT_PERIODIC]  # rings for ever, by less than its loads' 0.5 %
-    assert results["closure"][binding] < 5e-3
-    results, family = results[~binding], family[~binding]
+    rings = np.isin(case, ["tilt of 5 deg", "E x 1e3"])  # for ever, by a few thousandths of the loads
+    assert (results["status"][rings] == Status.STATIONARY).all()
+    assert (results["closure"][rings] < 1e-2).all()
+    results, family = results[~rings], family[~rings]
     ended = {name: {Status(s).label for s in results["status"][family == name]} for name in family}
     assert ended.pop("85 deg") == {"newton_failed"}
-    assert ended.pop("85 deg, 720 steps") == {"not_settled"}
-    assert ended.pop("70 deg") <= {"not_periodic", "not_resolved"}
-    for name in ("0 N m", "1 N m", "5000 rpm", "Js x 1e4", "no damping, nor by the method"):
-        assert ended.pop(name) == {"not_periodic"}, name
-    assert ended.pop("20000 rpm") == {"not_settled"}
+    assert ended.pop("20000 rpm") == {"stationary"}
     assert set().union(*ended.values()) == {"ok"}, ended
 
 
@@ -71,16 +73,6 @@ def test_the_setting_that_the_message_names_solves_the_case(hard: Path) -> None:
     with ResultStore.open(hard) as store:
         results, design = store.results(), store.design()
         family = [store.variants[i].family for i in design["variant"]]
-    slow = [i for i, name in enumerate(family) if results["motion"][i] == Motion.SLOW]
-    assert {family[i] for i in slow} == {"20000 rpm"}
-    s = study.load(STUDIES / "hard_cases.toml")
-    errors = sampling.draw(s)
-    for i in slow:
-        said = remedy(results[i], Options()._asdict())
-        revs = int(said.rpartition("solver.max_revs = ")[2])
-        params = joint.perturb(s.joints[design["variant"][i]], errors[i : i + 1])
-        row = simulate_rows(params, Options(max_revs=revs)).results[0]
-        assert row["status"] == Status.OK, (family[i], said)
     dear = results[family.index("85 deg")]
     assert "solver.steps_per_rev = 720" in remedy(dear, Options()._asdict())
     assert 0 <= dear["failed_theta"] < 2 * np.pi
@@ -89,7 +81,7 @@ def test_the_setting_that_the_message_names_solves_the_case(hard: Path) -> None:
 def test_the_report_writes_the_table_of_the_document(hard: Path) -> None:
     report = build(hard)
     lines = (hard.parent / "hard_cases.md").read_text(encoding="utf-8").splitlines()
-    assert len(lines) == 2 + 56
+    assert len(lines) == 2 + 42
     assert len({line.count("|") for line in lines}) == 1
     assert lines[2].startswith("| nominal | what the others are compared with")
     assert lines[2].endswith("| 1 |")

@@ -14,7 +14,7 @@ from tolstat import ideal, joint, simulation, study, trace
 from tolstat.kernel import dynamics
 from tolstat.kernel.work import FORCE, make_work
 from tolstat.simulation import restore, simulate_rows
-from tolstat.tables import RESULT, RESULTANT, SIMULATED, SIMULATED, Method, Mode, Options, Start, Status
+from tolstat.tables import RESULT, RESULTANT, SIMULATED, Method, Mode, Options, Start, Status
 
 OPTIONS = Options()
 TWIST = {"pin1__tilt_z": 0.005, "pin3__offset_t": 3e-5, "hole2__tilt_t": -0.004, "hole4__offset_e": 4e-5}

@@ -83,7 +83,7 @@ def test_every_dataset_has_unit_and_description(tmp_path: Path, study: fakes.Stu
     new_store(tmp_path / "a.h5", study).close()
     with h5py.File(tmp_path / "a.h5") as file:
         assert file.attrs["filetype"] == b"tolstat campaign"
-        assert file.attrs["schema_version"] == 3
+        assert file.attrs["schema_version"] == 4
         for group, columns in (("errors", ERROR_COLUMNS), ("results", RESULT_COLUMNS)):
             assert set(file[group]) == {c.name for c in columns}
             for c in columns:
@@ -187,8 +187,8 @@ def test_limits_are_replaced_whole_or_not_at_all(
     [
         ({"filetype": "statepoint"}, "is HDF5, but of type 'statepoint'"),
         (
-            {"schema_version": 4},
-            "has schema version 4, this tolstat reads 3\n  hint: use a newer tolstat",
+            {"schema_version": 5},
+            "has schema version 5, this tolstat reads 4\n  hint: use a newer tolstat",
         ),
     ],
 )

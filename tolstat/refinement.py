@@ -21,8 +21,8 @@ WATCHED = 48
 """Revolutions after which a joint that has not repeated is given up, if `max_revs` is less."""
 STEP_ERROR, AT_STEPS = 0.08, 180
 """Mean error of the uniform steps above which a joint is refined. Its largest loads err by less, since ringing that the
-steps do not resolve decays. With fewer steps a revolution than these it is larger for smooth motion, as it goes with the
-third power of a step."""
+steps do not resolve decays. With fewer steps a revolution than these it is larger for smooth motion, too: it goes with
+the third power of a step."""
 LIVELY, LIVELY_ERROR = 1.5e-3, 1e-3
 """|Psi| above which the output shaft swings about the ideal motion, and the mean error above which such a joint is
 refined: a swing remembers errors for long, and steps of BDF2 damp it. Both were found with 2759 joints that were

@@ -40,7 +40,7 @@ def remedy(row: np.void, options: Mapping[str, Any]) -> str:
         return f"repeats every {row['period']} revolutions, which the results cover"
     if status == Status.STATIONARY:
         return f"never repeats: largest loads are those of {options['duration']} revolutions, with an interval"
-    if motion == Motion.SLOW:
+    if motion == Motion.SLOW or (status == Status.NOT_SETTLED and float(row["closure_trend"]) < -1e-3):
         return _of_slow(row, options)
     if motion in (Motion.QUASI_PERIODIC, Motion.CHAOTIC):
         kind = motion.label.replace("_", "-")

@@ -22,7 +22,7 @@ from tolstat.kernel.state import STAGED, TOLERANCE
 from tolstat.kernel.topology import N_DOF, N_LUMPS
 from tolstat.kernel.trail import Trail, closure_trend, combine, lag_closure, make_trails, note_closure
 from tolstat.kernel.vector import copy
-from tolstat.tables import CONTACTS, MAX_ITERATIONS, RESULT, Fidelity, Method, Motion, Options, Status
+from tolstat.tables import CONTACTS, RESULT, Fidelity, Method, Motion, Options, Status
 
 PERIODIC, SLOW, SUBHARMONIC = int(Motion.PERIODIC), int(Motion.SLOW), int(Motion.SUBHARMONIC)
 QUASI_PERIODIC, CHAOTIC = int(Motion.QUASI_PERIODIC), int(Motion.CHAOTIC)
@@ -55,8 +55,8 @@ BESIDE, ALIGNING = 16, 4
 is given up after no more than these no class is told."""
 EXPONENT = 0.25
 """Size of an exponent (per revolution) that tells it from zero."""
-PARTS = 8
-"""Iterations are bound as those of a joint with so many parts in each step of the grid."""
+MOST_ITERATIONS = 3_000_000
+"""Bound on the work of a joint: some ten seconds."""
 
 TURNS = np.dtype(
     [
@@ -363,7 +363,7 @@ def revolved(point, memory, weight, iterations, par, options, samples, past, out
         if turns.revolution == turns.limit:
             return conclude_watch(options, trail, turns, out), False
         return NOT_SETTLED, True
-    if iterations > MAX_ITERATIONS * PARTS * options.steps_per_rev * options.max_revs:
+    if iterations > MOST_ITERATIONS:
         return NEWTON_FAILED, False
     last = turns.revolution
     turns.revolution += 1

@@ -65,7 +65,8 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     results, family = results[~rings], family[~rings]
     ended = {name: {Status(s).label for s in results["status"][family == name]} for name in family}
     assert ended.pop("85 deg") == {"newton_failed"}
-    assert ended.pop("20000 rpm") == {"stationary"}
+    for name in ("20000 rpm", "20000 rpm, 60 revolutions"):  # the same every three revolutions
+        assert ended.pop(name) == {"stationary"}
     assert set().union(*ended.values()) == {"ok"}, ended
 
 

@@ -32,6 +32,12 @@ def changes(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     return worst
 
 
+def assert_same(first: np.ndarray, second: np.ndarray) -> None:
+    """Tables of joints with the same numbers; the bytes between fields are anything."""
+    for name in RESULT.names:
+        np.testing.assert_array_equal(first[name], second[name], err_msg=name)
+
+
 def parameters(name: str, *rows: int) -> np.ndarray:
     plan = study.load(STUDIES / name, n=max(rows))
     return joint.perturb(plan.joint, sampling.draw(plan)[list(rows)])
@@ -117,11 +123,11 @@ def test_what_becomes_of_a_joint(before: Status, after: Status, change: float, s
     results["step_error"] = 2 * refinement.STEP_ERROR, 0.5 * refinement.STEP_ERROR
     untouched = results.copy()
     refinement.refine(untouched, Options(max_refinements=0), simulate)
-    assert untouched.tobytes() == results.tobytes()
-    smooth = results[1].copy()
+    assert_same(untouched, results)
+    smooth = results[1:].copy()
     refinement.refine(results, Options(), simulate)
     assert results["status"][0] == status
-    assert results[1].tobytes() == smooth.tobytes()
+    assert_same(results[1:], smooth)
     if before == Status.NEWTON_FAILED:
         assert asked == []
         return

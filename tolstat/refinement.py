@@ -19,7 +19,7 @@ TOLERANCE = 0.04
 tighter one is an eighth (`kernel.resolve.TIGHTER`)."""
 WATCHED = 48
 """Revolutions after which a joint that has not repeated is given up, if `max_revs` is less."""
-STEP_ERROR, AT_STEPS = 0.08, 180
+STEP_ERROR, AT_STEPS = 0.075, 180
 """Mean error of the uniform steps above which a joint is refined. Its largest loads err by less, since ringing that the
 steps do not resolve decays. With fewer steps a revolution than these it is larger for smooth motion, too: it goes with
 the third power of a step."""

@@ -62,6 +62,7 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     known = np.isin(found["status"], SIMULATED)
     for name in COUNTS:
         found[name] += results[name][rows]
+    found["step_error"] = results["step_error"][rows]
     results["status"][rows[~known]] = Status.NOT_RESOLVED
     results[rows[known]] = found[known]
     far = np.isin(found["status"], VALID) & (found["refinement_change"] > UNRESOLVED)

@@ -2,7 +2,7 @@
 
 A revolution has some `CELLS` cells, whole numbers of which make a step of the output grid. A cell is taken in 2^level
 equal parts by TR-BDF2. Where the estimated error of a part is above the tolerance, the cell is begun anew with twice as
-many. The next revolution begins with the levels of this one, or with one less where the error was far below the
+many. The next revolution begins with the levels of this one, or with lower ones where the error was far below the
 tolerance; a cell that has once been refused keeps its level. So the mesh of a motion that repeats comes to rest, and
 impacts that happen at the same angles meet fine parts there at once.
 

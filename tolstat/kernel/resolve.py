@@ -56,7 +56,7 @@ is given up after no more than these no class is told."""
 EXPONENT = 0.25
 """Size of an exponent (per revolution) that tells it from zero."""
 MOST_ITERATIONS = 3_000_000
-"""Bound on the work of a joint: some ten seconds."""
+"""Bound on the work of a joint: half a minute of a core."""
 
 TURNS = np.dtype(
     [

@@ -32,7 +32,7 @@ class Trail(NamedTuple):
 
 
 def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
-    """Allocate what `trail_of` makes the trails of, for `kept` revolutions."""
+    """Allocate the arrays of several trails, for `kept` revolutions."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
     modulus = np.full((joints, kept, angles, 8, 2), np.nan)
     return modulus, np.zeros((joints, kept), RESULT).view(np.recarray), make_notes(joints)

@@ -59,7 +59,7 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
         family = np.array([v.family for v in store.variants])[design["variant"]]
         case = np.array(store.case_names)[design["case"]]
     assert_honest(results)
-    rings = np.isin(case, ["tilt of 5 deg", "E x 1e3"])  # for ever, by a few thousandths of the loads
+    rings = case == "tilt of 5 deg"  # for ever, by a few thousandths of the loads
     assert (results["status"][rings] == Status.STATIONARY).all()
     assert (results["closure"][rings] < 1e-2).all()
     results, family = results[~rings], family[~rings]

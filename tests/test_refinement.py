@@ -10,7 +10,7 @@ import pytest
 from tolstat import joint, refinement, sampling, study
 from tolstat.remedy import remedy
 from tolstat.simulation import simulate_rows
-from tolstat.tables import RESULT, Method, Options, Status
+from tolstat.tables import RESULT, Method, Motion, Options, Status
 
 STUDIES = Path(__file__).parent.parent / "studies"
 PLAIN = Options(peak_substeps=1, max_refinements=0)
@@ -137,4 +137,31 @@ def test_what_becomes_of_a_joint(before: Status, after: Status, change: float, s
     assert (options.method, options.rtol, options.max_revs) == (Method.TR_BDF2, refinement.TOLERANCE, 48)
     assert results["newton_iterations"][0] == (1 if after == Status.NEWTON_FAILED else 11)
     said = remedy(results[0], Options()._asdict())
-    assert ("solver.max_refinements = 3" in said) == (status == Status.NOT_RESOLVED and after == Status.OK)
+    assert ("solver.max_refinements = 4" in said) == (status == Status.NOT_RESOLVED and after == Status.OK)
+
+
+@pytest.mark.parametrize(
+    ("load", "spread", "status"),
+    [(5.02, 0.01, Status.OK), (5.2, 0.01, Status.STATIONARY), (5.2, 0.1, Status.STATIONARY)],
+)
+def test_a_motion_that_all_but_repeats_is_taken_as_it_was(load: float, spread: float, status: Status) -> None:
+    """Ok with uniform steps, never repeating with others: the largest loads of 48 revolutions decide."""
+
+    def simulate(rows: np.ndarray, options: Options) -> tuple[np.ndarray, np.ndarray]:
+        made = np.zeros(len(rows), RESULT)
+        if options.method != Method.TR_BDF2:
+            made["F_max"] = made["T_max"] = load
+            made["status"] = Status.OK
+            return made, np.zeros((0, 0), RESULT)
+        made["status"], made["motion"], made["revolutions"] = Status.NOT_PERIODIC, Motion.CHAOTIC, 48
+        made["F_max"] = made["T_max"] = 5.0
+        blocks = np.zeros((len(rows), 48), RESULT)
+        for field in ("F_max", "T_max"):
+            blocks[field] = 5.0 * (1 + spread * (np.random.default_rng(1).random((1, 48, 1)) - 0.5))
+        return made, blocks
+
+    results, _ = simulate(np.arange(1), Options())
+    results["step_error"] = 2 * refinement.STEP_ERROR
+    refinement.refine(results, Options(), simulate)
+    assert results["status"] == status
+    assert results["F_max"].max() == pytest.approx(load if status == Status.OK else 5.0 * (1 + spread / 2), rel=1e-2)

@@ -189,7 +189,7 @@ class Options(NamedTuple):
     atol: float = 0.0
     fidelity: int = int(Fidelity.DYNAMIC)
     peak_substeps: int = 16
-    max_refinements: int = 2
+    max_refinements: int = 3
     duration: int = 100
 
 

@@ -35,12 +35,14 @@ TIGHTER = 8
 NEARLY, PATIENT = 1.5e-2, 10
 """Closure error at which a joint gets a tighter tolerance, if it needs one, and revolutions after which it gets its
 first one anyway: it need not settle with every one."""
-ENOUGH = 0.03
-"""Closure error at which a joint has settled in any case, in units of the last change of its largest loads: a tenth of
+ENOUGH = 0.1
+"""Closure error at which a joint has settled in any case, in units of the last change of its largest loads: a third of
 their error."""
 RESOLVED = 2e-2
 """Change of the largest loads by a tighter tolerance at which it is the last, relative to the largest of their kind. A
 method of order 2 leaves a third of it as error."""
+FAR = 2 * RESOLVED
+"""Change by the first revolution with a tighter tolerance at which the next one follows at once."""
 SETTLING = 16
 """Revolutions that a tighter tolerance is allowed at least."""
 LONGEST_PERIOD = 8
@@ -378,6 +380,8 @@ def revolved(point, memory, weight, iterations, par, options, samples, past, out
         note_closure(turns.revolution, out.closure, trail.notes)
         if repeats(last, options, memory, past.mesh, trail, turns, out):
             return (OK if out.period == 1 else NOT_PERIODIC), False
+    elif turns.period == 1 and turns.tightened < options.max_refinements and largest_change(turns.before, own) > FAR:
+        tighten(1, options, memory, past.mesh, turns, own)
     set_scale(force, torque, wanted(options, turns), options, par, memory, weight)
     if turns.limit > BESIDE and turns.revolution >= turns.limit - BESIDE:
         if turns.revolution == turns.limit - BESIDE:

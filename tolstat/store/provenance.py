@@ -12,8 +12,8 @@ import tolstat
 
 LIBRARIES = ("numpy", "numba", "scipy", "h5py")
 DECIDING = (
-    *("kernel", "joint", "tables.py", "simulation.py", "rainflow.py", "sampling.py", "tolerance.py"),
-    *("study/correlation.py", "study/design.py", "study/proposal.py"),
+    *("kernel", "joint", "tables.py", "simulation.py", "refinement.py", "stationary.py", "rainflow.py"),
+    *("sampling.py", "tolerance.py", "study/correlation.py", "study/design.py", "study/proposal.py"),
 )
 """Modules that decide the numbers of a campaign, given what its identity holds."""
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tolstat import joint as joints
-from tolstat.tables import PARAM
+from tolstat.common.tables import PARAM
 
 REFERENCE = Path(__file__).parent / "reference"
 REFERENCE_CASES = sorted(path.stem for path in REFERENCE.glob("*.toml"))

@@ -18,11 +18,13 @@ from typing import Any
 import numpy as np
 
 from tests.environment import environment as environment
-from tolstat import campaign, kept, stationary
-from tolstat.columns import Column
-from tolstat.execution import Stages
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Stages
+from tolstat.common import selected_results as kept
+from tolstat.common.columns import Column
+from tolstat.common.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
+from tolstat.solver import stationary
 from tolstat.study.model import Sampling
-from tolstat.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
 
 SPECS = {
     "loads": HistorySpec((30, 8, 6), "f4", "N, N*m", "bushing loads"),

@@ -1,4 +1,4 @@
-"""The field tables of docs/result_format.md, made from `tolstat.tables`.
+"""The field tables of docs/result_format.md, made from `tolstat.common.tables`.
 
 ``python -m tests.format_tables`` brings the document up to date; a test compares the two.
 """
@@ -8,8 +8,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from tolstat import origins, tables
-from tolstat.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
+from tolstat.common import draw_records as origins
+from tolstat.common import tables
+from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "result_format.md"
 

@@ -1,6 +1,6 @@
 """The joint once more, slowly and plainly: world coordinates, NumPy, one statement for each sentence of the model.
 
-Twin of ``kernel.dynamics``: it shares no code with the kernel but the table of parameters. Velocities and
+Twin of ``kernel.mechanics.dynamics``: it shares no code with the kernel but the table of parameters. Velocities and
 accelerations of bodies come from differences of their world position and attitude in time, so that none of the
 kernel's inertial terms is written a second time.
 """

@@ -15,10 +15,11 @@ import scipy.integrate
 import scipy.stats
 from numpy.typing import NDArray
 
-from tolstat import joint, refinement, sampling, study
-from tolstat.reference import first_order
-from tolstat.simulation import _together, simulate_rows
-from tolstat.tables import RESULT, Method, Motion, Options, Status
+from tolstat import joint, sampling, study
+from tolstat.common.tables import RESULT, Method, Motion, Options, Status
+from tolstat.solver import refinement
+from tolstat.solver.reference import first_order
+from tolstat.solver.simulation import _together, simulate_rows
 
 STUDY = Path(__file__).parent.parent / "studies" / "iso2768_f.toml"
 STARTED, LONG, DURATION = 100, 1100, 100

@@ -8,11 +8,10 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from tolstat import ideal
-from tolstat.joint import perturb
-from tolstat.recorded import joint_of
+from tolstat.common.tables import Status
+from tolstat.joint import ideal, perturb
 from tolstat.store import ResultStore
-from tolstat.tables import Status
+from tolstat.store.recorded import joint_of
 
 mpl.use("Agg")
 RPM = np.pi / 30

@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from tests import synthetic
-from tolstat import campaign, joint, sampling, study
+from tolstat import joint, sampling, study
+from tolstat.campaign import run as campaign
+from tolstat.common.tables import RESULT, Options, Simulation, Status
 from tolstat.store import Counts, ResultStore
-from tolstat.tables import RESULT, Options, Simulation, Status
 
 
 def simulate(params: np.ndarray, options: Options, **rest: object) -> Simulation:

@@ -15,17 +15,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat import joint, sampling, simulation, study
-from tolstat.kernel import first_order
-from tolstat.kernel._jit import closure, njit
-from tolstat.kernel.integrate import reset
-from tolstat.kernel.resolve import APART, lever
-from tolstat.kernel.settle import grid_step
-from tolstat.kernel.simulate import advance, begin, clear, make_scratch
-from tolstat.kernel.state import CV_FACTORISED, H_OLD, make_state_record
-from tolstat.kernel.topology import N_DOF
-from tolstat.kernel.work import WORK
-from tolstat.tables import RESULT, SIMULATED, Options, Status
+from tolstat import joint, sampling, study
+from tolstat.common.tables import RESULT, SIMULATED, Options, Status
+from tolstat.kernel.integrators import first_order
+from tolstat.kernel.integrators.integrate import reset
+from tolstat.kernel.integrators.state import CV_FACTORISED, H_OLD, make_state_record
+from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.mechanics.work import WORK
+from tolstat.kernel.revolution.resolve import APART, lever
+from tolstat.kernel.revolution.settle import grid_step
+from tolstat.kernel.revolution.simulate import advance, begin, clear, make_scratch
+from tolstat.kernel.simd.jit import closure, njit
+from tolstat.solver import simulation
 
 Table = np.ndarray[tuple[int], np.dtype[np.void]]
 

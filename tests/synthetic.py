@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tolstat import stationary
-from tolstat.tables import ERROR, RESULT, Status
+from tolstat.common.tables import ERROR, RESULT, Status
+from tolstat.solver import stationary
 
 
 def errors(n, seed=7):
@@ -89,8 +89,8 @@ method = "sweep"
 def store(folder, text=STUDY, name="small", simulated=None, **kwargs):
     """Make a result file without running the solver; `simulated` rows of it have invented results."""
     from tolstat import sampling, study
+    from tolstat.common.tables import Simulation
     from tolstat.store import ResultStore
-    from tolstat.tables import Simulation
 
     source = folder / f"{name}.toml"
     source.write_text(text, encoding="utf-8")

@@ -9,10 +9,11 @@ from typer.testing import CliRunner
 
 from tests import synthetic
 from tests.test_reweight import campaign, load
-from tolstat import allocate, sampling, study
+from tolstat import sampling, study
 from tolstat.analysis import allocation
 from tolstat.cli import app
-from tolstat.errors import InputError
+from tolstat.common.errors import InputError
+from tolstat.questions.allocate import query as allocate
 from tolstat.store import ResultStore
 from tolstat.study import costs, scaling
 

@@ -6,12 +6,14 @@ import pytest
 from typer.testing import CliRunner
 
 from tests import synthetic
-from tolstat import angles, campaign, revolutions, study
+from tolstat import study
+from tolstat.campaign import run as campaign
+from tolstat.campaign.recall import recall
 from tolstat.cli import app
-from tolstat.errors import InputError, StoreError
-from tolstat.recall import recall
-from tolstat.revolutions import Revolutions
-from tolstat.store import ResultStore
+from tolstat.common.errors import InputError, StoreError
+from tolstat.questions.causes import angles
+from tolstat.store import ResultStore, revolutions
+from tolstat.store.revolutions import Revolutions
 
 TEXT = synthetic.STUDY.replace("n = 60", "n = 900").replace("offset_t", "offset_[tz]")
 SIGMA = 1e-4 / 3

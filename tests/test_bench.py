@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 
 from tests.conftest import REFERENCE
 from tolstat import cli, study
-from tolstat.bench import flops, iteration, joints, others, run, scaling, split, startup, timing
-from tolstat.bench.flops import Counting
-from tolstat.bench.scaling import Stint
-from tolstat.bench.split import Once
-from tolstat.report import bench as page
+from tolstat.benchmarks import flops, iteration, joints, others, run, scaling, split, startup, timing
+from tolstat.benchmarks import text as page
+from tolstat.benchmarks.flops import Counting
+from tolstat.benchmarks.scaling import Stint
+from tolstat.benchmarks.split import Once
 
 STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"
 

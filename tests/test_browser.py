@@ -10,10 +10,10 @@ import pytest
 
 from tests import synthetic
 from tests.test_page import TEXT
-from tolstat import page
 from tolstat.analysis import exceedance
-from tolstat.report.source import load
+from tolstat.report import page
 from tolstat.store import ResultStore
+from tolstat.store.view import load
 
 BROWSER = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""

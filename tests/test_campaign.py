@@ -19,9 +19,14 @@ import pytest
 
 from tests import fakes
 from tests.synthetic import HEAD
-from tolstat import campaign, execution, joint, progress, signals, simulation, tables
+from tolstat import joint
 from tolstat import study as studies
-from tolstat.errors import InputError, StoreError
+from tolstat.campaign import blocks as execution
+from tolstat.campaign import progress, signals
+from tolstat.campaign import run as campaign
+from tolstat.common import tables
+from tolstat.common.errors import InputError, StoreError
+from tolstat.solver import simulation
 from tolstat.store import Counts, ResultStore
 
 

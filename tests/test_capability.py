@@ -6,7 +6,7 @@ from scipy.special import nctdtr
 from scipy.stats import lognorm, norm
 
 from tolstat.analysis import capability, exceedance
-from tolstat.tables import Status
+from tolstat.common.tables import Status
 
 SEEDS = 2000
 LIMIT = 3.0

@@ -9,9 +9,11 @@ import pytest
 
 from tests import fakes
 from tests.test_campaign import datasets
-from tolstat import campaign, joint, recorded, sampling, simulation, study
-from tolstat.errors import InputError, StoreError
-from tolstat.store import ResultStore
+from tolstat import joint, sampling, study
+from tolstat.campaign import run as campaign
+from tolstat.common.errors import InputError, StoreError
+from tolstat.solver import simulation
+from tolstat.store import ResultStore, recorded
 from tolstat.study import Study
 
 ROOT = Path(__file__).parent.parent

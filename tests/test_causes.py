@@ -8,13 +8,14 @@ import pytest
 from typer.testing import CliRunner
 
 from tests import synthetic
-from tolstat import causes
 from tolstat.analysis import exceedance, sensitivity
 from tolstat.cli import app
-from tolstat.report import capability, source
-from tolstat.report import causes as report
+from tolstat.common.tables import Simulation, Status
+from tolstat.questions.capability import rendering as capability
+from tolstat.questions.causes import query as causes
+from tolstat.questions.causes import rendering as report
 from tolstat.store import ResultStore
-from tolstat.tables import Simulation, Status
+from tolstat.store import view as source
 
 N = 3000
 TEXT = synthetic.STUDY.replace("n = 60", f"n = {N}").replace('"pin*.offset_t"', '"pin*.offset_[tz]"')

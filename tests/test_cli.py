@@ -16,11 +16,12 @@ from typer.testing import CliRunner
 
 import tolstat
 from tests import fakes, synthetic
-from tolstat import campaign, cli
-from tolstat.columns import ERROR_COLUMNS, RESULT_COLUMNS
-from tolstat.executor import WorkerDied
+from tolstat import cli
+from tolstat.campaign import run as campaign
+from tolstat.campaign.executors import WorkerDied
+from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
+from tolstat.common.tables import BUSHINGS, Simulation, Status
 from tolstat.store import ResultStore
-from tolstat.tables import BUSHINGS, Simulation, Status
 
 COMMANDS = (
     *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
@@ -331,7 +332,7 @@ def case(tmp_path):
 
 def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monkeypatch):
     made = simulated("ok", 1.5)
-    monkeypatch.setattr("tolstat.trace.simulate_case", lambda _: made)
+    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: made)
     done = call("simulate", case, "--json", "--out", tmp_path / "trace.csv")
     assert done.exit_code == 0, done.stderr
     assert json.loads(done.stdout) == made.summary()
@@ -342,7 +343,7 @@ def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monke
 
 
 def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch):
-    monkeypatch.setattr("tolstat.trace.simulate_case", lambda _: simulated("newton_failed", None))
+    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("newton_failed", None))
     done = call("simulate", case)
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1].split() == ["fork4", "-", "-"]
@@ -362,7 +363,7 @@ contact.stations = [
 @pytest.mark.parametrize("command", ["simulate", "plan", "run"])
 def test_what_is_hardly_meant_is_a_warning(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tolstat.trace.simulate_case", lambda _: simulated("ok", 1.5))
+    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("ok", 1.5))
     text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", f"{UNDAMPED}[operation]")
     if command == "simulate":
         text = text.partition("[tolerances]")[0]

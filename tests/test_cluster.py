@@ -17,16 +17,16 @@ import pytest
 
 from tests import fakes
 from tests.test_campaign import datasets
-from tolstat import campaign
-from tolstat.errors import InputError
-from tolstat.execution import Execution
-from tolstat.executor import Work
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
+from tolstat.campaign.executors import Work
+from tolstat.common.errors import InputError
+from tolstat.common.tables import Status
 from tolstat.store import Counts, ResultStore
-from tolstat.tables import Status
 
 pytest.importorskip("distributed")
 
-from tolstat.executor.cluster import check, map_on_cluster
+from tolstat.campaign.executors.cluster import check, map_on_cluster
 
 
 class Cluster(NamedTuple):
@@ -101,7 +101,7 @@ def process_number() -> dict[str, str]:
 
 
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tolstat.executor.cluster.CONNECT_S", 0.5)
+    monkeypatch.setattr("tolstat.campaign.executors.cluster.CONNECT_S", 0.5)
     with pytest.raises(InputError, match=r"--scheduler: tcp://127.0.0.1:1 does not answer"):
         list(map_on_cluster(Work(abs), range(9), "tcp://127.0.0.1:1", 2, process_number))
 

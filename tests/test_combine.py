@@ -16,12 +16,15 @@ from typer.testing import CliRunner
 
 from tests import fakes, synthetic
 from tests.test_campaign import datasets
-from tolstat import campaign, cli, combine, joint, sampling, tables
+from tolstat import cli, joint, sampling
 from tolstat import study as studies
-from tolstat.errors import InputError, StoreError
+from tolstat.campaign import extend as combine
+from tolstat.campaign import run as campaign
+from tolstat.common import tables
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import ResultStore
 from tolstat.study import Study
-from tolstat.tables import Options, Simulation, Status
 
 KINDS = ("none", "full")
 BODY = synthetic.STUDY.replace("[limits]", '[output]\nhistories = "KIND"\n[limits]')

@@ -9,13 +9,13 @@ from scipy.stats import binomtest, norm, ttest_ind, ttest_rel
 from typer.testing import CliRunner
 
 from tests import synthetic
-from tolstat import compare
 from tolstat.analysis import difference
 from tolstat.analysis.exceedance import clopper_pearson
 from tolstat.cli import app
-from tolstat.errors import InputError
+from tolstat.common.errors import InputError
+from tolstat.common.tables import Simulation, Status
+from tolstat.questions.compare import query as compare
 from tolstat.store import ResultStore
-from tolstat.tables import Simulation, Status
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)

@@ -12,13 +12,12 @@ from typer.testing import CliRunner
 from tests.conftest import REFERENCE
 from tests.test_report import overlapping, texts
 from tolstat import cli, joint, study
-from tolstat.comparison import competitors, measure, setup, table
-from tolstat.comparison.competitors import Competitor
-from tolstat.comparison.measure import TRUTH, Run
-from tolstat.errors import InputError
-from tolstat.reference import FirstOrder, Largest, first_order
-from tolstat.report import comparison as page
-from tolstat.tables import RESULT, Options, Status
+from tolstat.benchmarks.work_precision import competitors, measure, page, setup, table
+from tolstat.benchmarks.work_precision.competitors import Competitor
+from tolstat.benchmarks.work_precision.measure import TRUTH, Run
+from tolstat.common.errors import InputError
+from tolstat.common.tables import RESULT, Options, Status
+from tolstat.solver.reference import FirstOrder, Largest, first_order
 
 STUDY = REFERENCE.parents[1] / "studies" / "work_precision.toml"
 EVERY = [Competitor(code, jacobian) for code in ("Radau", "BDF", "LSODA", "CVODE") for jacobian in (False, True)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba import float64
 
-from tolstat.kernel._jit import closure
+from tolstat.kernel.simd.jit import closure
 
 
 @numba.njit

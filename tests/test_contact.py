@@ -10,11 +10,12 @@ import pytest
 from tests import stability
 from tests.conftest import LAWS, with_law
 from tolstat import joint as joints
-from tolstat import simulation
-from tolstat.kernel import closeup, dynamics, rotation
-from tolstat.kernel.topology import N_DOF, N_LUMPS, PIN
-from tolstat.kernel.work import DELTA, FORCE, NORMAL, V_NORMAL, make_work
-from tolstat.tables import RESULT, RESULTANT, Options
+from tolstat.common.tables import RESULT, RESULTANT, Options
+from tolstat.kernel.mechanics import dynamics, rotation
+from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PIN
+from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, V_NORMAL, make_work
+from tolstat.kernel.revolution import closeup
+from tolstat.solver import simulation
 
 STUDY = Path(__file__).parent.parent / "studies" / "iso2768_f.toml"
 PINS = slice(6 * PIN, 6 * PIN + 24)

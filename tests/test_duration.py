@@ -9,12 +9,13 @@ from scipy.stats import norm
 from typer.testing import CliRunner
 
 from tests import synthetic
-from tolstat import cli, duration, sampling, study
+from tolstat import cli, sampling, study
 from tolstat.analysis import exceedance
-from tolstat.errors import InputError, StoreError
-from tolstat.simulation import history_specs
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import CHANNELS, Options, Simulation
+from tolstat.questions.time_above import query as duration
+from tolstat.solver.simulation import history_specs
 from tolstat.store import ResultStore
-from tolstat.tables import CHANNELS, Options, Simulation
 
 SEEDS = 500
 SAMPLES = 720

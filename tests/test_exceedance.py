@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest, norm
 
 from tolstat.analysis import exceedance, quantile
-from tolstat.tables import Status
+from tolstat.common.tables import Status
 
 N_SEEDS = 1500
 N_JOINTS = 120

@@ -8,11 +8,14 @@ from typer.testing import CliRunner
 
 from tests import synthetic
 from tests.test_causes import made
-from tolstat import cli, summary
-from tolstat.columns import ERROR_COLUMNS
-from tolstat.errors import InputError, StoreError
-from tolstat.report import capability, exceedance, source
+from tolstat import cli
+from tolstat.common.columns import ERROR_COLUMNS
+from tolstat.common.errors import InputError, StoreError
+from tolstat.questions.capability import rendering as capability
+from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.report import summary
 from tolstat.store import ResultStore
+from tolstat.store import view as source
 
 
 def export(*arguments):

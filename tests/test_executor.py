@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from tests.environment import environment
-from tolstat.executor import Lost, Work, WorkerDied, available_workers, map_here, map_in_processes
-from tolstat.executor.common import THREAD_VARIABLES, never
+from tolstat.campaign.executors import Lost, Work, WorkerDied, available_workers, map_here, map_in_processes
+from tolstat.campaign.executors.common import THREAD_VARIABLES, never
 
 SQUARES = {i: i * i for i in range(20)}
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import expon, genpareto, norm
 
 from tolstat.analysis import extreme, pareto
-from tolstat.tables import Status
+from tolstat.common.tables import Status
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)

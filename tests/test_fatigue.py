@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests import naive
-from tolstat import rainflow
 from tolstat.analysis import cycles, damage
 from tolstat.analysis.cycles import Cycles
-from tolstat.tables import CHANNELS
+from tolstat.common.tables import CHANNELS
+from tolstat.solver import rainflow
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4]
 """ASTM E1049-85, Figures 6 and 7."""

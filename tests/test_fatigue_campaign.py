@@ -11,12 +11,14 @@ import pytest
 
 import tolstat
 from tests.test_fatigue import needs
-from tolstat import fatigue, pylife, rainflow
 from tolstat.analysis import damage
-from tolstat.errors import InputError, StoreError
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import CHANNELS
+from tolstat.questions.fatigue import pylife
+from tolstat.questions.fatigue import query as fatigue
+from tolstat.solver import rainflow
 from tolstat.store import ResultStore
 from tolstat.study.fatigue import Fatigue, read
-from tolstat.tables import CHANNELS
 
 STUDY = """
 [joint]
@@ -124,7 +126,7 @@ def test_the_section_may_be_edited_after_the_run(campaign, tmp_path):
 
 def test_a_campaign_without_a_valid_joint(tmp_path):
     from tests.test_cli import call
-    from tolstat.report import fatigue as report
+    from tolstat.questions.fatigue import rendering as report
 
     source, out = tmp_path / "a.toml", tmp_path / "a.h5"
     text = STUDY.format(histories="cycles", alpha=15, seed=1) + '[errors]\npin1.diameter = "0.5 mm"\n'
@@ -236,7 +238,7 @@ def test_command_prints_loads_and_damage(campaign, tmp_path):
 
 
 def test_spectra_fall_and_the_figure_shows_four_panels(campaign):
-    from tolstat.report import fatigue as report
+    from tolstat.questions.fatigue import rendering as report
 
     loading = fatigue.read([campaign()])
     table = report.spectra(loading, ["fork1.F_z"])

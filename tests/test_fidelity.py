@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 
 from tests import fakes
-from tolstat import campaign, fidelity, ideal, joint, sampling, study
-from tolstat.errors import InputError
-from tolstat.fidelity import Rung
-from tolstat.simulation import simulate_rows
+from tolstat import joint, sampling, study
+from tolstat.campaign import run as campaign
+from tolstat.common.errors import InputError
+from tolstat.common.tables import PARAM, RESULT, Fidelity, Options, Simulation, Status
+from tolstat.joint import ideal
+from tolstat.solver import fidelity
+from tolstat.solver.fidelity import Rung
+from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultStore
-from tolstat.tables import PARAM, RESULT, Fidelity, Options, Simulation, Status
 
 IDEAL = Options(fidelity=int(Fidelity.IDEAL))
 STATIC = Options(fidelity=int(Fidelity.QUASISTATIC))

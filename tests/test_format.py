@@ -18,8 +18,8 @@ import pytest
 from tests import fakes, make_golden
 from tests.test_campaign import datasets
 from tests.test_store import new_store, simulation
-from tolstat.columns import ERROR_COLUMNS, RESULT_COLUMNS
-from tolstat.errors import StoreError
+from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
+from tolstat.common.errors import StoreError
 from tolstat.store import ResultStore, integrity, result_file
 
 GOLDEN = sorted(make_golden.FOLDER.glob("schema*.h5"))
@@ -119,7 +119,7 @@ def test_texts_have_a_fixed_length(whole: Path) -> None:
 
 
 def test_histories_name_their_axes(tmp_path: Path) -> None:
-    from tolstat.simulation import history_specs
+    from tolstat.solver.simulation import history_specs
 
     for kind in ("full", "harmonics"):
         for spec in history_specs(fakes.Options(), kind, 4).values():
@@ -216,7 +216,7 @@ READ_ALL = """
 import pathlib, resource, sys
 resource.setrlimit(resource.RLIMIT_AS, (1 << 32, 1 << 32))
 from tests.test_format import read_all
-from tolstat.errors import StoreError
+from tolstat.common.errors import StoreError
 for line in sys.stdin:
     try:
         print("read", read_all(pathlib.Path(line.strip())), flush=True)

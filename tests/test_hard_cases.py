@@ -7,14 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolstat import campaign, joint, sampling, study, verify
-from tolstat.errors import InputError
-from tolstat.remedy import remedy
+from tolstat import joint, sampling, study
+from tolstat.campaign import run as campaign
+from tolstat.campaign import verify
+from tolstat.campaign.remedy import remedy
+from tolstat.common.errors import InputError
+from tolstat.common.tables import FAILED, LARGEST, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
 from tolstat.report import build, cases
-from tolstat.simulation import simulate_rows
+from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultStore, verification
 from tolstat.store.verification import Check, Verification
-from tolstat.tables import FAILED, LARGEST, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
 
 STUDIES = Path(__file__).parent.parent / "studies"
 FLOATS = [f.name for f in RESULT_FIELDS if f.dtype == "f8"]

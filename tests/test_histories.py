@@ -13,7 +13,7 @@ import pytest
 
 from tests import fakes
 from tests.test_store import in_another_process, new_store, simulation
-from tolstat.errors import StoreError
+from tolstat.common.errors import StoreError
 from tolstat.store import ResultStore
 from tolstat.store.histories import HistoryParts
 from tolstat.store.result_file import text

@@ -10,15 +10,16 @@ from typer.testing import CliRunner
 
 from tests import synthetic
 from tests.test_cli import invented_campaign
-from tolstat import combine, sampling, study
-from tolstat import reweight as reweighting
+from tolstat import sampling, study
 from tolstat.analysis import exceedance, weighted
+from tolstat.campaign import extend as combine
 from tolstat.cli import app
-from tolstat.errors import InputError, StoreError
-from tolstat.report import source
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Simulation, Status
+from tolstat.questions.reweight import query as reweighting
 from tolstat.store import ResultStore
+from tolstat.store import view as source
 from tolstat.study.proposal import Proposal, component, weights
-from tolstat.tables import Simulation, Status
 
 SEEDS = 500
 BETA = 4.75

@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from tolstat.integration import integrate
-from tolstat.kernel import rotation
-from tolstat.tables import Status
+from tolstat.common.tables import Status
+from tolstat.kernel.mechanics import rotation
+from tolstat.solver.integrate import integrate
 
 METHODS = ("bdf2", "generalized_alpha", "tr_bdf2")
 

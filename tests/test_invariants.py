@@ -10,13 +10,13 @@ import pytest
 
 from tests import naive
 from tests.conftest import LAWS, with_law
+from tests.support import energy
+from tests.support.kernel_energy import ENERGY, ENERGY_FIELDS
 from tests.test_kernel_dynamics import OPTIONS, loaded
-from tolstat import energy
-from tolstat.kernel import dynamics
-from tolstat.kernel.energy import ENERGY, ENERGY_FIELDS
-from tolstat.kernel.topology import ARM, FRAME, HUB, N_BODIES, N_DOF, PIN
-from tolstat.kernel.work import make_work
-from tolstat.tables import PARAM, Method, Options, Status
+from tolstat.common.tables import PARAM, Method, Options, Status
+from tolstat.kernel.mechanics import dynamics
+from tolstat.kernel.mechanics.topology import ARM, FRAME, HUB, N_BODIES, N_DOF, PIN
+from tolstat.kernel.mechanics.work import make_work
 
 METHODS = pytest.mark.parametrize("method", list(Method))
 BENT = np.radians(15)

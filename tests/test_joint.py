@@ -10,14 +10,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from tolstat import files
 from tolstat import joint as joints
-from tolstat.errors import InputError
+from tolstat.common import files
+from tolstat.common.errors import InputError
+from tolstat.common.strict import validate
+from tolstat.common.tables import ERROR_FIELDS, HOLES, MAX_STATIONS, PARAM, PINS
 from tolstat.joint import Joint, Operation, material
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
-from tolstat.kernel.topology import ARM_OF_PIN
-from tolstat.schema import validate
-from tolstat.tables import ERROR_FIELDS, HOLES, MAX_STATIONS, PARAM, PINS
+from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
 FILE = files.data_dir() / "joints" / "cirelli2021.toml"
 MM = 1e-3

@@ -16,14 +16,21 @@ from tests.test_campaign import datasets
 from tests.test_combine import make, run, slices  # noqa: F401  (make is a fixture)
 from tests.test_report import campaign as campaign_of
 from tests.test_report import swept, texts
-from tolstat import campaign, combine, kept, precision, replay, report, study, tail, verify
+from tolstat import report, study
 from tolstat.analysis import accuracy
-from tolstat.columns import RESULT_COLUMNS
-from tolstat.errors import InputError, StoreError
-from tolstat.report import accuracy as accuracy_tables
-from tolstat.report import exceedance, sweep
+from tolstat.campaign import extend as combine
+from tolstat.campaign import replay, verify
+from tolstat.campaign import run as campaign
+from tolstat.campaign import stop_rule as precision
+from tolstat.common import selected_results as kept
+from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Status
+from tolstat.questions.causes import tail
+from tolstat.questions.exceedance import accuracy as accuracy_tables
+from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.questions.exceedance import sweep
 from tolstat.store import ResultStore, integrity, result_file, verification
-from tolstat.tables import Status
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
 COURSE = [c.name for c in RESULT_COLUMNS if c.field not in kept.CHOSEN_FROM]

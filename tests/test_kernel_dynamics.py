@@ -7,12 +7,12 @@ import pytest
 
 from tests import naive
 from tests.conftest import LAWS, with_law
-from tolstat.bench.dense import dense
-from tolstat.kernel import dynamics, linsolve, tangent
-from tolstat.kernel.motion import ideal_motion
-from tolstat.kernel.topology import N_DOF, PSI
-from tolstat.kernel.work import make_work
-from tolstat.tables import RESULTANT, Mode, Options
+from tolstat.benchmarks.dense import dense
+from tolstat.common.tables import RESULTANT, Mode, Options
+from tolstat.kernel.mechanics import dynamics, linsolve, tangent
+from tolstat.kernel.mechanics.motion import ideal_motion
+from tolstat.kernel.mechanics.topology import N_DOF, PSI
+from tolstat.kernel.mechanics.work import make_work
 
 OPTIONS = Options()
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tolstat.kernel import rotation
-from tolstat.kernel.topology import TRIAD
-from tolstat.kernel.triad import from_triad, to_triad
-from tolstat.kernel.trigonometry import sine_cosine
+from tolstat.kernel.mechanics import rotation
+from tolstat.kernel.mechanics.topology import TRIAD
+from tolstat.kernel.mechanics.triad import from_triad, to_triad
+from tolstat.kernel.mechanics.trigonometry import sine_cosine
 
 SIZES = [0.0, 1e-9, 1e-3, 0.3, 0.31622, 0.31624, 1.0, 2.5]
 """Angles on both sides of the change from series to closed form at 0.3162 rad."""

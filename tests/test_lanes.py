@@ -9,12 +9,12 @@ import pytest
 
 from tests.conftest import LAWS
 from tolstat import joint as joints
-from tolstat import simulation, stationary
-from tolstat.kernel import lockstep
-from tolstat.kernel._jit import closure
-from tolstat.kernel.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
-from tolstat.kernel.lane_memory import aligned_zeros, as_lanes, lane_dtype
-from tolstat.tables import PARAM, Fidelity, Options, Start, Status
+from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status
+from tolstat.kernel.lanes import lockstep
+from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
+from tolstat.kernel.simd.jit import closure
+from tolstat.kernel.simd.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
+from tolstat.solver import simulation, stationary
 
 FAST = Options(steps_per_rev=45, max_revs=6, max_refinements=0)
 STATIC = FAST._replace(fidelity=int(Fidelity.QUASISTATIC))

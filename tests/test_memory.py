@@ -6,9 +6,9 @@ from typer.testing import CliRunner
 
 from tests.test_causes import TEXT, made
 from tolstat.cli import app
-from tolstat.report import source
+from tolstat.common.tables import ERROR, RESULT
 from tolstat.store import ResultStore, reader
-from tolstat.tables import ERROR, RESULT
+from tolstat.store import view as source
 
 BLOCK = 256
 

@@ -10,14 +10,16 @@ from scipy.stats import norm
 from typer.testing import CliRunner
 
 from tests import fakes, synthetic
-from tolstat import campaign, joint, multifidelity, sampling, study
+from tolstat import joint, sampling, study
 from tolstat.analysis import multifidelity as analysis
 from tolstat.analysis.multifidelity import Pairs
+from tolstat.campaign import run as campaign
+from tolstat.campaign.recall import recall
 from tolstat.cli import app
-from tolstat.errors import InputError
-from tolstat.recall import recall
+from tolstat.common.errors import InputError
+from tolstat.common.tables import RESULT, Fidelity, Simulation, Status
+from tolstat.questions.multifidelity import query as multifidelity
 from tolstat.store import ResultStore
-from tolstat.tables import RESULT, Fidelity, Simulation, Status
 
 SEEDS, M, N = 500, 120, 1500
 SIGMA = math.hypot(2.2, 0.5)

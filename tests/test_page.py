@@ -9,16 +9,15 @@ import pytest
 from typer.testing import CliRunner
 
 from tests import synthetic
-from tolstat import page
 from tolstat.analysis import exceedance
 from tolstat.cli import app
-from tolstat.errors import StoreError
-from tolstat.report import page as pages
-from tolstat.report.page import html as writer
-from tolstat.report.page import loads, pdf, verdict
-from tolstat.report.source import load
+from tolstat.common.errors import StoreError
+from tolstat.common.tables import Status
+from tolstat.report import compose as pages
+from tolstat.report import html as writer
+from tolstat.report import loads, page, pdf, verdict
 from tolstat.store import ResultStore
-from tolstat.tables import Status
+from tolstat.store.view import load
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
 TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(

@@ -9,10 +9,24 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from tolstat import ideal
-from tolstat.analysis import paper, paper_choices, paper_distances, paper_spectra, paper_statics
-from tolstat.files import data_dir
-from tolstat.tables import BUSHINGS, RESULT, Status
+from studies.cirelli2021 import (
+    choices as paper_choices,
+)
+from studies.cirelli2021 import (
+    distances as paper_distances,
+)
+from studies.cirelli2021 import (
+    spectra as paper_spectra,
+)
+from studies.cirelli2021 import (
+    statics as paper_statics,
+)
+from studies.cirelli2021 import (
+    tables as paper,
+)
+from tolstat.common.files import data_dir
+from tolstat.common.tables import BUSHINGS, RESULT, Status
+from tolstat.joint import ideal
 
 
 def test_printed_tables_have_128_entries_in_the_paper_s_order():

@@ -11,11 +11,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tolstat import campaign, files, report, study
-from tolstat.report import paper_checks, paper_equations, paper_source
-from tolstat.report.paper import context
+from studies.cirelli2021 import (
+    page_checks as paper_checks,
+)
+from studies.cirelli2021 import (
+    page_equations as paper_equations,
+)
+from studies.cirelli2021 import (
+    page_source as paper_source,
+)
+from studies.cirelli2021.page import context
+from tolstat import report, study
+from tolstat.campaign import run as campaign
+from tolstat.common import files
+from tolstat.common.tables import Status
 from tolstat.store import ResultStore
-from tolstat.tables import Status
 
 VARIANTS = """
 [[variant]]

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tolstat.analysis import paper_laws, paper_statements
-from tolstat.analysis.paper_evidence import Answer, Evidence, signed
+from studies.cirelli2021 import laws as paper_laws
+from studies.cirelli2021 import statements as paper_statements
+from studies.cirelli2021.evidence import Answer, Evidence, signed
+from tolstat.common.tables import BUSHINGS
 from tolstat.joint import Joint, load, varied
 from tolstat.joint.sections import BeamAxes
-from tolstat.tables import BUSHINGS
 
 CASES = ("ideal", "Pos fork +t", "Pos cross +t", "Ang fork +z", "Ang cross +z")
 ALPHA = np.radians([0.0, 15.0])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolstat.kernel.trail import closure_trend, combine, lag_closure, make_trail, note_closure
-from tolstat.simulation import simulate_rows
-from tolstat.tables import RESULT, Method, Motion, Options, Status
+from tolstat.common.tables import RESULT, Method, Motion, Options, Status
+from tolstat.kernel.revolution.trail import closure_trend, combine, lag_closure, make_trail, note_closure
+from tolstat.solver.simulation import simulate_rows
 
 RPM = np.pi / 30
 RATTLE = {"alpha": np.radians(30), "speed": 1000 * RPM, "torque": 5.0}

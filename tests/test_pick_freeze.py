@@ -10,13 +10,16 @@ from typer.testing import CliRunner
 
 from tests import fakes, synthetic
 from tests.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
-from tolstat import campaign, causes, cli, combine, joint, sampling, study
+from tolstat import cli, joint, sampling, study
 from tolstat.analysis import pick_freeze
-from tolstat.errors import InputError
-from tolstat.execution import Execution
+from tolstat.campaign import extend as combine
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
+from tolstat.common.errors import InputError
+from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.questions.causes import query as causes
 from tolstat.store import ResultStore
 from tolstat.study.rewriting import with_keys
-from tolstat.tables import RESULT, Simulation, Status
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)

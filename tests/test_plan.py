@@ -14,11 +14,14 @@ from typer.testing import CliRunner
 from tests import fakes, synthetic
 from tests.synthetic import HEAD
 from tests.test_campaign import datasets
-from tolstat import campaign, cli, plan, precision, report, study
+from tolstat import cli, report, study
 from tolstat.analysis import exceedance, quantile
-from tolstat.errors import InputError
+from tolstat.campaign import plan
+from tolstat.campaign import run as campaign
+from tolstat.campaign import stop_rule as precision
+from tolstat.common.errors import InputError
+from tolstat.common.tables import Status
 from tolstat.store import ResultStore
-from tolstat.tables import Status
 
 RULE = "P(cross1.F > 0.5 N) width < 0.4"
 """Nearly one in five of the fake joints is unresolved, and counts at both ends of the interval."""

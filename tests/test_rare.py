@@ -15,14 +15,16 @@ from typer.testing import CliRunner
 import tolstat
 from tests import fakes, synthetic
 from tests.test_campaign import datasets
-from tolstat import campaign, rare, sampling, study
+from tolstat import sampling, study
 from tolstat.analysis import subset
 from tolstat.analysis.subset import Settings, Walk
+from tolstat.campaign import run as campaign
+from tolstat.campaign.recall import recall
 from tolstat.cli import app
-from tolstat.errors import InputError, StoreError
-from tolstat.recall import recall
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import PARAM, RESULT, Simulation, Status
+from tolstat.questions.rare import query as rare
 from tolstat.store import ResultStore
-from tolstat.tables import PARAM, RESULT, Simulation, Status
 
 SEEDS = 500
 RHO = 0.6

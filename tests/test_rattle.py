@@ -10,11 +10,14 @@ import pytest
 
 from tests.conftest import REFERENCE
 from tests.test_refinement import assert_same
-from tolstat import ideal, joint, plan, sampling, simulation, stationary, study
+from tolstat import joint, sampling, study
 from tolstat.analysis import exceedance, weighted
-from tolstat.kernel.mesh import CELL, FIRST_LEVEL, LOW, SHAPING, UNKNOWN, next_level
-from tolstat.simulation import simulate_rows
-from tolstat.tables import PARAM, RESULT, Method, Motion, Options, Status
+from tolstat.campaign import plan
+from tolstat.common.tables import PARAM, RESULT, Method, Motion, Options, Status
+from tolstat.joint import ideal
+from tolstat.kernel.integrators.mesh import CELL, FIRST_LEVEL, LOW, SHAPING, UNKNOWN, next_level
+from tolstat.solver import simulation, stationary
+from tolstat.solver.simulation import simulate_rows
 
 STUDIES = Path(__file__).parent.parent / "studies"
 RPM = np.pi / 30

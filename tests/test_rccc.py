@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.conftest import REFERENCE
 from tests.naive import ARM_AXES, ARM_OF_PIN, PIN_AXES, triad
-from tolstat import ideal, rccc
-from tolstat.joint import Operation, nominal_errors
+from tolstat.joint import Operation, ideal, nominal_errors, rccc
 
 THETA = np.linspace(0, 2 * np.pi, 73) + 0.03
 TORQUE = 100.0

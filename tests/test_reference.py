@@ -7,9 +7,9 @@ import pytest
 
 from tests.conftest import REFERENCE
 from tolstat import joint, study
-from tolstat.reference import first_order, reference_rows
-from tolstat.simulation import simulate_rows
-from tolstat.tables import Options, Status
+from tolstat.common.tables import Options, Status
+from tolstat.solver.reference import first_order, reference_rows
+from tolstat.solver.simulation import simulate_rows
 
 OPTIONS = Options()
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolstat import joint, refinement, sampling, study
-from tolstat.remedy import remedy
-from tolstat.simulation import simulate_rows
-from tolstat.tables import RESULT, Method, Motion, Options, Status
+from tolstat import joint, sampling, study
+from tolstat.campaign.remedy import remedy
+from tolstat.common.tables import RESULT, Method, Motion, Options, Status
+from tolstat.solver import refinement
+from tolstat.solver.simulation import simulate_rows
 
 STUDIES = Path(__file__).parent.parent / "studies"
 PLAIN = Options(peak_substeps=1, max_refinements=0)

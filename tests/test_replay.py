@@ -14,12 +14,16 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from tests import synthetic
-from tolstat import campaign, cli, recorded, replay, sampling, study, tail, tolerance
-from tolstat.columns import RESULT_COLUMNS
-from tolstat.errors import InputError
-from tolstat.files import data_dir
-from tolstat.store import ResultStore, integrity
-from tolstat.tables import RESULT, Status
+from tolstat import cli, sampling, study
+from tolstat.campaign import replay
+from tolstat.campaign import run as campaign
+from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.errors import InputError
+from tolstat.common.files import data_dir
+from tolstat.common.tables import RESULT, Status
+from tolstat.questions.causes import tail
+from tolstat.store import ResultStore, integrity, recorded
+from tolstat.study.tolerances import distributions as tolerance
 
 HEAD = """
 [joint]

@@ -12,9 +12,12 @@ from matplotlib.text import Text
 
 from tests import synthetic
 from tolstat import report
-from tolstat.errors import InputError, StoreError
-from tolstat.report import exceedance, source, style, sweep, text
-from tolstat.tables import BUSHINGS, RESULT, Status
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import BUSHINGS, RESULT, Status
+from tolstat.display import style, text
+from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.questions.exceedance import sweep
+from tolstat.store import view as source
 
 
 def campaign(n=201, method="random", limits=None, **kwargs):

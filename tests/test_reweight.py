@@ -10,14 +10,23 @@ from scipy.stats import norm
 from typer.testing import CliRunner
 
 from tests import synthetic
-from tolstat import reweight as campaigns
 from tolstat import sampling, study
 from tolstat.analysis import reweight
 from tolstat.cli import app
-from tolstat.errors import InputError
+from tolstat.common.errors import InputError
+from tolstat.questions.reweight import query as campaigns
 from tolstat.store import ResultStore
 from tolstat.study.change import changed
-from tolstat.tolerance import Beta, LogNormal, Measured, Normal, Rayleigh, Triangular, TruncatedNormal, Uniform
+from tolstat.study.tolerances.distributions import (
+    Beta,
+    LogNormal,
+    Measured,
+    Normal,
+    Rayleigh,
+    Triangular,
+    TruncatedNormal,
+    Uniform,
+)
 
 SEEDS = 600
 LEVEL, NARROW = 2.0, 0.8
@@ -135,7 +144,7 @@ LIMITS = '"cross1.F" = "700 N"\n"fork*.T" = "40 N*m"\n"pin1.contact" = "800 N"\n
 def campaign(folder, text=CORRELATED, name="many"):
     """Campaign whose load cross1.F follows the errors by a formula."""
     path = synthetic.store(folder, text, name, simulated=0)
-    from tolstat.tables import Simulation
+    from tolstat.common.tables import Simulation
 
     with ResultStore.open(path, "r+") as store:
         results = synthetic.results(store.n)

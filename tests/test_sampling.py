@@ -13,9 +13,9 @@ from scipy import stats
 
 from tests.synthetic import HEAD
 from tolstat import sampling, study
-from tolstat.errors import InputError
+from tolstat.common.errors import InputError
+from tolstat.common.tables import ERROR, ERROR_FIELDS
 from tolstat.study import Study
-from tolstat.tables import ERROR, ERROR_FIELDS
 
 BASE = (
     HEAD

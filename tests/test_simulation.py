@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
-from tolstat import ideal, joint, simulation, study, trace
-from tolstat.kernel import dynamics
-from tolstat.kernel.work import FORCE, make_work
-from tolstat.simulation import restore, simulate_rows
-from tolstat.tables import RESULT, RESULTANT, SIMULATED, Method, Mode, Options, Start, Status
+from tolstat import joint, study
+from tolstat.campaign import trace
+from tolstat.common.tables import RESULT, RESULTANT, SIMULATED, Method, Mode, Options, Start, Status
+from tolstat.joint import ideal
+from tolstat.kernel.mechanics import dynamics
+from tolstat.kernel.mechanics.work import FORCE, make_work
+from tolstat.solver import simulation
+from tolstat.solver.simulation import restore, simulate_rows
 
 OPTIONS = Options()
 TWIST = {"pin1__tilt_z": 0.005, "pin3__offset_t": 3e-5, "hole2__tilt_t": -0.004, "hole4__offset_e": 4e-5}
@@ -301,7 +304,7 @@ PROBE = """
 import numpy as np
 from tolstat import joint
 from tolstat.kernel import dynamics, simulate
-from tolstat.tables import RESULT, Options
+from tolstat.common.tables import RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), joint.nominal_errors(1, operation))
 par = par.view(np.recarray)
@@ -353,8 +356,8 @@ print(counts)
 
 def test_a_second_process_finds_the_compiled_kernel():
     code = """
-from tolstat.kernel.lockstep import lockstep
-from tolstat.simulation import warm_up
+from tolstat.kernel.lanes.lockstep import lockstep
+from tolstat.solver.simulation import warm_up
 warm_up()
 print(sum(lockstep.stats.cache_hits.values()), sum(lockstep.stats.cache_misses.values()))
 """

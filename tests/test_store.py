@@ -16,12 +16,13 @@ import pytest
 
 import tolstat
 from tests import fakes, format_tables
-from tolstat import campaign, tables
-from tolstat.columns import ERROR_COLUMNS, RESULT_COLUMNS
-from tolstat.errors import StoreError
+from tolstat.campaign import run as campaign
+from tolstat.common import tables
+from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
+from tolstat.common.errors import StoreError
+from tolstat.common.tables import Simulation, Status
 from tolstat.store import Counts, ResultStore, provenance
 from tolstat.store.result_file import text
-from tolstat.tables import Simulation, Status
 
 
 def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
@@ -145,7 +146,7 @@ def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
 def in_another_process(path: Path, code: str) -> str:
     """Run code on a result file opened for writing as `store`; gives what it prints, or why it cannot be opened."""
     program = (
-        "from tolstat.errors import StoreError\nfrom tolstat.store import ResultStore\n"
+        "from tolstat.common.errors import StoreError\nfrom tolstat.store import ResultStore\n"
         f"try:\n    with ResultStore.open({str(path)!r}, 'r+') as store: {code}\n"
         "except StoreError as error: print(error)"
     )

@@ -13,13 +13,14 @@ import pytest
 from pydantic_core import PydanticCustomError
 
 from tests.synthetic import HEAD
-from tolstat import study, tables
-from tolstat.errors import InputError
+from tolstat import study
+from tolstat.common import tables
+from tolstat.common.errors import InputError
+from tolstat.common.units import to_si, written
 from tolstat.study import Study, load_case
 from tolstat.study import file as study_file
 from tolstat.study.model import Solver
-from tolstat.tolerance import Normal, Rayleigh
-from tolstat.units import to_si, written
+from tolstat.study.tolerances.distributions import Normal, Rayleigh
 
 STUDIES = Path(__file__).parent.parent / "studies"
 

@@ -24,13 +24,13 @@ import pytest
 
 from tests import fakes
 from tests.test_campaign import datasets, start
-from tolstat import campaign
-from tolstat.errors import InputError, StoreError
-from tolstat.execution import MAX_BLOCK, Execution, Pace, without_simulation
-from tolstat.retry import Retry, parse
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import MAX_BLOCK, Execution, Pace, without_simulation
+from tolstat.campaign.retry import Retry, parse
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status
 from tolstat.store import Counts, ResultStore
 from tolstat.study.model import Solver
-from tolstat.tables import SIMULATED, Fidelity, Options, Simulation, Status
 
 LONG = bool(os.environ.get("TOLSTAT_LONG"))
 

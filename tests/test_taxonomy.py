@@ -12,12 +12,13 @@ from typer.testing import CliRunner
 
 from tests import fakes
 from tests.synthetic import HEAD
-from tolstat import campaign, cli, study
-from tolstat.errors import InputError
-from tolstat.execution import Execution
-from tolstat.retry import parse
+from tolstat import cli, study
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
+from tolstat.campaign.retry import parse
+from tolstat.common.errors import InputError
+from tolstat.common.tables import FAILED, Status
 from tolstat.store import ResultStore
-from tolstat.tables import FAILED, Status
 
 STUDY = (
     HEAD

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from tolstat import tolerance
-from tolstat.errors import InputError
-from tolstat.files import data_dir
-from tolstat.study.tolerance_entry import Site
-from tolstat.study.tolerance_kinds import KINDS, RADIAL_KINDS, distribution
-from tolstat.tolerance import Distribution
+from tolstat.common.errors import InputError
+from tolstat.common.files import data_dir
+from tolstat.study.tolerances import distributions as tolerance
+from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.entry import Site
+from tolstat.study.tolerances.kinds import KINDS, RADIAL_KINDS, distribution
 
 ISO = data_dir() / "iso2768.csv"
 U = np.concatenate([10.0 ** np.arange(-15, -2), np.linspace(0.01, 0.99, 99), 1 - 10.0 ** np.arange(-3.0, -16, -1)])

@@ -11,14 +11,17 @@ import pytest
 from typer.testing import CliRunner
 
 from tests import fakes, synthetic
-from tolstat import campaign, cli, joint, recorded, sampling, study, verify
+from tolstat import cli, joint, sampling, study
 from tolstat.analysis import accuracy
-from tolstat.errors import InputError, StoreError
-from tolstat.report import accuracy as tables
-from tolstat.report import exceedance, source
-from tolstat.store import ResultStore, verification
+from tolstat.campaign import run as campaign
+from tolstat.campaign import verify
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Method, Options, Start, Status
+from tolstat.questions.exceedance import accuracy as tables
+from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.store import ResultStore, recorded, verification
+from tolstat.store import view as source
 from tolstat.store.verification import Check, Verification
-from tolstat.tables import Method, Options, Start, Status
 
 REAL = """
 [joint]

@@ -17,34 +17,34 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tolstat.allocate import of_store as allocated
     from tolstat.analysis.capability import at as capability
     from tolstat.analysis.exceedance import at as exceedance
     from tolstat.analysis.quantile import at as quantile
     from tolstat.analysis.weighted import at as weighted_exceedance
-    from tolstat.angles import of_store as against_angle
-    from tolstat.campaign import run
-    from tolstat.causes import of_store as causes_of
-    from tolstat.compare import of_stores as compared
-    from tolstat.duration import of_store as time_above
-    from tolstat.errors import InputError, StoreError, TolstatError
-    from tolstat.fatigue import read as load_cycles
-    from tolstat.integration import integrate
+    from tolstat.campaign.run import run
+    from tolstat.campaign.trace import simulate_case
+    from tolstat.common.errors import InputError, StoreError, TolstatError
+    from tolstat.common.tables import Status
     from tolstat.joint import perturb
-    from tolstat.multifidelity import run as two_fidelities
-    from tolstat.page import write as write_page
-    from tolstat.pylife import series as pylife_series
-    from tolstat.rare import of_study as rare_event
+    from tolstat.questions.allocate.query import of_store as allocated
+    from tolstat.questions.causes.angles import of_store as against_angle
+    from tolstat.questions.causes.query import of_store as causes_of
+    from tolstat.questions.causes.tail import worst as worst_joints
+    from tolstat.questions.compare.query import of_stores as compared
+    from tolstat.questions.fatigue.pylife import series as pylife_series
+    from tolstat.questions.fatigue.query import read as load_cycles
+    from tolstat.questions.fatigue.rendering import equivalent_loads
+    from tolstat.questions.multifidelity.query import run as two_fidelities
+    from tolstat.questions.rare.query import of_study as rare_event
+    from tolstat.questions.reweight.query import of_store as reweighted
+    from tolstat.questions.time_above.query import of_store as time_above
     from tolstat.report import write as write_report
-    from tolstat.report.fatigue import equivalent_loads
-    from tolstat.reweight import of_store as reweighted
+    from tolstat.report.page import write as write_page
+    from tolstat.report.summary import of_store as statistics
     from tolstat.sampling import draw
-    from tolstat.simulation import simulate_rows
+    from tolstat.solver.integrate import integrate
+    from tolstat.solver.simulation import simulate_rows
     from tolstat.study import load, load_case
-    from tolstat.summary import of_store as statistics
-    from tolstat.tables import Status
-    from tolstat.tail import worst as worst_joints
-    from tolstat.trace import simulate_case
 
 __version__ = "0.1.0"
 
@@ -84,37 +84,37 @@ __all__ = [
 ]
 
 _HOMES = {
-    "InputError": "tolstat.errors:InputError",
-    "Status": "tolstat.tables:Status",
-    "StoreError": "tolstat.errors:StoreError",
-    "TolstatError": "tolstat.errors:TolstatError",
-    "against_angle": "tolstat.angles:of_store",
-    "allocated": "tolstat.allocate:of_store",
+    "InputError": "tolstat.common.errors:InputError",
+    "Status": "tolstat.common.tables:Status",
+    "StoreError": "tolstat.common.errors:StoreError",
+    "TolstatError": "tolstat.common.errors:TolstatError",
+    "against_angle": "tolstat.questions.causes.angles:of_store",
+    "allocated": "tolstat.questions.allocate.query:of_store",
     "capability": "tolstat.analysis.capability:at",
-    "causes_of": "tolstat.causes:of_store",
-    "compared": "tolstat.compare:of_stores",
+    "causes_of": "tolstat.questions.causes.query:of_store",
+    "compared": "tolstat.questions.compare.query:of_stores",
     "draw": "tolstat.sampling:draw",
-    "equivalent_loads": "tolstat.report.fatigue:equivalent_loads",
+    "equivalent_loads": "tolstat.questions.fatigue.rendering:equivalent_loads",
     "exceedance": "tolstat.analysis.exceedance:at",
-    "integrate": "tolstat.integration:integrate",
+    "integrate": "tolstat.solver.integrate:integrate",
     "load": "tolstat.study:load",
     "load_case": "tolstat.study:load_case",
-    "load_cycles": "tolstat.fatigue:read",
+    "load_cycles": "tolstat.questions.fatigue.query:read",
     "open": "tolstat.store:ResultStore.open",
     "perturb": "tolstat.joint:perturb",
-    "pylife_series": "tolstat.pylife:series",
+    "pylife_series": "tolstat.questions.fatigue.pylife:series",
     "quantile": "tolstat.analysis.quantile:at",
-    "rare_event": "tolstat.rare:of_study",
-    "reweighted": "tolstat.reweight:of_store",
-    "run": "tolstat.campaign:run",
-    "simulate_case": "tolstat.trace:simulate_case",
-    "simulate_rows": "tolstat.simulation:simulate_rows",
-    "statistics": "tolstat.summary:of_store",
-    "time_above": "tolstat.duration:of_store",
-    "two_fidelities": "tolstat.multifidelity:run",
+    "rare_event": "tolstat.questions.rare.query:of_study",
+    "reweighted": "tolstat.questions.reweight.query:of_store",
+    "run": "tolstat.campaign.run:run",
+    "simulate_case": "tolstat.campaign.trace:simulate_case",
+    "simulate_rows": "tolstat.solver.simulation:simulate_rows",
+    "statistics": "tolstat.report.summary:of_store",
+    "time_above": "tolstat.questions.time_above.query:of_store",
+    "two_fidelities": "tolstat.questions.multifidelity.query:run",
     "weighted_exceedance": "tolstat.analysis.weighted:at",
-    "worst_joints": "tolstat.tail:worst",
-    "write_page": "tolstat.page:write",
+    "worst_joints": "tolstat.questions.causes.tail:worst",
+    "write_page": "tolstat.report.page:write",
     "write_report": "tolstat.report:write",
 }
 

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from tolstat import origins
+from tolstat.common import draw_records as origins
+from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import nominal_errors
 from tolstat.study import Study
 from tolstat.study.design import Design, sobol
 from tolstat.study.model import SweepAxis
 from tolstat.study.proposal import component, weights
 from tolstat.study.selection import columns_of
-from tolstat.tables import ERROR_FIELDS
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]

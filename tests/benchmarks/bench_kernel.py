@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import REFERENCE
-from tolstat import simulation, study
-from tolstat.bench import iteration, joints
-from tolstat.bench.split import Once
-from tolstat.kernel import parts
-from tolstat.tables import Fidelity
+from tolstat import study
+from tolstat.benchmarks import iteration, joints, parts
+from tolstat.benchmarks.split import Once
+from tolstat.common.tables import Fidelity
+from tolstat.solver import simulation
 
 pytest.importorskip("pytest_benchmark")
 STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"

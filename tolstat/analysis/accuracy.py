@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import BUSHINGS, PINS, SIMULATED, Status
+from tolstat.common.tables import BUSHINGS, PINS, SIMULATED, Status
 
 FloatArray = NDArray[np.float64]
 

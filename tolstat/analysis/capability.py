@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import exceedance, quantile
 from tolstat.analysis.exceedance import Exceedance, FloatArray
-from tolstat.tables import Status
+from tolstat.common.tables import Status
 
 REFERENCE = 0.9986501019683699
 """Share of a normal distribution below mean + 3 sigma."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.tables import UNSETTLED, VALID, Status
+from tolstat.common.tables import UNSETTLED, VALID, Status
 
 FloatArray = NDArray[np.float64]
 Table = NDArray[np.void]

@@ -18,7 +18,7 @@ from scipy.special import betaincinv
 from tolstat.analysis.exceedance import CURVE, Exceedance, FloatArray, Table, clopper_pearson
 from tolstat.analysis.quantile import Quantile
 from tolstat.analysis.reweight import smooth
-from tolstat.tables import UNSETTLED, VALID, Status
+from tolstat.common.tables import UNSETTLED, VALID, Status
 
 LEAST_EFFECTIVE = 20.0
 """Effective number of joints above a level below which its share is to be taken with care."""

@@ -15,14 +15,14 @@ import typer
 from typer.core import TyperGroup
 
 from tolstat import __version__
-from tolstat.errors import Fault, InputError, TolstatError
+from tolstat.common.errors import Fault, InputError, TolstatError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from tolstat.common.tables import Variant
     from tolstat.joint import Joint
     from tolstat.report import Report
-    from tolstat.tables import Variant
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which load is exceeded by which share of the joints."
 EPILOG = "Exit codes: 0 done, 1 internal error, 2 input that cannot be used, 130 interrupted, 143 terminated."
@@ -98,7 +98,7 @@ def tell(report: Report) -> None:
 
 
 def announce_compilation() -> None:
-    from tolstat.simulation import is_compiled
+    from tolstat.solver.simulation import is_compiled
 
     if not is_compiled():
         say("compiling the kernels for this machine: about a minute, this once")
@@ -113,7 +113,7 @@ def as_text(summary: dict[str, Any]) -> str:
 @contextmanager
 def writing(path: Path) -> Iterator[Path]:
     """Yield a temporary file that becomes `path`; what hinders that is the user's to mend."""
-    from tolstat import files
+    from tolstat.common import files
 
     try:
         with files.writing(path) as temporary:

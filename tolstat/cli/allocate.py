@@ -37,9 +37,9 @@ def allocate(
     other half judges the choice. Where the joints cannot tell, the verdict is "needs new runs", and what is proposed is
     a study to run next. A joint without a valid load counts as above the limits.
     """
-    from tolstat import allocate as source
-    from tolstat.files import check_target
-    from tolstat.report import text
+    from tolstat.common.files import check_target
+    from tolstat.display import text
+    from tolstat.questions.allocate import query as source
     from tolstat.store import ResultStore
     from tolstat.study.scaling import line
 

@@ -30,8 +30,8 @@ def bench(
     """
     from importlib.util import find_spec
 
-    from tolstat.bench import run
-    from tolstat.report import bench as page
+    from tolstat.benchmarks import run
+    from tolstat.benchmarks import text as page
 
     announce_compilation()
     found = run.bench(study_file, n, quick, cold, say)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tolstat.cli._app import ResultFile, as_text, say
-from tolstat.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, InputError, StoreError
 
 
 def capability(
@@ -23,10 +23,10 @@ def capability(
     With --one-in also the loads that one in N joints exceeds, and the median of the largest of N joints, from a
     generalised Pareto tail; N may be more than the joints simulated, and the intervals tell what that is worth.
     """
-    from tolstat.report import capability as tables
-    from tolstat.report import text
-    from tolstat.report.source import LOAD_FIELDS, read
+    from tolstat.display import text
+    from tolstat.questions.capability import rendering as tables
     from tolstat.store import ResultStore
+    from tolstat.store.view import LOAD_FIELDS, read
 
     with ResultStore.open(file) as store:
         campaign = read(store, LOAD_FIELDS, ())

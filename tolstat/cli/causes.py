@@ -10,7 +10,7 @@ import typer
 
 from tolstat.cli._app import Workers, announce_compilation, as_text, say, writing
 from tolstat.cli.extend import StudyFile
-from tolstat.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError
 
 
 class Groups(StrEnum):
@@ -68,9 +68,9 @@ def causes(
             raise InputError([Fault("--against-angle", "does not go with --pick-freeze", "give one of the two")])
         _against_angle(file, by, n, log, against_angle, joints, study_file)
         return
-    from tolstat import causes as source
-    from tolstat.report import causes as report
-    from tolstat.report import text
+    from tolstat.display import text
+    from tolstat.questions.causes import query as source
+    from tolstat.questions.causes import rendering as report
     from tolstat.store import ResultStore
 
     if points is not None:
@@ -91,8 +91,8 @@ def causes(
 def _run_design(path: Path, points: int, groups: Groups, out: Path | None, workers: int | None) -> Path:
     """Simulate a pick-freeze design of a study; returns the result file."""
     from tolstat import study
+    from tolstat.campaign.blocks import Execution
     from tolstat.cli.run import carry_out
-    from tolstat.execution import Execution
     from tolstat.study.rewriting import with_keys
 
     keys = {"method": "pick_freeze", "n": points, "groups": groups.value}
@@ -103,11 +103,11 @@ def _run_design(path: Path, points: int, groups: Groups, out: Path | None, worke
 
 
 def _against_angle(file: Path, by: str, n: int, log: bool, out: Path, joints: int, study_file: Path | None) -> None:
-    from tolstat import angles, revolutions
-    from tolstat.files import check_target
-    from tolstat.recall import recall
-    from tolstat.report import angles as report
-    from tolstat.store import ResultStore
+    from tolstat.campaign.recall import recall
+    from tolstat.common.files import check_target
+    from tolstat.questions.causes import angles
+    from tolstat.questions.causes import angles_figure as report
+    from tolstat.store import ResultStore, revolutions
 
     picture = out.with_suffix(".png")
     for path in (out, picture):

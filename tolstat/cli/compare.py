@@ -29,9 +29,9 @@ def compare(
     seed are compared one by one, so that small differences show. Writes curves and the differences as pictures and
     CSV, and the joints that changed the side of a limit.
     """
-    from tolstat import compare as source
-    from tolstat.report import compare as report
-    from tolstat.report import text
+    from tolstat.display import text
+    from tolstat.questions.compare import query as source
+    from tolstat.questions.compare import rendering as report
     from tolstat.store import ResultStore
 
     with ResultStore.open(a) as one, ResultStore.open(b) as other:

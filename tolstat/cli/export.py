@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tolstat.cli._app import ResultFile, as_text, say, writing
-from tolstat.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from typing import TextIO
@@ -53,7 +53,7 @@ def export(
     With --pylife one row a joint, channel and class of range and mean: cycles per revolution, for files whose study
     keeps cycles or load histories. See docs/fatigue.md for the lines that read it as a Series.
     """
-    from tolstat.files import check_target
+    from tolstat.common.files import check_target
     from tolstat.store import ResultStore
 
     given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--json": statistics}
@@ -96,7 +96,7 @@ def _write(out: str, write: Callable[[TextIO], object], what: str) -> None:
 
 
 def _collectives(store: ResultStore) -> tuple[Callable[[TextIO], None], str]:
-    from tolstat import pylife
+    from tolstat.questions.fatigue import pylife
 
     table = pylife.table(pylife.series(store))
     what = f"cycles of {table['joint'].nunique()} joints"
@@ -104,8 +104,9 @@ def _collectives(store: ResultStore) -> tuple[Callable[[TextIO], None], str]:
 
 
 def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
-    from tolstat import causes, summary
-    from tolstat.report import text
+    from tolstat.display import text
+    from tolstat.questions.causes import query as causes
+    from tolstat.report import summary
 
     found = summary.of_store(store)
     asked = {load: causes.of_store(store, load) for load in by}

@@ -28,8 +28,8 @@ def extend(
     The next joints of its sequence are drawn and simulated; no joint that FILE holds changes. FILE is then the
     same as that of a campaign of N joints. Stopped with Ctrl-C, run STUDY --n N --out FILE goes on.
     """
-    from tolstat import combine
-    from tolstat.execution import Execution
+    from tolstat.campaign import extend as combine
+    from tolstat.campaign.blocks import Execution
 
     plan = combine.extend(file, n, study_file)
     say(f"{file}: extended to {n} joints")

@@ -32,10 +32,10 @@ def fatigue(
     lines are those of the section [fatigue] of the (first) study. Without --channel the most loaded component of each
     bushing's force and torque is printed, and all channels are written.
     """
-    from tolstat import fatigue as source
-    from tolstat.files import check_target
-    from tolstat.report import fatigue as tables
-    from tolstat.report import text
+    from tolstat.common.files import check_target
+    from tolstat.display import text
+    from tolstat.questions.fatigue import query as source
+    from tolstat.questions.fatigue import rendering as tables
 
     if csv:
         check_target(csv, *files)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tolstat.cli._app import Workers, announce_compilation, as_text, make_folder, say
-from tolstat.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather
 
 
 def multifidelity(
@@ -37,10 +37,11 @@ def multifidelity(
     A pilot tells costs and correlation, and by them how many joints each gets; "no gain" where the dear one alone is
     as good. Both result files are ordinary ones. Stopped with Ctrl-C, the same command goes on where it was.
     """
-    from tolstat import campaign, study
-    from tolstat import multifidelity as fidelities
+    from tolstat import study
+    from tolstat.campaign import run as campaign
     from tolstat.cli.run import seconds_of
-    from tolstat.report import text
+    from tolstat.display import text
+    from tolstat.questions.multifidelity import query as fidelities
 
     faults: list[Fault] = []
     with gather(faults):

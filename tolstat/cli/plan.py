@@ -10,7 +10,7 @@ import typer
 from tolstat.cli._app import Workers, announce_compilation, as_text, warn
 
 if TYPE_CHECKING:
-    from tolstat.plan import Plan
+    from tolstat.campaign.plan import Plan
 
 
 def plan(
@@ -29,8 +29,8 @@ def plan(
     """
     from dataclasses import asdict
 
-    from tolstat import plan as plans
     from tolstat import study
+    from tolstat.campaign import plan as plans
 
     loaded = study.load(study_file, n=n)
     warn(study_file, loaded.joints, loaded.variants)

@@ -10,10 +10,10 @@ import typer
 
 from tolstat.cli._app import Workers, announce_compilation, as_text, say
 from tolstat.cli.extend import StudyFile
-from tolstat.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
-    from tolstat.rare import Found
+    from tolstat.questions.rare.query import Found
     from tolstat.study import Study
 
 
@@ -53,11 +53,11 @@ def rare(
     stopped with Ctrl-C or killed, the same command goes on where it was. For what the interval does not cover, see
     docs/rare_events.md.
     """
-    from tolstat import campaign
-    from tolstat import rare as simulation
-    from tolstat.executor import WorkerDied
-    from tolstat.report import rare as tables
-    from tolstat.report import text
+    from tolstat.campaign import run as campaign
+    from tolstat.campaign.executors import WorkerDied
+    from tolstat.display import text
+    from tolstat.questions.rare import query as simulation
+    from tolstat.questions.rare import rendering as tables
 
     given = {"n": n, "p0": p0, "seed": seed, "unresolved": None if unresolved is None else unresolved.value}
     given = {name: value for name, value in given.items() if value is not None}
@@ -86,7 +86,7 @@ def rare(
 
 def _plan(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
     from tolstat import study
-    from tolstat.rare import asked, parse
+    from tolstat.questions.rare.query import asked, parse
 
     faults: list[Fault] = []
     if limit is None:
@@ -102,8 +102,8 @@ def _plan(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
 
 
 def _recalled(source: Path, study_file: Path | None, given: list[Any]) -> Study:
-    from tolstat.errors import StoreError
-    from tolstat.recall import recall
+    from tolstat.campaign.recall import recall
+    from tolstat.common.errors import StoreError
     from tolstat.store import ResultStore
 
     with ResultStore.open(source) as store:

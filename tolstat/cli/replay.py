@@ -11,7 +11,7 @@ from tolstat.cli._app import ResultFile, announce_compilation, as_text, say
 from tolstat.cli.simulate import case_text, judge, write_trace
 
 if TYPE_CHECKING:
-    from tolstat.replay import Replay
+    from tolstat.campaign.replay import Replay
 
 
 def replay(
@@ -27,8 +27,8 @@ def replay(
     Its joint, errors and settings are those in FILE. Says whether every stored value comes out the same to the
     last bit, as on the machine and with the versions that made the file it must; exit code 1 if not.
     """
-    from tolstat import replay as replays
-    from tolstat.files import check_target
+    from tolstat.campaign import replay as replays
+    from tolstat.common.files import check_target
     from tolstat.store import ResultStore
 
     if out is not None:

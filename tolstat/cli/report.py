@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tolstat.cli._app import ResultFile, announce_compilation, make_folder, say, tell
-from tolstat.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather
 
 PAGES = (".html", ".htm")
 
@@ -67,12 +67,12 @@ def report(
 
 
 def _page(file: Path, out: Path | None, page: Path | None, pdf: bool, accept: str | None, again: int) -> None:
-    from tolstat.executor.common import THREAD_VARIABLES
+    from tolstat.campaign.executors.common import THREAD_VARIABLES
 
     for name in THREAD_VARIABLES:  # many small products: threads of BLAS cost more than they give
         os.environ.setdefault(name, "1")
-    from tolstat import page as pages
-    from tolstat.files import check_target
+    from tolstat.common.files import check_target
+    from tolstat.report import page as pages
     from tolstat.store import ResultStore
 
     faults: list[Fault] = []
@@ -105,7 +105,7 @@ def share_of(text: str) -> float:
     """
     from pydantic_core import PydanticCustomError
 
-    from tolstat.units import to_si
+    from tolstat.common.units import to_si
 
     try:
         share = to_si(text, "1")

@@ -24,8 +24,8 @@ def reweight(
     Each joint is weighted by how much more often the new tolerances make it. Where few joints have most of the weight
     the verdict is "needs new runs", and the table is not to be trusted.
     """
-    from tolstat import reweight as source
-    from tolstat.report import text
+    from tolstat.display import text
+    from tolstat.questions.reweight import query as source
     from tolstat.store import ResultStore
 
     with ResultStore.open(file) as store:

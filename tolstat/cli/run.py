@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tolstat.cli._app import Workers, announce_compilation, say, tell, warn
-from tolstat.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
     from tolstat.store import Counts
@@ -79,8 +79,8 @@ def run(
     where it was.
     """
     from tolstat import study
-    from tolstat.execution import Execution
-    from tolstat.retry import parse
+    from tolstat.campaign.blocks import Execution
+    from tolstat.campaign.retry import parse
 
     faults: list[Fault] = []
     limit, part, again = 0.0, None, None
@@ -144,8 +144,8 @@ def slice_of(text: str) -> range:
 
 def carry_out(plan: Study, path: Path, report: bool, until: str | None = None, **choices: Any) -> None:
     """Simulate what is pending, with progress on stderr, and report; `choices` go to `campaign.run`."""
-    from tolstat import campaign
-    from tolstat.executor import WorkerDied
+    from tolstat.campaign import run as campaign
+    from tolstat.campaign.executors import WorkerDied
 
     try:
         counts = _campaign_until(until, plan, path, **choices) if until else _campaign(plan, path, **choices)
@@ -163,7 +163,8 @@ def carry_out(plan: Study, path: Path, report: bool, until: str | None = None, *
 
 
 def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat import campaign, progress
+    from tolstat.campaign import progress
+    from tolstat.campaign import run as campaign
 
     announce_compilation()
     with progress.reporter() as reporter:
@@ -171,7 +172,9 @@ def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:
 
 
 def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat import campaign, precision, progress
+    from tolstat.campaign import progress
+    from tolstat.campaign import run as campaign
+    from tolstat.campaign import stop_rule as precision
     from tolstat.store import ResultStore
 
     rule = precision.parse(text)

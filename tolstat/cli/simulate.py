@@ -10,7 +10,7 @@ import typer
 from tolstat.cli._app import announce_compilation, as_text, say, warn, writing
 
 if TYPE_CHECKING:
-    from tolstat.trace import CaseResult
+    from tolstat.campaign.trace import CaseResult
 
 
 def simulate(
@@ -24,8 +24,9 @@ def simulate(
 
     The loads are those of the last revolution, cross bushings 1 to 4 and fork bushings 1 to 4.
     """
-    from tolstat import study, trace
-    from tolstat.files import check_target
+    from tolstat import study
+    from tolstat.campaign import trace
+    from tolstat.common.files import check_target
 
     if out is not None:
         check_target(out, case)
@@ -42,7 +43,7 @@ def simulate(
 
 def case_text(summary: dict[str, Any]) -> str:
     """Text of `CaseResult.summary`."""
-    from tolstat.report.text import align
+    from tolstat.display.text import align
 
     def value(load: float | None) -> str:
         return "-" if load is None else f"{load:.6g}"
@@ -55,7 +56,7 @@ def case_text(summary: dict[str, Any]) -> str:
 
 def judge(summary: dict[str, Any], remedy: str) -> None:
     """Warn of a joint without valid results."""
-    from tolstat.tables import STATUS_TEXT, Status
+    from tolstat.common.tables import STATUS_TEXT, Status
 
     state = Status[str(summary["status"]).upper()]
     if state != Status.OK:

@@ -40,9 +40,9 @@ def _summary(store: ResultStore) -> dict[str, Any]:
     """What there is to say, read some rows at a time; blocks of pending ones are not read."""
     import numpy as np
 
-    from tolstat.report import source
+    from tolstat.common.tables import Status
+    from tolstat.store import view as source
     from tolstat.store.reader import BLOCK
-    from tolstat.tables import Status
 
     states = np.full(store.n, Status.PENDING, np.uint8)
     loads, units, damaged = {name: np.zeros(store.n) for name in store.limits}, {}, 0

@@ -31,9 +31,9 @@ def time_above(
     Beside it stands the share of the joints that are above the level at any time. For files whose study keeps load
     histories, in full or as harmonics.
     """
-    from tolstat import duration as source
-    from tolstat.report import duration as report
-    from tolstat.report import text
+    from tolstat.display import text
+    from tolstat.questions.time_above import query as source
+    from tolstat.questions.time_above import rendering as report
     from tolstat.store import ResultStore
 
     with ResultStore.open(file) as store:

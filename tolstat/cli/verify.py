@@ -33,11 +33,12 @@ def verify(
     reference (scipy's Radau). Prints how far the largest loads are off, relative to the largest of the kind in the
     joint. Of a result file the joints are those that it holds, and what is found is kept in it for the report.
     """
-    from tolstat import progress
-    from tolstat import verify as verification
-    from tolstat.executor import available_workers
-    from tolstat.files import check_target
-    from tolstat.report import accuracy, text
+    from tolstat.campaign import progress
+    from tolstat.campaign import verify as verification
+    from tolstat.campaign.executors import available_workers
+    from tolstat.common.files import check_target
+    from tolstat.display import text
+    from tolstat.questions.exceedance import accuracy
 
     if out is not None:
         check_target(out, what)
@@ -58,7 +59,7 @@ def verify(
 
 def _summary(found: Verification) -> dict[str, Any]:
     """Distributions as plain values, None where nothing is known: by check and kind of load, and by load."""
-    from tolstat.report import accuracy
+    from tolstat.questions.exceedance import accuracy
 
     facts: dict[str, Any] = {"rows": found.rows.tolist(), "seed": found.seed}
     facts["checks"] = {name: check.description for name, check in found.checks.items()}

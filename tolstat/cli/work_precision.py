@@ -28,9 +28,8 @@ def work_precision(
     Prints who is ahead at a given error; writes COMPARISON.md, .csv, .png and .svg: page, every setting, figure. Use a
     quiet machine.
     """
-    from tolstat.comparison import measure, setup
-    from tolstat.report import comparison as page
-    from tolstat.report import marks
+    from tolstat.benchmarks.work_precision import measure, page, setup
+    from tolstat.display import marks
 
     asked, base = setup.load(file, quick)
     if into is not None:

@@ -10,7 +10,7 @@ from tolstat.cli._app import ResultFile, as_text, say
 from tolstat.cli.extend import StudyFile
 
 if TYPE_CHECKING:
-    from tolstat.tail import Tail
+    from tolstat.questions.causes.tail import Tail
 
 SHOWN = 5
 """Errors of a joint that the table shows; ``--json`` gives all."""
@@ -28,7 +28,7 @@ def worst(
     Errors are given in sigma: where in its own distribution each lies, as the standard score of the same probability,
     the largest first.
     """
-    from tolstat import tail
+    from tolstat.questions.causes import tail
     from tolstat.store import ResultStore
 
     with ResultStore.open(file) as store:
@@ -42,7 +42,7 @@ def worst(
 
 
 def _table(found: Tail, by: str) -> str:
-    from tolstat.report.text import align
+    from tolstat.display.text import align
 
     unit = f" [{found.unit}]" if found.unit != "1" else ""
     rows = [["row", f"{by}{unit}", "status", "errors in sigma, the largest first"]]

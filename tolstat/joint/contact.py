@@ -13,7 +13,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from tolstat import units
+from tolstat.common import units
+from tolstat.common.strict import Strict, refuse
+from tolstat.common.tables import MAX_STATIONS
 from tolstat.joint import material
 from tolstat.joint.sections import (
     NOT_NEGATIVE,
@@ -27,8 +29,6 @@ from tolstat.joint.sections import (
     Stiffness,
     needed,
 )
-from tolstat.schema import Strict, refuse
-from tolstat.tables import MAX_STATIONS
 
 QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
 Damping = Annotated[units.Damping, NOT_NEGATIVE]

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationInfo, field_validator
 
-from tolstat import schema
-from tolstat.errors import Fault, InputError
-from tolstat.files import data_dir
+from tolstat.common import strict as schema
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import data_dir
+from tolstat.common.strict import Strict, refuse
 from tolstat.joint.contact import Contact, of_its_law
 from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
-from tolstat.schema import Strict, refuse
 
 
 class Joint(Strict):

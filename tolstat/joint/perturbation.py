@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator
 
-from tolstat import units
+from tolstat.common import units
+from tolstat.common.strict import Strict, refuse
+from tolstat.common.tables import ERROR, HOLES, MAX_STATIONS, PARAM, PINS
 from tolstat.joint import material
 from tolstat.joint.contact import Contact
 from tolstat.joint.model import Joint
 from tolstat.joint.sections import Array
-from tolstat.kernel.topology import ARM, ARM_OF_PIN, PIN, TRIAD
-from tolstat.schema import Strict, refuse
-from tolstat.tables import ERROR, HOLES, MAX_STATIONS, PARAM, PINS
+from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
 Table = NDArray[np.void]
 

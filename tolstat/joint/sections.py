@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from tolstat import units
+from tolstat.common import units
+from tolstat.common.strict import Strict, refuse
 from tolstat.joint import material
-from tolstat.schema import Strict, refuse
 
 Array = NDArray[np.float64]
 

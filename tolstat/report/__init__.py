@@ -9,12 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tolstat import fidelity
-from tolstat.errors import Fault, InputError
-from tolstat.files import writing
-from tolstat.report import text
-from tolstat.report.source import LOAD_FIELDS, Campaign, read
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import writing
+from tolstat.display import text
+from tolstat.solver import fidelity
 from tolstat.store import ResultStore
+from tolstat.store.view import LOAD_FIELDS, Campaign, read
 
 
 class Report(NamedTuple):
@@ -99,7 +99,8 @@ def _noted(report: Report, note: str) -> Report:
 
 
 def _exceedance(campaign: Campaign, stem: Path) -> Report:
-    from tolstat.report import exceedance, style
+    from tolstat.display import style
+    from tolstat.questions.exceedance import rendering as exceedance
 
     files, table = [], "no largest load is kept; the results that are: tolstat export"
     if campaign.drawn:
@@ -117,7 +118,8 @@ def _exceedance(campaign: Campaign, stem: Path) -> Report:
 
 
 def _sweep(campaign: Campaign, stem: Path) -> Report:
-    from tolstat.report import style, sweep
+    from tolstat.display import style
+    from tolstat.questions.exceedance import sweep
 
     files = style.save(sweep.figure(campaign), stem.with_name(f"{stem.name}_sweep")) if campaign.drawn else []
     files.append(text.csv(sweep.table(campaign), stem, "sweep"))
@@ -125,13 +127,15 @@ def _sweep(campaign: Campaign, stem: Path) -> Report:
 
 
 def _accuracy(campaign: Campaign) -> str:
-    from tolstat.report import accuracy
+    from tolstat.questions.exceedance import accuracy
 
     return f"\n{accuracy.note(campaign.verification)}" if campaign.verification else ""
 
 
 def _cases(store: ResultStore, stem: Path) -> Report:
-    from tolstat.report import cases, paper, paper_source
+    from studies.cirelli2021 import page as paper
+    from studies.cirelli2021 import page_source as paper_source
+    from tolstat.report import cases
 
     full = cases.table(store)
     files = [text.csv(full, stem, "cases")]

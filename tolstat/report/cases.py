@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from tolstat import kept
-from tolstat.analysis import accuracy, paper
-from tolstat.remedy import remedy
+from studies.cirelli2021 import tables as paper
+from tolstat.analysis import accuracy
+from tolstat.campaign.remedy import remedy
+from tolstat.common import selected_results as kept
+from tolstat.common.tables import BUSHINGS, Motion, Status
 from tolstat.store import verification
 from tolstat.study.design import IDEAL
-from tolstat.tables import BUSHINGS, Motion, Status
 
 if TYPE_CHECKING:
+    from tolstat.common.tables import Variant
     from tolstat.store import ResultStore
-    from tolstat.tables import Variant
 
 
 def table(store: ResultStore) -> pd.DataFrame:

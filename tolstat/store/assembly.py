@@ -10,11 +10,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.files import writing
+from tolstat.common.files import writing
+from tolstat.common.tables import Status
 from tolstat.store.histories import HISTORY_BYTES, HistoryParts, attach_scales, create_dataset, rows_per_chunk
 from tolstat.store.reader import BLOCK, Reader, parts_folder
 from tolstat.store.result_file import campaign_digest, fault, fill
-from tolstat.tables import Status
 
 
 class Differing(Exception):

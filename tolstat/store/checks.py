@@ -14,11 +14,11 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tolstat import kept
-from tolstat.columns import ERROR_COLUMNS, LEDGER_COLUMNS
+from tolstat.common import selected_results as kept
+from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS
+from tolstat.common.tables import HistorySpec
 from tolstat.store import integrity
 from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, descriptions, fault, text
-from tolstat.tables import HistorySpec
 
 DAMAGED = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
 """What reading a damaged file raises, in h5py or in the code that trusts a file's attributes."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.tables import FAILED, Status
+from tolstat.common.tables import FAILED, Status
 
 
 class Counts(NamedTuple):

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import origins
-from tolstat.columns import ERROR_COLUMNS
-from tolstat.errors import Fault, InputError
-from tolstat.tables import Status
+from tolstat.common import draw_records as origins
+from tolstat.common.columns import ERROR_COLUMNS
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.tables import Status
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -20,9 +20,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.files import writing
+from tolstat.common.files import writing
+from tolstat.common.tables import HistorySpec
 from tolstat.store.result_file import fault, put_attributes
-from tolstat.tables import HistorySpec
 
 CHUNK_BYTES = 1 << 16
 """About how much of a history one compressed chunk holds."""

@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.columns import ERROR_COLUMNS, Column
+from tolstat.common.columns import ERROR_COLUMNS, Column
 
 Hash = NDArray[np.uint64]
 Described = tuple[tuple[Column, ...], NDArray[np.void]]

@@ -12,8 +12,8 @@ import tolstat
 
 LIBRARIES = ("numpy", "numba", "scipy", "h5py")
 DECIDING = (
-    *("kernel", "joint", "tables.py", "simulation.py", "refinement.py", "stationary.py", "rainflow.py"),
-    *("sampling.py", "tolerance.py", "study/correlation.py", "study/design.py", "study/proposal.py"),
+    *("kernel", "joint", "common/tables.py", "sampling.py", "study/tolerances", "study/design.py", "study/proposal.py"),
+    *("solver/simulation.py", "solver/refinement.py", "solver/stationary.py", "solver/rainflow.py"),
 )
 """Modules that decide the numbers of a campaign, given what its identity holds."""
 
@@ -30,7 +30,7 @@ def source_hash() -> str:
     digest = hashlib.sha256()
     for name in DECIDING:
         found = package / name
-        for path in sorted(found.glob("*.py")) if found.is_dir() else [found]:
+        for path in sorted(found.rglob("*.py")) if found.is_dir() else [found]:
             digest.update(path.relative_to(package).as_posix().encode())
             digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()[:16]

@@ -12,15 +12,16 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import kept, tables
-from tolstat.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
-from tolstat.errors import StoreError
+from tolstat.common import selected_results as kept
+from tolstat.common import tables
+from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common.errors import StoreError
+from tolstat.common.tables import Status, Variant
 from tolstat.store import checks, integrity
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
 from tolstat.store.histories import HistoryParts
 from tolstat.store.result_file import campaign_digest, descriptions, fault, is_locked, open_hdf5, text
-from tolstat.tables import Status, Variant
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,13 +17,15 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import kept, origins, tables
-from tolstat.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
-from tolstat.errors import Fault, StoreError
-from tolstat.files import check_room, writing
+from tolstat.common import draw_records as origins
+from tolstat.common import selected_results as kept
+from tolstat.common import tables
+from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.files import check_room, writing
+from tolstat.common.tables import HistorySpec, Options
 from tolstat.store.integrity import errors_hash, seal
 from tolstat.store.provenance import git_commit, versions
-from tolstat.tables import HistorySpec, Options
 
 if TYPE_CHECKING:
     from tolstat.study import Study

@@ -19,9 +19,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import kept
-from tolstat.errors import StoreError
-from tolstat.files import check_room, writing
+from tolstat.common import selected_results as kept
+from tolstat.common.errors import StoreError
+from tolstat.common.files import check_room, writing
+from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store.checks import DAMAGED
 from tolstat.store.histories import HISTORY_BYTES
 from tolstat.store.integrity import history_checks, results_hash
@@ -41,7 +42,6 @@ from tolstat.store.result_file import (
     size_of_new,
     text,
 )
-from tolstat.tables import HistorySpec, Options, Simulation, Status
 
 if TYPE_CHECKING:
     from tolstat.study import Study

@@ -9,8 +9,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import kept, tables
-from tolstat.columns import Column
+from tolstat.common import selected_results as kept
+from tolstat.common import tables
+from tolstat.common.columns import Column
 from tolstat.store.result_file import create_table, put_attributes, text
 
 if TYPE_CHECKING:

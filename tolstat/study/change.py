@@ -6,14 +6,14 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from tolstat.errors import Fault, InputError, gather
-from tolstat.schema import did_you_mean
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import did_you_mean
 from tolstat.study import selection
 from tolstat.study.file import nominal_value
 from tolstat.study.study import Study
-from tolstat.study.tolerance_entry import Site
-from tolstat.study.tolerance_kinds import distribution
-from tolstat.tolerance import Distribution
+from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.entry import Site
+from tolstat.study.tolerances.kinds import distribution
 
 INSTEAD = {
     **dict.fromkeys(("plus_minus",), ("lower", "upper", "iso2768", "nominal")),

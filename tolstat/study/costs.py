@@ -15,12 +15,13 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field, model_validator
 
-from tolstat import schema, units
-from tolstat.errors import Fault, InputError, gather
-from tolstat.schema import Strict, refuse
+from tolstat.common import strict as schema
+from tolstat.common import units
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
-from tolstat.study.tolerance_entry import Positive
+from tolstat.study.tolerances.entry import Positive
 
 REACH = (0.25, 4.0)
 """Least and largest factor on a tolerance that are looked at."""

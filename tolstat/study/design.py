@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import merged
 from tolstat.study.model import Solver
-from tolstat.tables import DESIGN, Variant
 
 IDEAL = "ideal"
 """Name of the case without errors, the first of every list."""

@@ -9,11 +9,12 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
-from tolstat import schema, units
-from tolstat.errors import Fault, InputError, gather
-from tolstat.schema import Strict
+from tolstat.common import strict as schema
+from tolstat.common import units
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import Strict
+from tolstat.common.tables import CHANNELS
 from tolstat.study.selection import Claims, Entry, entries, quantity, resolve
-from tolstat.tables import CHANNELS
 
 Positive = Annotated[units.Number, AfterValidator(units.positive)]
 Exponent = Annotated[units.Number, Field(ge=1, le=30)]

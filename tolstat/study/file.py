@@ -7,20 +7,22 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from tolstat import joint, kept, schema
-from tolstat.errors import Fault, InputError, gather
+from tolstat import joint
+from tolstat.common import selected_results as kept
+from tolstat.common import strict as schema
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import read_toml
+from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
-from tolstat.schema import read_toml
 from tolstat.study import fatigue, listing, proposal, selection
-from tolstat.study.correlation import Copula, assemble
 from tolstat.study.design import Design
-from tolstat.study.model import MAX_ROWS, Correlation, Output, Sampling, Solver, SweepAxis, SweepEntry
+from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Claims, Entry
-from tolstat.study.tolerance_entry import Site
-from tolstat.study.tolerance_kinds import distribution
-from tolstat.tables import FINEST_STEPS
-from tolstat.tolerance import Distribution
+from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
+from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.entry import Site
+from tolstat.study.tolerances.kinds import distribution
 
 ModelT = TypeVar("ModelT", bound=schema.Strict)
 

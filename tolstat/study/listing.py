@@ -7,15 +7,16 @@ from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tolstat import joint, schema
-from tolstat.errors import Fault, InputError, gather
+from tolstat import joint
+from tolstat.common import strict as schema
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import merged, overridden
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
 from tolstat.study.model import MAX_ROWS, CaseEntry, Range, Solver, VariantEntry
 from tolstat.study.selection import UNITS, Claims, Entry
-from tolstat.tables import Variant
 
 Section = tuple[int | str, ...]
 

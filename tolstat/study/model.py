@@ -7,12 +7,13 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from tolstat import kept, units
-from tolstat.columns import Column
-from tolstat.schema import Strict, refuse
+from tolstat.common import selected_results as kept
+from tolstat.common import units
+from tolstat.common.columns import Column
+from tolstat.common.strict import Strict, refuse
+from tolstat.common.tables import Fidelity, Method, Options, Start
 from tolstat.study import selection
-from tolstat.study.tolerance_entry import Value
-from tolstat.tables import Fidelity, Method, Options, Start
+from tolstat.study.tolerances.entry import Value
 
 _DEFAULTS = Options()
 
@@ -36,7 +37,7 @@ class Solver(Strict):
     error_budget : float
         Largest error of a load that ``auto`` allows, relative to the joint's largest load of the kind.
     peak_substeps : int
-        Parts of a step where a contact switches on a load's peak, see `kernel.closeup`; 1 looks no closer.
+        Parts of a step where a contact switches on a load's peak, see `kernel.revolution.closeup`; 1 looks no closer.
     max_refinements : int
         Times that the tolerance of a joint whose steps follow the error may be tightened, see `refinement`; 0 leaves
         all joints at `steps_per_rev`.
@@ -217,16 +218,6 @@ class Output(Strict):
     def columns(self) -> tuple[Column, ...]:
         """Columns of the results that are kept."""
         return kept.columns({kept.KEY: self.identity().get("results")})
-
-
-class Correlation(Strict):
-    """One ``[[correlation]]``: every two of the errors named have the correlation `rho`.
-
-    It is the correlation of the normal scores (Gaussian copula): the errors' own where they are normal.
-    """
-
-    between: Annotated[list[str], Field(min_length=1)]
-    rho: Annotated[Number, Field(gt=-1, lt=1)]
 
 
 class CaseEntry(Strict):

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tolstat.errors import Fault, InputError, gather
-from tolstat.schema import Strict, did_you_mean, dotted
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import Strict, did_you_mean, dotted
+from tolstat.common.units import Number
 from tolstat.study.selection import columns_of, entries, select
-from tolstat.units import Number
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tolstat.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError
 
 
 def by_section(text: str) -> Iterator[tuple[str, str]]:

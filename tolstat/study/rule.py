@@ -7,8 +7,8 @@ import re
 from contextlib import suppress
 from typing import NamedTuple
 
-from tolstat.errors import Fault, InputError, gather
-from tolstat.schema import did_you_mean
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import did_you_mean
 from tolstat.study.selection import LIMIT_UNITS, Entry, quantity, resolve
 
 _STATEMENT = re.compile(

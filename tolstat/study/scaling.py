@@ -7,13 +7,14 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from tolstat import tolerance, units
-from tolstat.errors import Fault, InputError
+from tolstat.common import units
+from tolstat.common.errors import Fault, InputError
 from tolstat.study import rewriting, selection
 from tolstat.study.study import Study
-from tolstat.study.tolerance_entry import Site
-from tolstat.study.tolerance_kinds import KINDS, RADIAL_KINDS, distribution
-from tolstat.tolerance import Distribution
+from tolstat.study.tolerances import distributions as tolerance
+from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.entry import Site
+from tolstat.study.tolerances.kinds import KINDS, RADIAL_KINDS, distribution
 
 SCALED = ("normal", "uniform", "triangular", "beta", "rayleigh")
 """Distributions whose band has a factor: those of measured parts, and of positive values, have none."""

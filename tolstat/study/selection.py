@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 from pydantic_core import PydanticCustomError
 
-from tolstat.errors import Fault, InputError, gather
-from tolstat.schema import did_you_mean, dotted
-from tolstat.tables import BUSHINGS, ERROR_FIELDS, HOLES, PINS
-from tolstat.units import to_si
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import did_you_mean, dotted
+from tolstat.common.tables import BUSHINGS, ERROR_FIELDS, HOLES, PINS
+from tolstat.common.units import to_si
 
 UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 """SI unit of every error, in the order of the table."""

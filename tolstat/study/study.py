@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import kept
-from tolstat.errors import Fault, InputError
+from tolstat.common import selected_results as kept
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
-from tolstat.study.correlation import Copula
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
-from tolstat.study.freeze import Group, groups
+from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.proposal import Proposal
 from tolstat.study.selection import LIMIT_UNITS
-from tolstat.tables import DESIGN, Variant
-from tolstat.tolerance import Distribution
+from tolstat.study.tolerances.correlation import Copula
+from tolstat.study.tolerances.distributions import Distribution
 
 
 @dataclass(frozen=True)

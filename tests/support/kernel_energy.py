@@ -1,0 +1,123 @@
+"""Energies of a joint and the powers that change them, at one state.
+
+With them
+
+    d/dt (kinetic + bushings + contacts) = input - load - bushing_damping - contact_damping - film + bushing_moments
+
+holds exactly along a solution. The last is the power of what is not the gradient of a potential: a bushing's moment
+K phi works on the angular velocity, its potential phi . K phi / 2 changes with the rate of the rotation vector.
+
+Deformations are read off the force functions of the joint: a second row of parameters has springs of stiffness 1 and
+no damper, a third dampers of 1 and no spring.
+"""
+
+from tolstat.common.tables import Field, dtype_of
+from tolstat.kernel.mechanics.bushing import bushing_load
+from tolstat.kernel.mechanics.contact import contact_load, smooth_step
+from tolstat.kernel.mechanics.dynamics import RAMP, forces, mass_of, resisting_torque
+from tolstat.kernel.mechanics.topology import BUSHING_BASE, BUSHING_LUMP, FRAME, HUB, INPUT_SHAFT, N_LUMPS, PSI
+from tolstat.kernel.mechanics.triad import to_triad
+from tolstat.kernel.mechanics.vector import add, cross, dot, row, sub, turn_back
+from tolstat.kernel.mechanics.work import DELTA, FORCE, V_NORMAL, V_TANGENT
+from tolstat.kernel.simd.jit import njit
+
+ENERGY_FIELDS = (
+    Field("kinetic", "J", "kinetic energy of the lumps and the output shaft, absolute motion"),
+    Field("bushings", "J", "elastic energy of the 8 bushings"),
+    Field("contacts", "J", "elastic energy of the contact stations"),
+    Field("input", "W", "power of the drive on the input shaft"),
+    Field("load", "W", "power that the resisting torque takes"),
+    Field("bushing_damping", "W", "power that the bushings' dampers take"),
+    Field("contact_damping", "W", "power that the contacts' normal damping takes"),
+    Field("film", "W", "power that the lubricant film takes"),
+    Field("bushing_moments", "W", "power of the bushings' elastic moments beyond their potential"),
+)
+ENERGY = dtype_of(ENERGY_FIELDS)
+
+
+@njit
+def kinetic_energy(v, par, work):
+    """Kinetic energy of the lumps and the output shaft in the ground frame, J."""
+    energy = 0.5 * par.Js * (work.shaft[0] + v[PSI]) ** 2
+    for body in range(N_LUMPS):
+        mass, inertia = mass_of(body, par)
+        omega = row(work.frame_w, FRAME[body])
+        velocity = add(row(work.vel, body), cross(omega, row(work.pos, body)))
+        w = to_triad(body, turn_back(work.rot, body, add(omega, row(work.spin, body))))
+        energy += 0.5 * mass * dot(velocity, velocity)
+        for k in range(3):
+            energy += 0.5 * inertia[k] * w[k] ** 2
+    return energy
+
+
+@njit
+def bushing_energy(i, par, springs, dampers, work, out):
+    """Add the elastic energy and the powers of bushing `i`."""
+    base, lump = BUSHING_BASE[i], BUSHING_LUMP[i]
+    stiffness, damping = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
+    w = to_triad(lump, turn_back(work.rot, base, sub(row(work.spin, lump), row(work.spin, base))))
+    bushing_load(i, springs, work)
+    elastic_moment = (work.load[i, 3], work.load[i, 4], work.load[i, 5])
+    for k in range(6):
+        out.bushings += 0.5 * stiffness[k] * work.load[i, k] ** 2
+    bushing_load(i, dampers, work)
+    for k in range(3):
+        rate, turning = -work.load[i, k], -work.load[i, 3 + k]
+        out.bushing_damping += damping[k] * rate**2 + damping[3 + k] * turning * w[k]
+        out.bushing_moments += stiffness[3 + k] * elastic_moment[k] * (w[k] - turning)
+
+
+@njit
+def contact_energy(pin, par, springs, work, out):
+    """Add the elastic energy and the powers of the contact of `pin`; ``work.station`` holds the full forces."""
+    for j in range(par.n_stations):
+        out.contact_damping += work.station[pin, j, FORCE] * work.station[pin, j, V_NORMAL]
+    contact_load(pin, springs, work)
+    for j in range(par.n_stations):
+        station, weight = work.station[pin, j], par.station_weight[j]
+        delta = station[DELTA]
+        if delta <= 0:
+            continue
+        out.contact_damping -= station[FORCE] * station[V_NORMAL]
+        out.film += par.c_t * weight * smooth_step(delta / par.delta_d) * station[V_TANGENT] ** 2
+        out.contacts += (par.station_k1[j] * delta / 3 + par.station_k2[j] / 2) * delta**2
+
+
+@njit
+def measure(t, q, v, rows, options, work, out):
+    """Energies and powers of one state.
+
+    Parameters
+    ----------
+    t : float
+        Time, s.
+    q, v : ndarray, shape (55,)
+        Unknowns and their rates; m and rad.
+    rows : ndarray of PARAM, shape (3,)
+        The joint; the same with bushing stiffness 1, no bushing damping and no contact damping; the same with bushing
+        stiffness 0 and damping 1.
+    options : Options
+        ``start`` decides whether the resisting torque is ramped.
+    work : record of WORK
+        Rewritten.
+    out : record of ENERGY
+        Written.
+    """
+    par = rows[0]
+    forces(t, q, v, par, work)
+    out.kinetic = kinetic_energy(v, par, work)
+    out.input = -work.force[INPUT_SHAFT, 5] * par.omega
+    out.load = resisting_torque(t, par, options.start == RAMP) * (work.shaft[0] + v[PSI])
+    out.bushings = out.contacts = 0.0
+    out.bushing_damping = out.contact_damping = out.film = out.bushing_moments = 0.0
+    for pin in range(4):
+        contact_energy(pin, par, rows[1], work, out)
+    for i in range(8):
+        bushing_energy(i, par, rows[1], rows[2], work, out)
+
+
+@njit
+def measure_all(t, points, rows, options, work, out):
+    """`measure` every state of a trajectory: ``points``, shape (n, 3, 55), at times `t`, to `out`, shape (n,)."""
+    for k in range(t.size):
+        measure(t[k], points[k, 0], points[k, 1], rows, options, work, out[k])

@@ -1,0 +1,75 @@
+"""Parts of a joint's simulation over and over, for one joint or for lanes, so that they can be timed by themselves."""
+
+from tolstat.kernel.lanes.lane_memory import as_lanes
+from tolstat.kernel.mechanics.contact import contact_load
+from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.revolution.simulate import assemble, begin, clear, eliminate, residual, rigid_guess, solve
+from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import fma
+
+RESIDUAL, CONTACT, ASSEMBLY, ELIMINATION, SUBSTITUTION = range(5)
+"""What `repeat` repeats: residual with contacts; contacts; tangent; tangent and its factors; a solution with them."""
+CHAINS = 10
+"""Sums that `multiply_add` carries side by side: as many as keep both units of today's cores busy."""
+
+
+@njit
+def repeat(part, times, t, cv, ca, motion, par, options, work):
+    """Do a part `times` times at the state ``motion.q``, ``v``, ``a`` of time `t`; cv, ca as `predict` returns them."""
+    residual(t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
+    assemble(cv, ca, par, work)
+    eliminate(work)
+    for _ in range(times):
+        if part == RESIDUAL:
+            residual(t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
+        elif part == CONTACT:
+            for pin in range(4):
+                contact_load(pin, par, work)
+        elif part == ASSEMBLY:
+            assemble(cv, ca, par, work)
+        elif part == ELIMINATION:
+            assemble(cv, ca, par, work)
+            eliminate(work)
+        else:
+            for i in range(N_DOF):
+                work.solution[i] = -motion.residual[i]
+            solve(motion.q, work)
+
+
+@njit
+def repeat_in_lanes(part, times, options, batch):
+    """`repeat` for all lanes at once, whose motion and control are those of `batch`."""
+    par, work, motion = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.motion)
+    control = as_lanes(batch.control)
+    repeat(part, times, control.t, control.cv, control.ca, motion, par, options, work)
+
+
+@njit
+def start(rows, options, alone):
+    """Bring every joint of `rows` to its start."""
+    work, state, ring, _ = alone
+    for i in range(len(rows)):
+        clear(rows[i], state, ring.samples, ring.notes)
+        begin(rows[i], options, work, state)
+
+
+@njit
+def guess(rows, alone):
+    """Do what of the start of every joint of `rows` is not done in lanes."""
+    work, state, ring, _ = alone
+    for i in range(len(rows)):
+        clear(rows[i], state, ring.samples, ring.notes)
+        rigid_guess(0.0, rows[i], work, state)
+
+
+@njit
+def multiply_add(times, batch):
+    """Add products to `CHAINS` lanes `times` times: what a core can do at most."""
+    motion = as_lanes(batch.motion)
+    x, y = motion.q[0], motion.q[1]
+    a, b, c, d, e = motion.v[0], motion.v[1], motion.v[2], motion.v[3], motion.v[4]
+    f, g, h, i, j = motion.v[5], motion.v[6], motion.v[7], motion.v[8], motion.v[9]
+    for _ in range(times):
+        a, b, c, d, e = fma(a, x, y), fma(b, x, y), fma(c, x, y), fma(d, x, y), fma(e, x, y)
+        f, g, h, i, j = fma(f, x, y), fma(g, x, y), fma(h, x, y), fma(i, x, y), fma(j, x, y)
+    motion.a[0] = a + b + c + d + e + f + g + h + i + j

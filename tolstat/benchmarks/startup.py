@@ -1,0 +1,107 @@
+"""What passes before the first joint: help, imports, kernels from the cache, kernels compiled anew."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+FIRST_JOINT = "from tolstat.benchmarks.startup import first_joint; first_joint({path!r})"
+COMPILE = "from tolstat.benchmarks.startup import compile_kernels; compile_kernels({fidelity!r})"
+
+
+@dataclass(frozen=True)
+class Startup:
+    """Times from the start of a process, each the best of a few.
+
+    Attributes
+    ----------
+    help_s : float
+        ``tolstat --help``, by the clock.
+    first_joint_s : float
+        Until the first joint of the study is simulated with kernels from the cache, by the clock.
+    first_joint_cpu_s : float
+        The same in processor time.
+    cold_s, cold_cpu_s : float or None
+        Compiling what dynamic joints need, by the clock and in processor time; None where that was not asked for.
+    cold_quasistatic_s, cold_quasistatic_cpu_s : float or None
+        Compiling what quasi-static joints need.
+    """
+
+    help_s: float
+    first_joint_s: float
+    first_joint_cpu_s: float
+    cold_s: float | None
+    cold_cpu_s: float | None
+    cold_quasistatic_s: float | None
+    cold_quasistatic_cpu_s: float | None
+
+
+def measure(study_path: str, cold: bool, repeats: int = 3) -> Startup:
+    """Start processes and wait for them.
+
+    Parameters
+    ----------
+    study_path : str
+        Study of which the first joint is simulated.
+    cold : bool
+        Compile everything too, into an empty cache of its own: minutes.
+    repeats : int
+        How often what is short is done.
+
+    Returns
+    -------
+    Startup
+    """
+    here = dict(os.environ)
+    shown = min(_run(["-m", "tolstat", "--help"], here)[0] for _ in range(repeats))
+    runs = [_run(["-c", FIRST_JOINT.format(path=study_path)], here) for _ in range(repeats)]
+    compiled: dict[str, tuple[float, float]] = {}
+    for fidelity in ("dynamic", "quasistatic") if cold else ():
+        with tempfile.TemporaryDirectory() as folder:
+            elsewhere = {name: text for name, text in here.items() if name != "NUMBA_CACHE_DIR"}
+            elsewhere["XDG_CACHE_HOME"] = folder
+            compiled[fidelity] = _run(["-c", COMPILE.format(fidelity=fidelity)], elsewhere)
+    return Startup(
+        shown,
+        min(run[0] for run in runs),
+        min(run[1] for run in runs),
+        *compiled.get("dynamic", (None, None)),
+        *compiled.get("quasistatic", (None, None)),
+    )
+
+
+def first_joint(study_path: str) -> None:
+    """Simulate the first joint of a study as a campaign does; what this process is started for."""
+    from tolstat import joint, sampling, study
+    from tolstat.solver import simulation
+    from tolstat.store.recorded import perturbed
+
+    loaded = study.load(study_path, n=1)
+    params = perturbed(loaded, np.arange(1), sampling.draw(loaded)[:1], joint.perturb)
+    simulation.simulate_rows(params, loaded.solver.options())
+
+
+def compile_kernels(fidelity: str) -> None:
+    """Compile what joints of a fidelity need; what this process is started for."""
+    from tolstat.common.tables import Fidelity, Options
+    from tolstat.solver import simulation
+
+    simulation.warm_up(Options(fidelity=int(Fidelity[fidelity.upper()])))
+
+
+def _run(arguments: list[str], environment: dict[str, str]) -> tuple[float, float]:
+    """Seconds that a Python takes, by the clock and in processor time."""
+    before, begin = _children_s(), time.perf_counter()
+    subprocess.run([sys.executable, *arguments], env=environment, stdout=subprocess.DEVNULL, check=True)
+    return time.perf_counter() - begin, _children_s() - before
+
+
+def _children_s() -> float:
+    times = os.times()
+    return times.children_user + times.children_system

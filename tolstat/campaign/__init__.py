@@ -1,0 +1,1 @@
+"""Pending rows through executors into the result file."""

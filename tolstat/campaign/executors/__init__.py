@@ -1,0 +1,7 @@
+"""Blocks of work through a function: in this process, in supervised ones, or on a cluster. It knows no physics."""
+
+from tolstat.campaign.executors.common import Lost, Work, WorkerDied, available_workers
+from tolstat.campaign.executors.processes import map_in_processes
+from tolstat.campaign.executors.serial import map_here
+
+__all__ = ["Lost", "Work", "WorkerDied", "available_workers", "map_here", "map_in_processes"]

@@ -1,0 +1,227 @@
+"""Blocks through the workers of a Dask cluster; those that its workers do not survive end in supervised processes here.
+
+The scheduler gives the blocks of a lost worker to others. A block over which several workers die is not given to the
+cluster again: its pieces are done on this machine at the end, where it shows which of them crash or hang.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import tempfile
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from tolstat.campaign.executors.common import POLL_S, BlockT, Lost, ResultT, Work, WorkerDied, available_workers, never
+from tolstat.campaign.executors.processes import map_in_processes, one_thread_each, signals_blocked
+from tolstat.campaign.executors.worker import alarm
+from tolstat.common.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+FIRST_WORKER_S = 300.0
+"""How long the first worker of a cluster is waited for, in seconds: a queue may have to start it."""
+CONNECT_S = 15.0
+"""How long a scheduler is waited for, in seconds."""
+FETCH_S = 60.0
+"""How long a result is waited for, in seconds."""
+MAX_FAILURES = 3
+"""How many blocks may fail before the first one that does not."""
+
+Fingerprint = Callable[[], Mapping[str, str]]
+
+_ONE_AT_A_TIME = threading.Lock()
+"""Joints are simulated in work arrays of the process, which a worker with several threads must not share."""
+
+
+def map_on_cluster(
+    work: Work[BlockT, ResultT],
+    blocks: Iterable[BlockT],
+    scheduler: str | None,
+    workers: int,
+    fingerprint: Fingerprint,
+    stop: Callable[[], bool] = never,
+) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
+    """Apply the function to every block on a Dask cluster and yield the results as they come.
+
+    Close the generator (`contextlib.closing`) when leaving it early.
+
+    Parameters
+    ----------
+    work : Work
+        What to do. A worker that exceeds the time limit is ended.
+    blocks : iterable
+        Blocks; taken from it only as they are needed.
+    scheduler : str, optional
+        Address of the scheduler; without it a cluster is started on this machine.
+    workers : int
+        Processes of a cluster on this machine.
+    fingerprint : callable
+        What must be the same here and in every worker, such as versions, by name.
+    stop : callable, optional
+        Asked often; when it says True no block is begun any more, and those in work are finished.
+
+    Yields
+    ------
+    tuple
+        As `map_in_processes`.
+
+    Raises
+    ------
+    InputError
+        When Dask is not installed, the scheduler does not answer, or a worker's fingerprint differs.
+    WorkerDied
+        When the scheduler is lost, has no workers, or pieces that are left make every process die.
+    """
+    with _client(scheduler, workers) as client:
+        _check_fingerprints(client, fingerprint)
+        cluster = _Cluster(client, work, iter(blocks), fingerprint)
+        yield from cluster.run(stop)
+    pieces = [piece for block in cluster.suspects for piece in work.split(block)]
+    if pieces:
+        yield from map_in_processes(work, pieces, min(len(pieces), available_workers()), stop)
+
+
+class _Cluster:
+    """Blocks under way on a cluster, at most twice as many as it has threads."""
+
+    def __init__(self, client: Client, work: Work[Any, Any], blocks: Iterator[Any], fingerprint: Fingerprint) -> None:
+        self.client = client
+        self.work = work
+        self.blocks = blocks
+        self.fingerprint = fingerprint
+        self.expected = dict(fingerprint())
+        self.running: dict[Future, Any] = {}
+        self.ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
+        self.suspects: list[Any] = []
+        self.works = False
+
+    def run(self, stop: Callable[[], bool]) -> Iterator[tuple[Any, Any]]:
+        more = True
+        while more or self.running:
+            if stop():
+                self.suspects.clear()
+                more = False
+            more = more and self._hand_out()
+            try:
+                future = self.ended.get(timeout=POLL_S)
+            except queue.Empty:
+                if self.client.status != "running":
+                    raise WorkerDied("the Dask scheduler is gone\n  hint: start it again") from None
+                continue
+            yield from self._take(future)
+
+    def _hand_out(self) -> bool:
+        """Submit blocks; whether there may be more."""
+        room = 2 * max(1, sum(self.client.nthreads().values())) - len(self.running)
+        for _ in range(room):
+            block = next(self.blocks, None)
+            if block is None:
+                return False
+            future = self.client.submit(do, self.work, self.fingerprint, self.expected, block, pure=False)
+            self._watch(future, block)
+        return True
+
+    def _watch(self, future: Future, block: Any) -> None:
+        self.running[future] = block
+        future.add_done_callback(self.ended.put)
+
+    def _take(self, future: Future) -> Iterator[tuple[Any, Any]]:
+        block = self.running.pop(future)
+        if future.status in ("lost", "pending"):  # lost with its worker, and on its way again
+            self._watch(future, block)
+            return
+        if future.status not in ("finished", "error"):
+            raise WorkerDied("the Dask scheduler has dropped a block\n  hint: see whether it was started anew")
+        try:
+            result = future.result(timeout=FETCH_S)
+        except InputError:
+            raise
+        except Exception as error:  # workers died over it, or with its result, or it raised this
+            self.suspects.append(block)
+            if not self.works and len(self.suspects) >= MAX_FAILURES:
+                raise WorkerDied(f"the Dask cluster does no block: {error!r}\n  hint: see its logs") from error
+            return
+        self.works = True
+        yield block, result
+
+
+def do(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
+    """Do a block in a worker, one at a time."""
+    check(expected, _own(fingerprint), "a Dask worker")
+    with _ONE_AT_A_TIME:
+        _prepare(work.prepare)
+        alarm(work.limit_s)
+        try:
+            return work.function(block)
+        finally:
+            alarm(None)
+
+
+@cache
+def _own(fingerprint: Fingerprint) -> Mapping[str, str]:
+    return fingerprint()
+
+
+@cache
+def _prepare(prepare: Callable[[], object]) -> None:
+    """Prepare this process once, one process of a machine after the other: they may compile into one cache."""
+    with open(os.path.join(tempfile.gettempdir(), f"tolstat-{os.getuid()}.lock"), "w") as lock:
+        import fcntl
+
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        prepare()
+
+
+def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> None:
+    """Refuse a process that would give other numbers.
+
+    Raises
+    ------
+    InputError
+        With all that differs.
+    """
+    lines = [
+        f"{name}: {value} here, {found.get(name)} there" for name, value in expected.items() if found.get(name) != value
+    ]
+    if lines:
+        differing = "\n    ".join([f"{where} has other versions", *lines])
+        raise InputError([Fault("--executor dask", differing, "install the same ones, and start the workers anew")])
+
+
+def _check_fingerprints(client: Client, fingerprint: Fingerprint) -> None:
+    try:
+        client.wait_for_workers(1, timeout=FIRST_WORKER_S)
+    except TimeoutError as error:
+        raise WorkerDied(f"the Dask cluster has no worker after {FIRST_WORKER_S:g} s\n  hint: start some") from error
+    for address, found in client.run(fingerprint, on_error="return").items():
+        if isinstance(found, BaseException):
+            remedy = "install tolstat there, and start the workers anew"
+            raise InputError([Fault("--executor dask", f"the worker {address} cannot run tolstat: {found!r}", remedy)])
+        check(dict(fingerprint()), found, f"the worker {address}")
+
+
+@contextmanager
+def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        remedy = "install it with: pip install 'tolstat[dask]'"
+        raise InputError([Fault("--executor dask", "Dask's distributed is not installed", remedy)]) from error
+    if scheduler is None:
+        with one_thread_each(), signals_blocked():
+            cluster = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
+        with cluster, Client(cluster) as client:
+            yield client
+        return
+    try:
+        client = Client(scheduler, timeout=CONNECT_S)
+    except (OSError, ValueError) as error:
+        found = f"{scheduler} does not answer: {error}"
+        raise InputError([Fault("--scheduler", found, "give the address that dask scheduler prints")]) from error
+    with client:
+        yield client

@@ -1,0 +1,288 @@
+"""Blocks through worker processes that may die or hang: they are replaced, and no block is lost with them.
+
+Neither pool of the standard library does this: `multiprocessing.Pool` waits for ever for the task of a killed worker,
+and `ProcessPoolExecutor` fails every task once one worker is gone. Here each worker has a pipe and one block at a time.
+
+A block whose worker died, hung or raised is split, and its pieces come after all other blocks, one by one. A piece
+that fails twice alone is given up as `Lost`, but only once another block has come through since, if need be one that
+did before: when the machine is what is wrong (no memory left, a broken installation) all blocks fail, and none of them
+is to blame.
+
+Workers are spawned, because a forked child inherits locks of threads that it does not have.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from typing import Any, Generic, Literal, NamedTuple
+
+from tolstat.campaign.executors.common import POLL_S, THREAD_VARIABLES, BlockT, Lost, ResultT, Work, WorkerDied, never
+from tolstat.campaign.executors.worker import RAISED, READY, serve
+
+TRIES = 2
+"""How often a single piece may fail before it is given up."""
+DOUBT = 3
+"""After how many failures in a row a block that came through before is done again, to see if workers still can."""
+MAX_FAILED_STARTS = 3
+"""How many workers in a row may end before they are ready."""
+START_LIMIT_S = 600.0
+"""Longest time for a worker to get ready, in seconds: it may have to compile."""
+
+HINT = (
+    "hint: use fewer workers if memory is short; in a script of your own, start the campaign "
+    'under: if __name__ == "__main__"'
+)
+
+
+def map_in_processes(
+    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], workers: int, stop: Callable[[], bool] = never
+) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
+    """Apply the function to every block in worker processes and yield the results as they come.
+
+    Close the generator (`contextlib.closing`) when leaving it early: that ends the workers at once.
+
+    Parameters
+    ----------
+    work : Work
+        What to do.
+    blocks : iterable
+        Blocks; taken from it only as they are needed.
+    workers : int
+        Number of processes.
+    stop : callable, optional
+        Asked often; when it says True no block is begun any more, and those in work are finished.
+
+    Yields
+    ------
+    tuple
+        A block or a piece of one, and its result, or `Lost` for a piece that was given up; in the order in which they
+        are finished.
+
+    Raises
+    ------
+    WorkerDied
+        When workers cannot be started, or die one after the other without finishing anything.
+    Exception
+        When every block raises it.
+    """
+    team: _Team[BlockT, ResultT] = _Team(work, iter(blocks), workers)
+    try:
+        with one_thread_each():
+            yield from team.run(stop)
+    finally:
+        team.end()
+
+
+class _Task(NamedTuple, Generic[BlockT]):
+    """A block, how often it has failed alone, and whether it is only to show that workers can still do one."""
+
+    block: BlockT
+    failures: int = 0
+    control: bool = False
+
+
+@dataclass
+class _Worker(Generic[BlockT]):
+    process: SpawnProcess
+    connection: Connection
+    deadline: float
+    ready: bool = False
+    task: _Task[BlockT] | None = None
+
+
+class _Team(Generic[BlockT, ResultT]):
+    """Workers and what is left for them to do."""
+
+    def __init__(self, work: Work[BlockT, ResultT], blocks: Iterator[BlockT], size: int) -> None:
+        self.work = work
+        self.size = size
+        self.max_losses = 5 + size
+        self.workers: list[_Worker[BlockT]] = []
+        self.fresh: Iterator[_Task[BlockT]] = (_Task(block) for block in blocks)
+        self.ahead: _Task[BlockT] | None = None
+        self.suspects: deque[_Task[BlockT]] = deque()
+        self.given_up: list[tuple[BlockT, Lost]] = []
+        self.control: _Task[BlockT] | None = None
+        self.losses = 0
+        self.failed_starts = 0
+
+    def run(self, stop: Callable[[], bool]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
+        while True:
+            if stop():
+                self._drop_tasks()
+            self._hand_out()
+            if not any(worker.task for worker in self.workers) and not self._has_task():
+                break
+            # All messages first, then new blocks, then the caller, who may take his time with the results.
+            finished = [result for worker in self._heard_from() for result in self._listen(worker)]
+            self._hand_out()
+            yield from finished
+        yield from self.given_up
+
+    def end(self) -> None:
+        for worker in self.workers:
+            self._bury(worker)
+
+    def _drop_tasks(self) -> None:
+        self.fresh, self.ahead = iter(()), None
+        self.suspects.clear()
+        self.given_up.clear()
+
+    def _next_task(self) -> _Task[BlockT] | None:
+        task, self.ahead = self.ahead, None
+        if task is not None:
+            return task
+        in_doubt = self.given_up or self.losses >= DOUBT
+        if in_doubt and self.control and not any(w.task and w.task.control for w in self.workers):
+            return self.control
+        task = next(self.fresh, None)
+        if task is None and self.suspects:
+            return self.suspects.popleft()
+        return task
+
+    def _has_task(self) -> bool:
+        self.ahead = self._next_task()
+        return self.ahead is not None
+
+    def _hand_out(self) -> None:
+        for worker in self.workers:
+            if worker.ready and worker.task is None:
+                task = self._next_task()
+                if task is None:
+                    return
+                self._give(worker, task)
+        while len(self.workers) < self.size and self._has_task():
+            self.workers.append(_start(self.work))
+
+    def _give(self, worker: _Worker[BlockT], task: _Task[BlockT]) -> None:
+        worker.task = task
+        limit = self.work.limit_s
+        worker.deadline = time.monotonic() + limit if limit else float("inf")
+        with suppress(OSError):  # it has died meanwhile: its end of the pipe will be found closed
+            worker.connection.send(task.block)
+
+    def _heard_from(self) -> list[_Worker[BlockT]]:
+        """Wait for workers with a message; those that have died have one, too: the end of the pipe."""
+        nearest = min(worker.deadline for worker in self.workers) - time.monotonic()
+        ready = wait([w.connection for w in self.workers], timeout=max(0.0, min(POLL_S, nearest)))
+        now = time.monotonic()
+        return [w for w in self.workers if w.connection in ready or w.deadline <= now]
+
+    def _listen(self, worker: _Worker[BlockT]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
+        if not worker.connection.poll():
+            limit = self.work.limit_s if worker.ready else START_LIMIT_S
+            self._lose(worker, "timeout", f"took more than {limit:g} s")
+            return
+        try:
+            kind, content = worker.connection.recv()
+        except (EOFError, OSError):
+            worker.process.join(1.0)
+            self._lose(worker, "crashed", _cause(worker.process.exitcode))
+            return
+        task, worker.task, worker.deadline = worker.task, None, float("inf")
+        if kind == READY:
+            worker.ready, self.failed_starts = True, 0
+        elif kind == RAISED and task is not None:
+            self._suspect(task, Lost("crashed", f"{type(content).__name__}: {content}"), content)
+        elif task is not None:
+            yield from self._succeed(task, content)
+
+    def _succeed(self, task: _Task[BlockT], result: ResultT) -> Iterator[tuple[BlockT, ResultT | Lost]]:
+        self.losses = 0
+        if self.control is None:
+            self.control = task._replace(control=True)
+        if not task.control:
+            yield task.block, result
+        yield from self.given_up
+        self.given_up.clear()
+
+    def _lose(self, worker: _Worker[BlockT], kind: Literal["crashed", "timeout"], reason: str) -> None:
+        self._bury(worker)
+        self.workers.remove(worker)
+        if worker.ready and worker.task is not None:
+            self._suspect(worker.task, Lost(kind, reason), None)
+            return
+        self.failed_starts += 1
+        if self.failed_starts >= MAX_FAILED_STARTS:
+            times = f"{self.failed_starts} times in a row"
+            raise WorkerDied(f"a worker process died before it had begun, {times}: {reason}\n  {HINT}")
+
+    def _suspect(self, task: _Task[BlockT], lost: Lost, error: Exception | None) -> None:
+        self.losses += 1
+        if self.losses >= self.max_losses:
+            if error is not None:
+                raise error
+            found = f"{self.losses} times in a row a worker process died over its block, and none was finished"
+            raise WorkerDied(f"{found}; the last one: {lost.reason}\n  {HINT}")
+        if task.control:
+            return
+        pieces = self.work.split(task.block)
+        if len(pieces) > 1:
+            self.suspects.extend(_Task(piece) for piece in pieces)
+        elif task.failures + 1 < TRIES:
+            self.suspects.append(task._replace(failures=task.failures + 1))
+        else:
+            self.given_up.append((task.block, lost))
+
+    def _bury(self, worker: _Worker[BlockT]) -> None:
+        worker.process.kill()
+        worker.process.join()
+        worker.connection.close()
+
+
+def _start(work: Work[Any, Any]) -> _Worker[Any]:
+    """Start a worker; it inherits blocked signals until it can ignore them."""
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=serve, args=(there, work), daemon=True)
+    try:
+        with signals_blocked():
+            process.start()
+    finally:
+        there.close()
+    return _Worker(process, here, time.monotonic() + START_LIMIT_S)
+
+
+def _cause(exit_code: int | None) -> str:
+    if exit_code is None:
+        return "closed its pipe"
+    if exit_code < 0:
+        return f"killed by {signal.Signals(-exit_code).name}"
+    return f"ended with exit code {exit_code}"
+
+
+@contextmanager
+def signals_blocked() -> Iterator[None]:
+    """Have processes that are started meanwhile inherit blocked signals: to stop is for this process to decide."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Have workers that are started meanwhile compute with one thread; libraries ask when they are loaded."""
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

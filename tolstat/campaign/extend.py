@@ -1,0 +1,236 @@
+"""Campaigns that grow, and campaigns computed in parts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.campaign.recall import recall
+from tolstat.campaign.run import differing_keys
+from tolstat.common.draw_records import columns
+from tolstat.common.errors import Fault, InputError
+from tolstat.sampling import draw_blocks, origin_blocks
+from tolstat.store import Counts, ResultStore
+from tolstat.store.assembly import Differing, assemble, check_free
+from tolstat.store.reader import BLOCK
+
+if TYPE_CHECKING:
+    from tolstat.study import Study
+
+CANNOT_GROW = {
+    "lhs": "a Latin hypercube has as many strata as joints: further joints would change those that are there",
+    "sweep": "a sweep has its number of joints from its points",
+    "cases": "its joints are listed one by one",
+    "subset": "how many joints a subset simulation has is for its levels to decide",
+}
+
+
+class Merged(NamedTuple):
+    """What a merge came to.
+
+    Attributes
+    ----------
+    counts : Counts
+        State of the joints of the campaign.
+    twice : int
+        Rows that more than one file holds, all with the same results.
+    """
+
+    counts: Counts
+    twice: int
+
+
+def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
+    """Give a campaign further joints, pending: the next ones of its sequence.
+
+    Nothing that the file holds changes. `campaign.run` with the study returned simulates the new joints; the datasets
+    are then those of a campaign that had `n` joints from the start.
+
+    Parameters
+    ----------
+    path : Path
+        Result file of a whole campaign; with histories, a complete one. It is replaced when the new one is complete.
+    n : int
+        Number of joints that it shall have, the nominal one not counted.
+    study_path : Path, optional
+        The study file, where the text in the result file does not do any more.
+
+    Returns
+    -------
+    Study
+        The study with `n` joints.
+
+    Raises
+    ------
+    InputError
+        When the campaign cannot be extended to `n` joints, or its study not be read.
+    StoreError
+        When the file cannot be used or replaced.
+    """
+    with ResultStore.open(path, "r+") as store:
+        _check_extendable(store, n)
+        study = recall(store, n, study_path)
+        more = range(store.n, study.rows)
+        grow(store, study, draw_blocks(study, more), origin_blocks(study, more))
+        return study
+
+
+def grow(
+    store: ResultStore,
+    study: Study,
+    errors: Iterable[NDArray[np.void]],
+    origin: Iterable[NDArray[np.void]] | None = None,
+) -> None:
+    """Replace a result file by one with further rows, pending; nothing that it holds changes.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The file, open for writing; of no use afterwards.
+    study : Study
+        The study of the larger campaign.
+    errors, origin : iterable of tables
+        Errors of the further rows, block after block; how they were drawn, where `origins.columns` has that.
+
+    Raises
+    ------
+    StoreError
+        When the file cannot be replaced.
+    """
+    sampling = study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]}
+    changed = {"identity": study.identity(), "sampling": sampling}
+    attrs = store.attributes() | {name: json.dumps(value, allow_nan=False) for name, value in changed.items()}
+    attrs["campaign_rows"] = study.rows
+    attrs.pop("stop", None)
+    drawn = None if origin is None else chain(_blocks(store, store.origin), origin)
+    whole = chain(_blocks(store, store.errors), errors)
+    assemble(store.path, attrs, study.rows, [store], whole, overwrite=True, origin=drawn)
+
+
+def merge(paths: Sequence[Path], out: Path) -> Merged:
+    """Put the files of slices together to the file of the whole campaign, equal to that of one run.
+
+    Rows may be in several files if their results are the same to the last bit. Rows that are pending in all of
+    their files are pending in the new one; `campaign.run` goes on with them.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Result files of slices, in any order.
+    out : Path
+        The file to make.
+
+    Returns
+    -------
+    Merged
+
+    Raises
+    ------
+    InputError
+        When the files are not of one campaign, made by one version of the code, or do not cover it; with all faults.
+    StoreError
+        When a file cannot be used, or `out` not be made.
+    """
+    check_free(out)
+    with ExitStack() as opened:
+        stores = [opened.enter_context(ResultStore.open(path)) for path in paths]
+        stores.sort(key=lambda store: (store.rows.start, store.rows.stop))
+        _check_one_campaign(stores)
+        attrs = stores[0].attributes()
+        attrs.pop("stop", None)
+        design = np.concatenate([s.design()[a:] for s, a in _shares(stores)]) if stores[0].case_names else None
+        errors = (block for store, begin in _shares(stores) for block in _blocks(store, store.errors, begin))
+        origin = (block for store, begin in _shares(stores) for block in _blocks(store, store.origin, begin))
+        drawn = origin if columns(stores[0].sampling) else None
+        try:
+            assemble(out, attrs, stores[0].campaign_rows, stores, errors, design, origin=drawn)
+        except Differing as error:
+            holding = [str(store.path) for store in stores if error.row in store.rows]
+            found = f"hold different results of row {error.row}: {error.column} differs"
+            remedy = f"replay it with: tolstat replay {holding[0]} --row {error.row}; keep the file that agrees"
+            raise InputError([Fault(" and ".join(holding), found, remedy)]) from None
+    with ResultStore.open(out) as store:
+        return Merged(store.counts(), sum(len(s.rows) for s in stores) - store.n)
+
+
+def _check_extendable(store: ResultStore, n: int) -> None:
+    place, held = str(store.path), store.sampling["n"]
+    faults = []
+    reason = CANNOT_GROW.get(store.sampling["method"])
+    if reason:
+        faults.append(Fault(place, f"cannot be extended: {reason}", "run a campaign of its own with the number wanted"))
+    elif n <= held:
+        faults.append(Fault(place, f"has {held} joints already", f"give --n more than {held}"))
+    if not store.whole:
+        found = f"holds rows {store.rows.start}:{store.rows.stop} of a campaign only"
+        faults.append(Fault(place, found, "merge all slices first, with: tolstat merge"))
+    elif store.history_specs and not store.complete:
+        faults.append(Fault(place, "has joints pending, with histories to come", "finish it first, with: tolstat run"))
+    if faults:
+        raise InputError(faults)
+
+
+def _check_one_campaign(stores: Sequence[ResultStore]) -> None:
+    first = stores[0]
+    faults = []
+    for store in stores[1:]:
+        lines = differing_keys(store.identity, first.identity)
+        lines += [
+            f"{name}: {store.versions.get(name)} in the file, {first.versions.get(name)} there"
+            for name in ("tolstat", "sources")
+            if store.versions.get(name) != first.versions.get(name)
+        ]
+        lines = [line.replace("in the study", "there") for line in lines]
+        if store.retries != first.retries:
+            lines.append("other retries in the file than there")
+        if lines:
+            found = "\n    ".join([f"is not of the campaign of {first.path}", *lines])
+            faults.append(
+                Fault(str(store.path), found, "leave it out, or compute it again with the same study and code")
+            )
+    missing = _missing(stores)
+    if missing:
+        listed = ", ".join(f"{rows.start}:{rows.stop}" for rows in missing)
+        remedy = f"compute each, with: tolstat run STUDY --rows {missing[0].start}:{missing[0].stop} --out FILE"
+        faults.append(Fault("merge", f"no file holds rows {listed} of {first.campaign_rows}", remedy))
+    if first.history_specs:
+        remedy = "finish it first, with: tolstat run"
+        pending = [store for store in stores if not store.complete]
+        faults += [Fault(str(s.path), "has joints pending, with histories to come", remedy) for s in pending]
+    if faults:
+        raise InputError(faults)
+
+
+def _missing(stores: Sequence[ResultStore]) -> list[range]:
+    """Rows of the campaign that no file holds."""
+    missing, covered = [], 0
+    for store in stores:
+        if store.rows.start > covered:
+            missing.append(range(covered, store.rows.start))
+        covered = max(covered, store.rows.stop)
+    if covered < stores[0].campaign_rows:
+        missing.append(range(covered, stores[0].campaign_rows))
+    return missing
+
+
+def _shares(stores: Sequence[ResultStore]) -> Iterator[tuple[ResultStore, int]]:
+    """Files that add rows to those of the files before them, and from which of their rows on."""
+    covered = 0
+    for store in stores:
+        if store.rows.stop > covered:
+            yield store, covered - store.rows.start
+            covered = store.rows.stop
+
+
+def _blocks(
+    store: ResultStore, read: Callable[[slice], NDArray[np.void]], begin: int = 0
+) -> Iterator[NDArray[np.void]]:
+    for first in range(begin, store.n, BLOCK):
+        yield read(slice(first, first + BLOCK))

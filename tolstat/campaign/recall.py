@@ -1,0 +1,62 @@
+"""The study of a campaign, from its result file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+from tolstat.campaign.run import differing_keys
+from tolstat.common.errors import Fault, StoreError
+from tolstat.store import ResultStore
+from tolstat.study import Study, load, subset_of
+from tolstat.study.model import Solver
+
+
+def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -> Study:
+    """Read the study that a result file was made from.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The file. It keeps the text of its study; a joint file or measured data that the text names by a path are
+        looked for from the result file's folder.
+    n : int, optional
+        Number of joints instead of the campaign's.
+    path : Path, optional
+        The study file to take instead of the text.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        When the study cannot be read any more.
+    StoreError
+        When it gives another campaign than the one in the file.
+    """
+    held = store.sampling["n"]
+    source = path if path is not None else store.path.parent / f"{store.study_name}.toml"
+    text = None if path is not None else store.study_text
+    study = load(source, n=held, text=text)
+    if store.sampling["method"] == "subset":
+        study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
+    if path is None:
+        study = replace(study, solver=_solver(store, study))
+    differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
+    if differing:
+        found = "\n    ".join(["its study is not as it was when the file was made", *differing])
+        raise StoreError(str(Fault(str(store.path), found, "give the study file as it was then with --study")))
+    if n is None:
+        return study
+    return replace(load(source, n=n, text=text), solver=study.solver)
+
+
+def _solver(store: ResultStore, study: Study) -> Solver:
+    """Settings that the file was made with: those of its study, but for the files of two fidelities."""
+    held = {key.removeprefix("solver."): value for key, value in store.identity.items() if key.startswith("solver.")}
+    own = study.solver.model_dump()
+    changed = {key: value for key, value in held.items() if key in own and own[key] != value}
+    return study.solver.model_copy(update=changed)

@@ -1,0 +1,131 @@
+"""One joint of a campaign again, from its result file alone, and whether it comes out as it is stored."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.campaign.trace import CaseResult
+from tolstat.common.columns import Column
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.tables import Options, Status
+from tolstat.solver.simulation import simulate_rows, warm_up
+from tolstat.store import ResultStore
+from tolstat.store.provenance import versions
+from tolstat.store.recorded import options_of, parameters
+
+
+class Difference(NamedTuple):
+    """A value that did not come out as it is stored.
+
+    Attributes
+    ----------
+    name : str
+        Column of the results, or ``histories/`` and the name of a history.
+    stored, now : float
+        The value; for a history the two values that are furthest apart.
+    """
+
+    name: str
+    stored: float
+    now: float
+
+    @property
+    def relative(self) -> float:
+        """Difference relative to the larger of both; infinite where one is not finite."""
+        if not np.isfinite([self.stored, self.now]).all():
+            return np.inf
+        return abs(self.now - self.stored) / max(abs(self.now), abs(self.stored))
+
+
+class Replay(NamedTuple):
+    """A joint computed again.
+
+    Attributes
+    ----------
+    row : int
+        Row of the campaign.
+    result : CaseResult
+        The joint, with full histories.
+    stored : Status
+        What became of it in the campaign.
+    differences : list of Difference
+        Values that are not the same to the last bit.
+    code : list of str
+        What of the code is another than that which made the file: ``"numpy: 2.1.0 then, 2.4.6 now"``.
+    """
+
+    row: int
+    result: CaseResult
+    stored: Status
+    differences: list[Difference]
+    code: list[str]
+
+
+def replay(store: ResultStore, row: int) -> Replay:
+    """Compute a joint of a campaign again.
+
+    Parameters
+    ----------
+    store : ResultStore
+        The result file.
+    row : int
+        Row of the campaign.
+
+    Returns
+    -------
+    Replay
+
+    Raises
+    ------
+    InputError
+        When the file has no such row, it is pending, or the file's joint or options mean nothing to this version.
+    """
+    place = str(store.path)
+    if row not in store.rows:
+        found = f"has the rows {store.rows.start} to {store.rows.stop - 1}, not {row}"
+        raise InputError([Fault(place, found, "give one of these with --row")])
+    here = slice(row - store.rows.start, row - store.rows.start + 1)
+    stored = store.results(here)
+    if stored["status"][0] == Status.PENDING:
+        raise InputError([Fault(place, f"row {row} is pending", "simulate it first, with: tolstat run")])
+    params = parameters(store, np.array([here.start]))
+    options = options_of(store, here.start)
+    warm_up()
+    begin = time.perf_counter()
+    simulation = simulate_rows(params, options, "full")
+    result = CaseResult(simulation, float(params["alpha"][0]), time.perf_counter() - begin, options)
+    differences = _different_results(store.columns, stored, simulation.results)
+    if store.history_specs:
+        differences += _different_histories(store, here.start, params, options)
+    now = versions()
+    code = [f"{name}: {store.versions.get(name)} then, {new} now" for name, new in now.items()]
+    changed = [line for line, name in zip(code, now, strict=True) if store.versions.get(name) != now[name]]
+    return Replay(row, result, Status(stored["status"][0]), differences, changed)
+
+
+def _different_results(
+    columns: tuple[Column, ...], stored: NDArray[np.void], now: NDArray[np.void]
+) -> list[Difference]:
+    found = []
+    for c in columns:
+        before, after = (np.ascontiguousarray(c.of(table)) for table in (stored, now))
+        if before.tobytes() != after.tobytes():
+            found.append(Difference(c.name, float(before[0]), float(after[0])))
+    return found
+
+
+def _different_histories(store: ResultStore, row: int, params: NDArray[np.void], options: Options) -> list[Difference]:
+    kind: Any = store.identity["output.histories"]
+    now = simulate_rows(params, options, kind, store.identity["output.harmonics"]).histories
+    found = []
+    for name in store.history_specs:
+        before = store.histories(name, np.array([row]))
+        if before.tobytes() != now[name].tobytes():
+            apart = np.nan_to_num(np.abs(before.astype(float) - now[name]), nan=np.inf)
+            at = np.unravel_index(np.argmax(apart), apart.shape)
+            found.append(Difference(f"histories/{name}", float(before[at]), float(now[name][at])))
+    return found

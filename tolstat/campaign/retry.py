@@ -1,0 +1,131 @@
+"""Joints that ended in some states, once more: with other settings of the solver, or as they were."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from tolstat.common import strict as schema
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.tables import HistorySpec, Options, Status
+from tolstat.solver import fidelity
+from tolstat.store import ResultStore
+
+if TYPE_CHECKING:
+    from tolstat.study import Study
+
+
+class Retry(NamedTuple):
+    """Which joints are simulated again, and how.
+
+    Attributes
+    ----------
+    status : tuple of Status
+        States of the joints.
+    settings : dict
+        Settings other than the study's, ``{"solver.steps_per_rev": 360}``.
+    options : Options
+        All settings.
+    auto : bool
+        Whether fidelity and steps a revolution are those that ``solver.fidelity = "auto"`` chose for the campaign.
+    """
+
+    status: tuple[Status, ...]
+    settings: dict[str, Any]
+    options: Options
+    auto: bool = False
+
+    def chosen(self, record: Mapping[str, Any]) -> Retry:
+        """Take over what ``auto`` chose for a campaign, where nothing else is asked for."""
+        return self._replace(options=fidelity.apply(self.options, record)) if self.auto else self
+
+    def entry(self) -> dict[str, Any]:
+        """What the result file keeps of it."""
+        status = [state.label for state in self.status]
+        return {"status": status, "settings": self.settings, "options": self.options._asdict()}
+
+
+def parse(states: str, settings: Sequence[str], study: Study) -> Retry:
+    """Read what a user has asked for.
+
+    Parameters
+    ----------
+    states : str
+        ``"newton_failed,timeout"``.
+    settings : sequence of str
+        ``"solver.steps_per_rev=360"``: a key of the study's ``[solver]`` and its value as in TOML.
+    study : Study
+        The study whose settings they replace.
+
+    Raises
+    ------
+    InputError
+        With every fault.
+    """
+    faults: list[Fault] = []
+    labels = {state.label: state for state in Status if state != Status.PENDING}
+    names = [name.strip() for name in states.split(",")]
+    for name in names:
+        if name not in labels:
+            faults.append(Fault("--retry", f"{name!r} is no state", schema.did_you_mean(name, list(labels))))
+    changed: dict[str, Any] = {}
+    for text in settings:
+        with gather(faults):
+            key, value = _setting(text)
+            changed[key] = value
+    solver = study.solver
+    with gather(faults):
+        new = {key.removeprefix("solver."): value for key, value in changed.items()}
+        solver = schema.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
+    if faults:
+        raise InputError(faults)
+    chosen = tuple(labels[name] for name in dict.fromkeys(names))
+    return Retry(chosen, changed, solver.options(), auto=solver.fidelity == "auto")
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    key, equals, value = text.partition("=")
+    if not (equals and key.startswith("solver.")):
+        raise InputError([Fault("--set", f"{text!r} sets nothing of the solver", "write solver.steps_per_rev=360")])
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()  # a word, which a shell has taken the quotes from
+
+
+def begin(store: ResultStore, retry: Retry, specs: Mapping[str, HistorySpec], tell: Callable[[str], None]) -> None:
+    """Make the joints pending that are to be simulated again, unless this very retry is under way in the file.
+
+    Parameters
+    ----------
+    store : ResultStore
+        Open for writing.
+    retry : Retry
+        Which joints, and how.
+    specs : mapping of str to HistorySpec
+        Histories that joints simulated so would have.
+    tell : callable
+        Told how many joints there are.
+
+    Raises
+    ------
+    InputError
+        When histories would have another shape than those of the other joints.
+    StoreError
+        When there is no room for a second copy of the file.
+    """
+    entry = json.loads(json.dumps(retry.entry()))
+    number = len(store.retries)
+    if store.retries[-1:] == [entry] and np.any(store.attempt()[store.pending()] == number):
+        return
+    if dict(specs) != store.history_specs:
+        found = "with these settings load histories have another number of samples than those in the file"
+        raise InputError([Fault("--set", found, "leave solver.steps_per_rev as it is, or run a campaign of its own")])
+    rows = np.flatnonzero(np.isin(store.status(), retry.status))
+    tell(f"{rows.size} joints once more")
+    if rows.size:
+        store.begin_retry(rows, entry)

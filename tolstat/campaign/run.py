@@ -1,0 +1,273 @@
+"""A campaign: the pending rows of a result file through the simulation and back into the file."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.campaign import signals, verify
+from tolstat.campaign.blocks import Execution, Stages, pending, simulate_pending
+from tolstat.campaign.executors import WorkerDied
+from tolstat.campaign.progress import Reporter, note
+from tolstat.campaign.retry import Retry, begin
+from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.tables import Status
+from tolstat.solver import fidelity, rainflow
+from tolstat.store import Counts, ResultStore
+from tolstat.store.provenance import versions
+from tolstat.store.recorded import perturbed, settings
+
+if TYPE_CHECKING:
+    from tolstat.study import Study
+
+
+class Interrupted(Exception):
+    """A campaign was stopped by a signal; the file holds all finished blocks.
+
+    Attributes
+    ----------
+    path : Path
+        The result file.
+    counts : Counts
+        How far the campaign is.
+    exit_code : int
+        128 and the number of the signal: 130 after Ctrl-C, 143 after SIGTERM.
+    """
+
+    def __init__(self, path: Path, counts: Counts, number: int = signal.SIGINT) -> None:
+        self.path = path
+        self.counts = counts
+        self.exit_code = 128 + number
+        super().__init__(
+            f"stopped: {counts.done} of {counts.total} joints are kept in {path}\n  hint: run the same command to go on"
+        )
+
+
+def run(
+    study: Study,
+    out: str | Path,
+    workers: int | None = None,
+    block: int | None = None,
+    progress: Reporter | None = None,
+    stages: Stages | None = None,
+    rows: range | None = None,
+    until_row: int | None = None,
+    execution: Execution | None = None,
+    retry: Retry | None = None,
+    tell: Callable[[str], None] = note,
+    check: bool = True,
+) -> Counts:
+    """Simulate the joints of a study that its result file does not hold yet.
+
+    Neither workers nor blocks nor interruptions change a number in the file.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    out : str or Path
+        Result file; made if it does not exist, otherwise its pending rows are done, and limits, text and name of the
+        study taken over.
+    workers, block : int, optional
+        Short for an `Execution` of these.
+    progress : Reporter, optional
+        Told how far the campaign is, at the start and after every block.
+    stages : Stages, optional
+        Other functions than tolstat's own.
+    rows : range, optional
+        Rows of the campaign that the file holds, a slice of it; all without it.
+    until_row : int, optional
+        Rows of the campaign from this one on are left pending.
+    execution : Execution, optional
+        Where and how to simulate.
+    retry : Retry, optional
+        Joints that are simulated once more, and how.
+    tell : callable, optional
+        Told which fidelity ``auto`` has chosen, why a joint was given up, and how many are simulated once more.
+    check : bool
+        Simulate a few of the joints in other ways at the end, to know the numerical error; see `verify.small`.
+
+    Returns
+    -------
+    Counts
+        How the joints ended.
+
+    Raises
+    ------
+    InputError
+        When workers, block or time limit cannot be, or `rows` are none of the study's.
+    StoreError
+        When the file is of another study or was begun by other code (it names what differs), or cannot be used.
+    Interrupted
+        When Ctrl-C was pressed or the process was asked to end.
+    WorkerDied
+        When worker processes die whatever they work at; the file holds all finished blocks.
+    """
+    execution = execution or Execution(workers=workers, block=block)
+    _check_positive(workers=execution.workers, block=execution.block, joint_timeout=execution.joint_timeout)
+    stages = stages or _own_stages()
+    path = Path(out)
+    with signals.caught() as stop, _create_or_resume(study, path, stages, rows, tell) as store:
+        if retry:
+            retry = retry.chosen(store.fidelity)
+            begin(store, retry, stages.history_specs(retry.options, *_history_options(study)), tell)
+        counts = store.counts()
+        last = store.n if until_row is None else until_row - store.rows.start
+        try:
+            if progress:
+                progress(counts)
+            if next(pending(store, last), None) is not None:
+                stages.warm_up()
+                store.begin_session(counts.done)
+            finished = simulate_pending(study, store, last, stages, execution, stop)
+            with stop.patiently(), closing(finished):
+                for done in finished:
+                    store.write(done.rows, done.simulation)
+                    counts = counts.after(done.simulation.results["status"])
+                    if done.trouble:
+                        status = Status(done.simulation.results["status"][0])
+                        tell(f"row {store.rows[done.rows[0]]}: {status.label}: {done.trouble}")
+                    if progress:
+                        progress(counts)
+            if check:
+                verify.small(store, partial(_rows_of, study, store, stages), stages.simulate)
+            store.finish()
+            store.end_session()
+        except KeyboardInterrupt:
+            store.end_session()
+            raise Interrupted(path, store.counts(), stop.number) from None
+        except WorkerDied as error:
+            kept = f"{counts.done} of {counts.total} joints are kept in {path}"
+            raise WorkerDied(f"{error}\n  {kept}: run the same command to go on") from error
+        if next(pending(store, last), None) is not None:
+            raise Interrupted(path, counts, stop.number)
+        return counts
+
+
+def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """Compare two identities of studies.
+
+    Returns
+    -------
+    list of str
+        ``"solver.steps_per_rev: 90 in the file, 180 in the study"`` for every key that differs.
+    """
+    lines = []
+    for key in sorted(held.keys() | wanted.keys()):
+        if key not in wanted or key not in held or held[key] != wanted[key]:
+            sides = (f"{side[key]!r}" if key in side else "nothing" for side in (held, wanted))
+            lines.append("{}: {} in the file, {} in the study".format(key, *sides))
+    return lines
+
+
+def _own_stages() -> Stages:
+    from tolstat import joint, sampling
+    from tolstat.solver import simulation
+
+    return Stages(
+        sampling.draw_blocks,
+        sampling.dimensions,
+        joint.perturb,
+        simulation.history_specs,
+        simulation.simulate_rows,
+        simulation.warm_up,
+        sampling.origin_blocks,
+    )
+
+
+def _create_or_resume(
+    study: Study, path: Path, stages: Stages, rows: range | None, tell: Callable[[str], None]
+) -> ResultStore:
+    rows = range(study.rows) if rows is None else rows
+    if not (0 <= rows.start < rows.stop <= study.rows and rows.step == 1):
+        found = f"{rows.start}:{rows.stop} are no rows of the {study.rows} that the study has"
+        raise InputError([Fault("rows", found, f"give a part of 0:{study.rows}")])
+    if not path.exists():
+        choice = choose_fidelity(study, stages) if study.solver.fidelity == "auto" else {}
+        if choice:
+            tell(fidelity.describe(choice))
+        options = settings(study.solver, choice)
+        histories = stages.history_specs(options, *_history_options(study))
+        errors = stages.draw(study, rows)
+        origin = stages.origins(study, rows)
+        return ResultStore.create(path, study, errors, histories, stages.dimensions(), rows, options, choice, origin)
+    store = ResultStore.open(path, "r+")
+    try:
+        _check_same(store, study, rows)
+        store.judge_by(study)
+    except StoreError:
+        store.close()
+        raise
+    return store
+
+
+def _rows_of(study: Study, store: ResultStore, stages: Stages, rows: NDArray[np.intp]) -> NDArray[np.void]:
+    """Parameters of rows of the file, (m,) table PARAM."""
+    errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
+    return perturbed(study, rows + store.rows.start, errors, stages.perturb)
+
+
+def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any]:
+    """Choose the fidelity of a new campaign by a pilot of its joints.
+
+    Returns
+    -------
+    dict
+        The record of the choice, see `fidelity.Choice`.
+    """
+    stages = stages or _own_stages()
+    stages.warm_up()
+    rows = fidelity.pilot(study.rows, study.sampling.nominal_first, study.sampling.seed)
+    errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
+    params = perturbed(study, rows, errors, stages.perturb)
+    simulate = partial(stages.simulate, histories="none", n_harmonics=0)
+    budget, least = study.solver.error_budget, _least_steps(*_history_options(study))
+    return fidelity.choose(params, study.solver.options(), budget, study.asked, simulate, least).record
+
+
+def _least_steps(histories: str, n_harmonics: int) -> int:
+    """Fewest steps a revolution that the histories kept can be made from."""
+    harmonics = 2 * n_harmonics + 1 if "harmonics" in histories else 0
+    return max(harmonics, rainflow.LEAST_SAMPLES if "cycles" in histories else 0)
+
+
+def _check_same(store: ResultStore, study: Study, rows: range) -> None:
+    differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
+    found, remedy = "is the result file of another study", "use another --out, or delete the file"
+    if not differing:
+        began = f"commit {store.git_commit}" if store.git_commit else "the code that began it"
+        found, remedy = "was begun by other code", f"use another --out, or go on with {began}"
+    now = versions()
+    for name, noun in (("tolstat", "version"), ("sources", "hash")):
+        held = store.versions.get(name, "unknown")
+        if held != now[name]:
+            differing.append(f"{name}: {noun} {held} in the file, {now[name]} now")
+    if not differing and store.rows != rows:
+        held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
+        raise StoreError(str(Fault(str(store.path), f"holds rows {held}, not {asked}", f"give --rows {held}")))
+    if differing:
+        lines = "\n    ".join([found, *differing])
+        raise StoreError(str(Fault(str(store.path), lines, remedy)))
+
+
+def _check_positive(**numbers: float | None) -> None:
+    faults = []
+    for name, value in numbers.items():
+        if value is not None and not (value > 0 if isinstance(value, float) else value >= 1):
+            faults.append(
+                Fault(name, f"{value} is too small", "give a time above zero, or a whole number of 1 or more")
+            )
+    if faults:
+        raise InputError(faults)
+
+
+def _history_options(study: Study) -> tuple[str, int]:
+    return study.output.histories, study.output.harmonics

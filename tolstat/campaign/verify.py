@@ -1,0 +1,357 @@
+"""Numerical error of a campaign: some of its joints, simulated again in other ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.campaign.executors import Lost, Work, map_here, map_in_processes
+from tolstat.common import selected_results as kept
+from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
+from tolstat.store import Counts, ResultStore, recorded, verification
+from tolstat.store.provenance import versions
+from tolstat.store.verification import Check, Verification
+
+if TYPE_CHECKING:
+    from tolstat.study import Study
+
+SMALL = ("half_step", "newton", "settling")
+"""Checks at the end of every run: they need no other code than the run did."""
+FULL = (*SMALL, "method", "reference")
+LEAST_STEPS = 180
+"""Steps a revolution, at least, of the dynamic joint beside one of lower fidelity."""
+DESCRIPTION = {
+    "half_step": "twice as many steps a revolution",
+    "newton": "Newton stops at a hundredth of solver.newton_tol",
+    "settling": "from the other start, settled at a hundredth of solver.settle_tol",
+    "method": "another method of integration",
+    "fidelity": "dynamic, where the campaign is below",
+    "reference": "scipy's Radau, rtol 1e-7, largest loads at 2880 angles and all steps",
+}
+SMALL_SHARE, SMALL_MOST = 400, 16
+"""One joint in 400 is checked at the end of a run, at least one and at most 16: some 2 % of its time."""
+
+Simulate = Callable[..., Simulation]
+Progress = Callable[[Counts], None]
+
+
+def silent(counts: Counts) -> None:
+    """Tell nobody how far it is."""
+
+
+def changed(options: Options, check: str) -> Options:
+    """Return the settings of a check.
+
+    Parameters
+    ----------
+    options : Options
+        Settings of the campaign.
+    check : str
+        One of `FULL`, or ``fidelity``.
+    """
+    if check == "half_step":
+        return options._replace(steps_per_rev=2 * options.steps_per_rev)
+    if check == "newton":
+        return options._replace(newton_tol=0.01 * options.newton_tol)
+    if check == "settling":
+        other_start = Start.RAMP if options.start == Start.STATIC else Start.STATIC
+        return options._replace(settle_tol=0.01 * options.settle_tol, start=int(other_start))
+    if check == "method":
+        other = Method.BDF2 if options.method == Method.TR_BDF2 else Method.TR_BDF2
+        return options._replace(method=int(other))
+    if check == "fidelity" and options.fidelity != Fidelity.DYNAMIC:
+        steps = max(options.steps_per_rev, LEAST_STEPS)
+        return options._replace(fidelity=int(Fidelity.DYNAMIC), steps_per_rev=steps)
+    return options
+
+
+def choose(rows: NDArray[np.intp], joints: int | None, seed: int) -> NDArray[np.intp]:
+    """Choose `joints` of the `rows` at random, all if there are fewer or it is None; ascending."""
+    if joints is None:
+        return rows
+    rng = np.random.default_rng([seed, 4])  # 4: not the numbers that errors were drawn with
+    return np.sort(rng.choice(rows, min(joints, len(rows)), replace=False))
+
+
+def run_checks(
+    params: NDArray[np.void],
+    options: Sequence[Options],
+    names: Iterable[str],
+    simulate: Simulate | None = None,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> dict[str, Check]:
+    """Simulate joints in other ways.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (m,)
+        The joints.
+    options : sequence of Options
+        Settings that the campaign has for each of them.
+    names : iterable of str
+        Which of `FULL`; ``fidelity`` is added where a joint is below dynamic fidelity.
+    simulate : callable, optional
+        In place of `simulation.simulate_rows`.
+    workers : int
+        Processes that share the references, each of which takes seconds; they are the same to their tolerance.
+    progress : callable
+        Told of the joints that have their reference.
+
+    Returns
+    -------
+    dict of str to Check
+    """
+    lower = any(own.fidelity != Fidelity.DYNAMIC for own in options)
+    checks = {}
+    for name in (*names, *(("fidelity",) if lower else ())):
+        own = [changed(one, name) for one in options]
+        if name == "reference":
+            results = _references(params, own, workers, progress)
+        else:
+            results = by_options(partial(_plain, simulate), params, own)
+        checks[name] = Check(DESCRIPTION[name], own[0]._asdict(), results)
+    return checks
+
+
+Single = tuple[int, NDArray[np.void], Options]
+"""A joint: its place, its row of PARAM, its settings."""
+
+
+def _references(
+    params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
+) -> NDArray[np.void]:
+    """Reference of each joint, (m,) table RESULT, one after the other in each process."""
+    blocks: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
+    work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
+    done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
+    workers = min(workers, len(blocks))
+    done = map_in_processes(work, blocks, workers) if workers > 1 else map_here(work, blocks)
+    results, counts = without_results(len(blocks), Status.CRASHED), Counts(len(blocks), 0, 0, 0)
+    progress(counts)
+    with closing(done):
+        for (i, _, _), result in done:
+            if not isinstance(result, Lost):
+                results[i] = result[0]
+            counts = counts.after(results["status"][i : i + 1])
+            progress(counts)
+    return results
+
+
+def _reference(joint: Single) -> NDArray[np.void]:
+    from tolstat.solver.reference import reference_rows
+
+    _, params, options = joint
+    return reference_rows(params, options)
+
+
+def _plain(simulate: Simulate | None, params: NDArray[np.void], options: Options) -> NDArray[np.void]:
+    from tolstat.solver.simulation import simulate_rows
+
+    return (simulate or simulate_rows)(params, options, histories="none", n_harmonics=0).results
+
+
+def by_options(
+    solve: Callable[[NDArray[np.void], Options], NDArray[np.void]],
+    params: NDArray[np.void],
+    options: Sequence[Options],
+) -> NDArray[np.void]:
+    """Results of joints that have settings of their own, (m,) table RESULT, in as few calls as there are settings."""
+    results = np.empty(len(params), RESULT)
+    for one in dict.fromkeys(options):
+        here = np.array([own == one for own in options])
+        results[here] = solve(params[here], one)
+    return results
+
+
+def of_campaign(
+    store: ResultStore,
+    parameters: Callable[[NDArray[np.intp]], NDArray[np.void]],
+    names: Iterable[str],
+    joints: int | None,
+    seed: int,
+    simulate: Simulate | None = None,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Verification | None:
+    """Check settled joints of a campaign.
+
+    Parameters
+    ----------
+    store : ResultStore
+        Its file.
+    parameters : callable
+        Rows (m,) -> their parameters, (m,) table PARAM.
+    names, simulate, workers, progress
+        As in `run_checks`.
+    joints : int or None
+        How many joints; None for all, the one without errors included.
+    seed : int
+        What they are chosen by.
+
+    Returns
+    -------
+    Verification or None
+        None when no joint is settled.
+    """
+    settled = np.flatnonzero(store.status() == Status.OK)
+    if joints is not None and store.sampling["nominal_first"] and len(settled) > 1:
+        settled = settled[settled > 0]  # the joint without errors is not in the statistics either
+    rows = choose(settled, joints, seed)
+    if not rows.size:
+        return None
+    options = [recorded.options_of(store, row) for row in rows.tolist()]
+    checks = run_checks(parameters(rows), options, names, simulate, workers, progress)
+    for check in checks.values():
+        kept.blank_others(check.results, store.columns)
+    base = np.concatenate([store.results(slice(row, row + 1)) for row in rows.tolist()])
+    return Verification(seed, rows, base, checks)
+
+
+def small(store: ResultStore, parameters: Callable[..., NDArray[np.void]], simulate: Simulate) -> None:
+    """Check a few joints of a complete campaign and keep that in its file, unless it is a slice or has them already."""
+    if not (store.complete and store.whole) or verification.read(store) is not None:
+        return
+    joints = min(max(store.n // SMALL_SHARE, 1), SMALL_MOST)
+    found = of_campaign(store, parameters, SMALL, joints, int(store.sampling["seed"]), simulate)
+    if found is not None:
+        verification.write(store, found)
+
+
+def check(
+    path: Path,
+    joints: int | str = 24,
+    seed: int | None = None,
+    on_start: Callable[[], None] = lambda: None,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Verification:
+    """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
+
+    `on_start` is called when the input is known to be good, before the work.
+    """
+    from tolstat.study import load
+
+    if path.suffix != ".toml":
+        return check_file(path, joints, seed, on_start=on_start, workers=workers, progress=progress)
+    faults: list[Fault] = []
+    with gather(faults):
+        number_of(joints)
+    with gather(faults):
+        plan = load(path)
+    if faults:
+        raise InputError(faults)
+    on_start()
+    return check_study(plan, joints, seed, workers=workers, progress=progress)
+
+
+def check_file(
+    path: Path,
+    joints: int | str = 24,
+    seed: int | None = None,
+    names: Iterable[str] = FULL,
+    on_start: Callable[[], None] = lambda: None,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Verification:
+    """Check joints of a result file and keep that in it, in place of an earlier verification.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its campaign may be unfinished.
+    joints : int or "all"
+        Number of joints; all are those that settled, the one without errors included.
+    seed : int, optional
+        What they are chosen by; the campaign's own seed without it.
+    names : iterable of str
+        Which of `FULL`.
+    on_start : callable
+        Called when the file is known to be good, before the work.
+    workers, progress
+        As in `run_checks`.
+
+    Returns
+    -------
+    Verification
+
+    Raises
+    ------
+    StoreError
+        When the file cannot be used, was made by other code, or has no settled joint.
+    InputError
+        When `joints` is something else.
+    """
+    number = number_of(joints)
+    with ResultStore.open(path, "r+") as store:
+        if any(store.versions.get(key) != value for key, value in versions().items() if key in ("tolstat", "sources")):
+            remedy = "verify it with that code, or run the campaign again with another --out"
+            raise StoreError(str(Fault(str(path), "was made by other code", remedy)))
+        seed = int(store.sampling["seed"]) if seed is None else seed
+        if not (store.status() == Status.OK).any():
+            raise StoreError(str(Fault(str(path), "has no settled joint", "run the campaign first: tolstat run")))
+        on_start()
+        params = partial(recorded.parameters, store)
+        found = of_campaign(store, params, names, number, seed, None, workers, progress)
+        assert found is not None
+        verification.write(store, found)
+    return found
+
+
+def check_study(
+    plan: Study,
+    joints: int | str = 24,
+    seed: int | None = None,
+    names: Iterable[str] = FULL,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Verification:
+    """Check joints of a study that has not been run: they are simulated as it would, and in other ways.
+
+    Parameters, returns and raises as `check_file`; joints that do not settle are among those returned.
+    """
+    from tolstat.joint import perturb
+    from tolstat.sampling import draw
+
+    number = number_of(joints)
+    if plan.solver.fidelity == "auto":
+        remedy = "run the study and verify its result file"
+        raise InputError([Fault(f"{plan.path}: solver.fidelity", "'auto' chooses when the study is run", remedy)])
+    seed = plan.sampling.seed if seed is None else seed
+    first = int(plan.sampling.nominal_first and number is not None)
+    rows = choose(np.arange(first, plan.rows), number, seed)
+    params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)
+    options = [plan.solvers[number].options() for number in recorded.variants(plan, rows).tolist()]
+    base = by_options(partial(_plain, None), params, options)
+    checks = run_checks(params, options, names, None, workers, progress)
+    for results in (base, *(check.results for check in checks.values())):
+        kept.blank_others(results, plan.output.columns)
+    return Verification(seed, rows, base, checks)
+
+
+def number_of(joints: int | str) -> int | None:
+    """Return how many joints are meant; None for ``"all"``.
+
+    Raises
+    ------
+    InputError
+        When it is no whole number of 1 or more.
+    """
+    if joints == "all":
+        return None
+    try:
+        number = int(joints)
+    except ValueError:
+        found = f"{joints!r} is no whole number"
+    else:
+        if number >= 1:
+            return number
+        found = f"{number} is less than one"
+    raise InputError([Fault("joints", found, 'give a whole number of 1 or more, or "all"')])

@@ -1,0 +1,70 @@
+"""How each joint of a campaign was drawn, where that is more than its number: tables by sampling method.
+
+They lie in the group ``origin`` of the result file. Row i is joint i there, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tolstat.common.columns import Column
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.tables import Field, dtype_of
+
+IMPORTANCE_FIELDS = (
+    Field("component", "1", "what it was drawn from: 0 the tolerances, k proposal k; -1 the nominal joint", "i4"),
+    Field("weight", "1", "density of its errors under the tolerances over that under the mixture; 0 if not drawn"),
+)
+SUBSET_FIELDS = (
+    Field("level", "1", "level of the subset simulation: 0 is drawn from the tolerances, -1 the nominal joint", "i4"),
+    Field("parent", "1", "row of the joint whose errors were moved to give these; -1 at level 0", "i8"),
+)
+FIELDS: dict[str, tuple[Field, ...]] = {"importance": IMPORTANCE_FIELDS, "subset": SUBSET_FIELDS}
+"""Columns by sampling method; methods that are not here have no such table."""
+IMPORTANCE, SUBSET = dtype_of(IMPORTANCE_FIELDS), dtype_of(SUBSET_FIELDS)
+
+
+def columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:
+    """Columns of the table; empty where the method needs none.
+
+    Parameters
+    ----------
+    sampling : mapping
+        The attribute ``sampling`` of a result file.
+    """
+    fields = FIELDS.get(sampling["method"], ())
+    return tuple(Column(f.name, f.unit, f.description, f.dtype, f.name, ()) for f in fields)
+
+
+def dtype(sampling: Mapping[str, Any]) -> np.dtype[np.void]:
+    """Structured type of a row of the table."""
+    return dtype_of(FIELDS[sampling["method"]])
+
+
+def check_counted(sampling: Mapping[str, Any], path: Path, weighted: bool = False) -> None:
+    """Refuse a file whose joints were not drawn from the tolerances alone, where they would be counted alike.
+
+    Parameters
+    ----------
+    sampling : mapping
+        The attribute ``sampling`` of the file.
+    path : Path
+        The file.
+    weighted : bool
+        Whether joints are counted by their weights.
+
+    Raises
+    ------
+    StoreError
+        With what can be asked of such a file.
+    """
+    if sampling["method"] == "subset":
+        remedy = f"ask for its probability with: tolstat rare {path}"
+        raise StoreError(str(Fault(str(path), "holds the levels of a subset simulation, no sample", remedy)))
+    if sampling["method"] == "importance" and not weighted:
+        found = "holds joints that count differently (importance sampling), which this statistic does not go by"
+        raise StoreError(str(Fault(str(path), found, 'use tolstat report, or sampling.method = "random"')))

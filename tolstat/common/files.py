@@ -1,0 +1,109 @@
+"""Where the package keeps its data, and files that are whole or not there."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tolstat.common.errors import Fault, InputError
+
+
+def data_dir() -> Path:
+    """Directory of the data that comes with the package: in an installed wheel, or beside a checkout's."""
+    package = Path(__file__).parent.parent
+    inside = package / "data"
+    return inside if inside.is_dir() else package.parent / "data"
+
+
+def check_target(path: Path, *inputs: Path) -> None:
+    """Check, before the work whose result it shall hold, that a file can be written.
+
+    Raises
+    ------
+    InputError
+        When `path` is a folder, its folder is not there, or it is one of `inputs`.
+    """
+    place = str(path)
+    if path.is_dir():
+        raise InputError([Fault(place, "cannot be written: is a folder", "give the path of a file")])
+    if not path.parent.is_dir():
+        raise InputError([Fault(place, "cannot be written: no such folder", "make the folder first")])
+    if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
+        raise InputError([Fault(place, "cannot be written: it is the input", "give another name")])
+
+
+@contextmanager
+def writing(path: Path, overwrite: bool = True) -> Iterator[Path]:
+    """Yield a temporary name beside `path`; what is written there becomes `path` if all went well.
+
+    Parameters
+    ----------
+    path : Path
+        The name that the file shall have. It never names half a file.
+    overwrite : bool
+        Whether a file of that name is replaced.
+
+    Raises
+    ------
+    FileExistsError
+        When `overwrite` is false and `path` exists, even if it came to exist in the meantime.
+    """
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        yield temporary
+        sync(temporary)
+        if overwrite:
+            os.replace(temporary, path)
+        else:
+            _rename_new(temporary, path)
+        sync(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def check_room(path: Path, size: int) -> None:
+    """Check that a file of `size` bytes can be written beside `path`, by taking the room for a moment.
+
+    HDF5 does not survive a full disk: a file that cannot be closed stays open, and complains of it to the end.
+
+    Raises
+    ------
+    OSError
+        When there is no room.
+    """
+    if not hasattr(os, "posix_fallocate"):
+        return
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
+    try:
+        os.posix_fallocate(handle, 0, size)
+    finally:
+        os.close(handle)
+        temporary.unlink()
+
+
+def sync(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    folder = path.is_dir()
+    if folder and os.name != "posix":  # other systems do not open folders
+        return
+    handle = os.open(path, os.O_RDONLY if folder else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _rename_new(source: Path, target: Path) -> None:
+    """Give `source` another name without replacing a file, which a rename would do silently."""
+    try:
+        os.link(source, target)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without hard links
+        if target.exists():
+            raise FileExistsError(f"{target} exists") from None
+        os.rename(source, target)

@@ -1,0 +1,160 @@
+"""Strict input models: every fault of a file at once, each with its place and a remedy."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import NoneType
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import PydanticCustomError
+
+from tolstat.common.errors import Fault, InputError
+
+
+class Strict(BaseModel):
+    """Base of all input models: unknown keys are faults, values are immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False)
+
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+
+def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
+    """Read a TOML file, or `text` in its place.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or is not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8") if text is None else text)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(
+            [Fault(str(path), f"cannot be read: {reason}", "check the path and its permissions")]
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError([Fault(str(path), f"is not TOML: {error}", "mend the syntax at that place")]) from error
+
+
+def dotted(location: Sequence[int | str]) -> str:
+    """Key path as a user writes it: ``tolerances.pin1.offset_t``, ``correlation[0].rho``."""
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def validate(
+    model: type[ModelT],
+    data: object,
+    place: str,
+    *,
+    prefix: tuple[int | str, ...] = (),
+    context: Mapping[str, Any] | None = None,
+) -> ModelT:
+    """Validate `data` against `model`.
+
+    Parameters
+    ----------
+    model : type
+        A `Strict` model.
+    data : object
+        Parsed TOML, a mapping if it is right.
+    place : str
+        What to put before each key path, usually the file's name.
+    prefix : tuple
+        Key path of `data` in its file; the faults name it.
+    context : mapping, optional
+        Handed to the model's validators.
+
+    Returns
+    -------
+    BaseModel
+        The validated model.
+
+    Raises
+    ------
+    InputError
+        With one `Fault` for every fault in `data`.
+    """
+    try:
+        return model.model_validate(data, context=context)
+    except ValidationError as error:
+        raise InputError(faults(error, model, place, prefix)) from error
+
+
+def faults(
+    error: ValidationError, model: type[BaseModel], place: str, prefix: tuple[int | str, ...] = ()
+) -> list[Fault]:
+    """Translate pydantic's errors to faults with remedies."""
+    return [_fault(e, model, place, prefix) for e in error.errors(include_url=False)]
+
+
+_REMEDIES = {
+    "greater_than": "give a value above {gt}",
+    "greater_than_equal": "give a value of at least {ge}",
+    "less_than": "give a value below {lt}",
+    "less_than_equal": "give a value of at most {le}",
+    "too_short": "give at least {min_length}",
+    "int_type": "write a whole number, without quotes",
+    "int_from_float": "write a whole number",
+    "bool_type": "write true or false, without quotes",
+    "string_type": "write a text in quotes",
+    "list_type": "write a list in [ ]",
+    "dict_type": "write a table",
+    "model_type": "write a table",
+}
+"""Remedy for a kind of pydantic error, filled from the error's context."""
+
+
+def _fault(e: Any, model: type[BaseModel], place: str, prefix: tuple[int | str, ...]) -> Fault:
+    path = dotted((*prefix, *e["loc"]))
+    where = f"{place}: {path}" if path else place
+    context = e.get("ctx", {})
+    if "remedy" in context:
+        return Fault(where, context["found"].replace("{input}", repr(e["input"])), context["remedy"])
+    if e["type"] == "extra_forbidden":
+        return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), _keys_at(model, e["loc"][:-1])))
+    if e["type"] == "missing":
+        return Fault(where, "missing key", f"add {path}")
+    if e["type"] in ("literal_error", "enum"):
+        return Fault(where, f"{e['input']!r} is not allowed", f"write one of {context['expected']}")
+    remedy = _REMEDIES.get(e["type"], "give a value of the kind asked for").format(**context)
+    return Fault(where, f"{e['input']!r}: {e['msg'].removeprefix('Input ')}", remedy)
+
+
+def did_you_mean(word: str, allowed: Sequence[str]) -> str:
+    """Remedy for an unknown word: the closest of the allowed ones, else all of them."""
+    close = difflib.get_close_matches(word, allowed, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
+
+
+def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
+    """Names of the keys that `model` allows at a key path, as far as the models tell."""
+    current: Any = model
+    for part in location:
+        fields = getattr(current, "model_fields", None)
+        if isinstance(part, int):
+            current = next(iter(get_args(current)), None)
+        elif fields is None or part not in fields:
+            return []
+        else:
+            current = fields[part].annotation
+            if NoneType in get_args(current):  # a key that may be left out
+                current = get_args(current)[0]
+    fields = getattr(current, "model_fields", {})
+    return [f.alias or name for name, f in fields.items()]
+
+
+def refuse(found: str, remedy: str) -> PydanticCustomError:
+    """Error for a validator to raise, which becomes a `Fault` with this text."""
+    return PydanticCustomError("refused", "{found}", {"found": found, "remedy": remedy})

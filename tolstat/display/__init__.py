@@ -1,0 +1,1 @@
+"""How things are shown: text, style of figures, blocks of a page."""

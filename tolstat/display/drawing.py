@@ -1,0 +1,121 @@
+"""Looks of the page's pictures: one panel each, legible on a telephone and in print."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from html import escape
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tolstat.display import style
+from tolstat.display.blocks import Panel
+
+BOTTOM, RIGHT, TOP = 0.5, 0.12, 0.26
+"""Room around the axes, inches; that on the left is the panel's."""
+GREY = "#B8B8B8"
+
+
+class Frame(NamedTuple):
+    """Where in a picture the axes lie (points from the left and from the top), and which loads their ends are."""
+
+    left: float
+    right: float
+    top: float
+    bottom: float
+    low: float
+    high: float
+
+
+@contextmanager
+def settings(scale: float = 1.0) -> Iterator[None]:
+    """House settings with sizes for one panel, times `scale`."""
+    sizes: dict[Any, float] = {
+        "font.size": 9.2,
+        "axes.labelsize": 9.0,
+        "axes.titlesize": 9.0,
+        "xtick.labelsize": 8.5,
+        "ytick.labelsize": 8.5,
+        "legend.fontsize": 8.5,
+        "lines.linewidth": 1.6,
+        "axes.linewidth": 0.8,
+        "grid.linewidth": 0.7,
+    }
+    legend: dict[Any, Any] = {"frameon": True, "framealpha": 0.8, "facecolor": "white", "edgecolor": "none"}
+    given = {name: scale * size for name, size in sizes.items()} | {f"legend.{k}": value for k, value in legend.items()}
+    with style.settings(), mpl.rc_context(given):
+        mpl.rcParams["svg.fonttype"] = "none"  # text stays text: small, sharp, to be searched and read aloud
+        yield
+
+
+def place(panel: Panel) -> tuple[float, float, float, float]:
+    """Axes of a panel in parts of its width and height: left, bottom, width, height."""
+    width, height = panel.size
+    return (
+        panel.left / width,
+        BOTTOM / height,
+        1.0 - (panel.left + RIGHT) / width,
+        1.0 - (BOTTOM + TOP) / height,
+    )
+
+
+def svg(panel: Panel) -> tuple[str, Frame]:
+    """Draw a panel as SVG to stand inside a page: the same bytes for the same panel, no name used twice on the page."""
+    with settings():
+        figure = Figure(figsize=panel.size, dpi=72)
+        ax = figure.add_axes(place(panel))
+        panel.draw(ax)
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+    box, height = ax.get_window_extent(), figure.bbox.height
+    low, high = ax.get_xlim()
+    frame = Frame(box.x0, box.x1, height - box.y1, height - box.y0, low, high)
+    return _inline(buffer.getvalue(), panel), frame
+
+
+def _inline(text: str, panel: Panel) -> str:
+    body = text[text.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
+    body = re.sub(r' id="([^"]+)"', lambda m: f' id="{panel.key}-{m[1]}"' if m[1] in used else "", body)
+    body = re.sub(r'(href="#|url\(#)', rf"\1{panel.key}-", body)
+    body = re.sub(r' (?:d|x|y|points)="[^"]+"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), body)  # in points
+    box = re.search(r'viewBox="[^"]+"', body)
+    assert box is not None
+    spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    head = f'<svg {spaces} {box[0]} role="img" aria-labelledby="{panel.key}-title {panel.key}-desc">'
+    said = f'<title id="{panel.key}-title">{escape(panel.title)}</title>'
+    said += f'<desc id="{panel.key}-desc">{escape(panel.description)}</desc>'
+    return head + said + body[body.index(">") + 1 :].strip()
+
+
+def rows(ax: Axes, labels: list[str]) -> None:
+    """Give a panel of horizontal rows its labels, the first row on top."""
+    ax.set_yticks(range(len(labels)), labels)
+    ax.set_ylim(len(labels) - 0.4, -0.6)
+    ax.tick_params(axis="y", length=0)
+    ax.grid(axis="y", visible=False)
+    ax.spines["left"].set_visible(False)
+
+
+def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    """Put a legend in one row above the axes, where rows leave no room inside."""
+    where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0}
+    ax.legend(handles, labels, ncols=len(labels), handlelength=1.2, columnspacing=1.2, **where)
+
+
+def empty(ax: Axes, text: str) -> None:
+    """Say in an empty panel why it is empty."""
+    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes)
+    ax.set(xticks=[], yticks=[])
+
+
+def rows_height(count: int) -> float:
+    """Height of a panel of horizontal rows, inches."""
+    return 0.235 * count + BOTTOM + TOP + 0.1

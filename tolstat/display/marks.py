@@ -1,0 +1,35 @@
+"""A part of a Markdown file that a command writes: what stands between two comments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import writing
+
+
+def split(path: Path, name: str) -> tuple[str, str]:
+    """Read a file: what stands before its part `name`, opening comment included, and after it.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read or lacks the two comments.
+    """
+    begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+    try:
+        content = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError([Fault(str(path), f"cannot be read: {error}", "name a Markdown file")]) from error
+    head, opened, rest = content.partition(begin)
+    _, closed, tail = rest.partition(end)
+    if not (opened and closed):
+        raise InputError([Fault(str(path), "has no place for the table", f"add the lines {begin} and {end}")])
+    return head + begin, end + tail
+
+
+def insert(path: Path, name: str, part: str) -> None:
+    """Put `part` in the place `name` of a file; raises as `split` does."""
+    head, tail = split(path, name)
+    with writing(path) as temporary:
+        temporary.write_text(f"{head}\n\n{part}\n\n{tail}", encoding="utf-8")

@@ -1,0 +1,148 @@
+"""Looks of every figure: colours that colour-blind readers can tell apart, and how a file is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from tolstat.common.files import writing
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
+"""Bushing 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
+Dash = str | tuple[float, tuple[float, ...]]
+DASHES: tuple[Dash, ...] = (
+    "-",
+    (0.0, (6.0, 2.0)),
+    (0.0, (3.0, 1.5)),
+    (0.0, (1.2, 0.9)),
+)
+"""Bushing 1 to 4: where curves lie on each other, the dashes let the lower one show."""
+INK, FAINT = "#222222", "#777777"
+
+_SETTINGS: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.titlesize": 11.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 10.0,
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E2E2E2",
+    "grid.linewidth": 0.7,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "lines.linewidth": 1.8,
+    "legend.frameon": False,
+    "svg.hashsalt": "tolstat",
+    "text.parse_math": False,  # a study may have any name
+}
+_PANELS = (("cross", "F"), ("cross", "T"), ("fork", "F"), ("fork", "T"))
+
+
+@contextmanager
+def settings() -> Iterator[None]:
+    """House settings while a figure is drawn; the caller's own are untouched afterwards."""
+    with mpl.rc_context(_SETTINGS):
+        yield
+
+
+def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, str, Axes]]]:
+    """Make a page of four panels: force and torque of the cross bushings above those of the fork bushings.
+
+    Parameters
+    ----------
+    title, subtitle : str
+        Headline, and the line or lines of small print below it.
+
+    Returns
+    -------
+    figure : Figure
+        The page; leave its lowest strip to a legend, see `legend`.
+    panels : list of (group, letter, Axes)
+        ``("cross", "F", axes)`` and so on.
+    """
+    figure = Figure(figsize=(11.0, 8.5))
+    axes = figure.subplots(2, 2)
+    figure.subplots_adjust(left=0.085, right=0.975, top=0.82, bottom=0.125, hspace=0.42, wspace=0.16)
+    figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")
+    figure.text(0.02, 0.932, subtitle, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
+    page = []
+    for (group, letter), ax in zip(_PANELS, axes.flat, strict=True):
+        ax.set_title(f"{group.capitalize()} bushings, {'force' if letter == 'F' else 'torque'}", pad=21)
+        page.append((group, letter, ax))
+    return figure, page
+
+
+def share_axis(ax: Axes, low: float, which: str = "y") -> None:
+    """Logarithmic axis in per cent, from `low` to a little above 100 % so that a curve there can be seen."""
+    upright = which == "y"
+    (ax.set_yscale if upright else ax.set_xscale)("log")
+    (ax.set_ylim if upright else ax.set_xlim)(low, low**-0.04)
+    axis = ax.yaxis if upright else ax.xaxis
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def mark(ax: Axes, x: float, y: float, colour: str) -> None:
+    """Mark the nominal joint by a small triangle."""
+    ax.plot(x, y, marker="v", ms=7.5, mec="white", mew=0.7, color=colour, clip_on=False, zorder=5)
+
+
+def note(ax: Axes, text: str, y: float) -> None:
+    """Write a note on a horizontal line, at its right end."""
+    ax.annotate(
+        text,
+        (1.0, y),
+        xycoords=ax.get_yaxis_transform(),
+        xytext=(-2, 3),
+        textcoords="offset points",
+        ha="right",
+        fontsize=9,
+    )
+
+
+def legend(figure: Figure, handles: list[Artist], labels: list[str]) -> None:
+    """Put one legend for all panels at the foot of the page, in a row or two."""
+    letters = sum(len(label) + 7 for label in labels)
+    figure.legend(
+        handles,
+        labels,
+        loc="lower center",
+        ncols=len(labels) if letters < 140 else -(-len(labels) // 2),
+        bbox_to_anchor=(0.5, 0.0),
+        handlelength=2.4,
+        columnspacing=1.3,
+        fontsize=9.5,
+    )
+
+
+def save(figure: Figure, stem: Path, suffixes: tuple[str, ...] = (".png", ".svg")) -> list[Path]:
+    """Write a figure in each format, the same bytes for the same figure.
+
+    Returns
+    -------
+    list of Path
+        The files written: `stem` with each suffix appended.
+    """
+    files = []
+    for suffix in suffixes:
+        path = stem.with_name(stem.name + suffix)
+        metadata = {"Date": None} if suffix == ".svg" else None
+        with settings(), writing(path) as temporary:
+            figure.savefig(temporary, format=suffix.lstrip("."), dpi=150, metadata=metadata)
+        files.append(path)
+    return files

@@ -1,0 +1,141 @@
+"""Closed forms of the ideal joint: no errors, no clearance, no elasticity; no inertia but in `loads`.
+
+Truth for tests and baseline of reports. Source: Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and
+Driveshafts, ch. 4; Cirelli et al. (2021), eq. (2).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def speed_ratio(theta: ArrayLike, alpha: float) -> Array:
+    """Speed ratio of output to input shaft (Cirelli et al. 2021, eq. 2).
+
+    Parameters
+    ----------
+    theta : array_like
+        Input angle, rad.
+    alpha : float
+        Misalignment, rad.
+
+    Returns
+    -------
+    ndarray
+        Same shape as `theta`.
+    """
+    return np.asarray(np.cos(alpha) / (1 - (np.sin(alpha) * np.cos(theta)) ** 2))
+
+
+def output_angle(theta: ArrayLike, alpha: float) -> Array:
+    """Angle of the output shaft, tan(theta_o) = tan(theta) / cos(alpha), following theta without jumps.
+
+    Parameters and returned value in rad, as in `speed_ratio`.
+    """
+    theta = np.asarray(theta, float)
+    advance = np.sin(theta) * np.cos(theta) * (1 - np.cos(alpha))
+    return np.asarray(theta + np.arctan2(advance, np.cos(theta) ** 2 * np.cos(alpha) + np.sin(theta) ** 2))
+
+
+def cross_angle(theta: ArrayLike, alpha: float) -> Array:
+    """Rotation beta of the cross in the input fork, tan(beta) = tan(alpha) sin(theta), rad."""
+    return np.asarray(np.arctan(np.tan(alpha) * np.sin(theta)))
+
+
+def cross_couple(theta: ArrayLike, alpha: float, torque: float) -> Array:
+    """Couple that the forks exert on the cross about its normal when the output carries a constant torque.
+
+    Frictionless pins transmit no moment about their own axes, so input and output couples both lie along the normal
+    of the cross; its component along the output shaft is the torque: M = T / cos(gamma), sin(gamma) = sin(alpha)
+    cos(theta). It runs between T and T / cos(alpha).
+
+    Parameters
+    ----------
+    theta : array_like
+        Input angle, rad.
+    alpha : float
+        Misalignment, rad.
+    torque : float
+        Output torque, N m.
+
+    Returns
+    -------
+    ndarray
+        N m, same shape as `theta`.
+    """
+    return np.asarray(torque / np.sqrt(1 - (np.sin(alpha) * np.cos(theta)) ** 2))
+
+
+def pin_force(theta: ArrayLike, alpha: float, torque: float, radius: float) -> Array:
+    """Force on each pin when the couple acts at `radius` (m) from the centre: M / (2 radius), N.
+
+    Other parameters as in `cross_couple`.
+    """
+    return cross_couple(theta, alpha, torque) / (2 * radius)
+
+
+def reversal_torque(params: NDArray[np.void]) -> Array:
+    """Torque below which the inertia of the output shaft turns the load around twice a revolution.
+
+    The shaft and the two arms on it, moment of inertia J, are accelerated by w^2 dr/dtheta, r being the speed ratio
+    (eq. 2). Where J w^2 max|dr/dtheta| exceeds the resisting torque, the joint drives and is driven in turn: its pins
+    cross their clearances and hit.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (n,)
+        Joints.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        N m.
+    """
+    inertia = params["Js"] + 2 * (params["arm_mass"] * params["R"] ** 2 + params["arm_inertia"][:, 2])
+    theta = np.linspace(0, np.pi, 361)
+    sine, cosine = np.sin(params["alpha"])[:, None], np.cos(params["alpha"])[:, None]
+    steepest = np.abs(cosine * sine**2 * np.sin(2 * theta) / (1 - (sine * np.cos(theta)) ** 2) ** 2).max(axis=1)
+    return np.asarray(inertia * params["omega"] ** 2 * steepest)
+
+
+def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
+    """Loads of all bushings and contact forces of the ideal joint at its operating point.
+
+    Each pin is in touch with the outer end of its hole, R + z/2 from the centre (R + the outermost station's distance
+    with the law ``sliced``), as it is once the cross has turned through its clearance; without clearance both touch
+    and the force lies further in. What moves the bodies in the ideal motion is included: centrifugal loads, the
+    cross's couple, inertia of the output shaft and its arms. Without it the forces are those of `pin_force`, and in
+    the forks' axes the secondary couples, up to T sin(alpha) on the input side and T tan(alpha) on the output side.
+
+    Parameters
+    ----------
+    theta : array_like, shape (n,)
+        Input angle, rad.
+    par : ndarray of PARAM, shape (1,)
+        The joint; its errors and clearances are not looked at.
+
+    Returns
+    -------
+    loads : ndarray, shape (n, 8, 6)
+        Force e, t, z (N) and torque e, t, z (N m) of the bushings cross 1-4, fork 1-4 on the lump, at the base
+        marker and in its axes.
+    contact : ndarray, shape (n, 4)
+        Force between each pin and its hole, N.
+    """
+    from tolstat.common.tables import Options
+    from tolstat.kernel.mechanics.ideal_loads import ideal_loads
+    from tolstat.kernel.revolution.simulate import make_scratch
+
+    angles = np.atleast_1d(np.asarray(theta, float))
+    row: Any = par.view(np.recarray)[0]
+    work, state, *_ = make_scratch(Options())
+    load, contact = np.empty((angles.size, 8, 6)), np.empty((angles.size, 4))
+    for i, angle in enumerate(angles):
+        ideal_loads(angle, row, state, work)
+        load[i], contact[i] = work.load, work.contact[:, 0]
+    return load, contact

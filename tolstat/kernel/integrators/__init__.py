@@ -1,0 +1,1 @@
+"""Methods of integration in time, and the steps that they take."""

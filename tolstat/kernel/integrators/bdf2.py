@@ -1,0 +1,41 @@
+"""BDF2 with variable step, applied to q' = v and v' = a (Hairer, Wanner: Solving ODEs I, III.5).
+
+At the new point (3 y_2 - 4 y_1 + y_0) / (2 h) stands for y', for equal steps; with r the ratio of the step to the one
+before, ((1+2r)/(1+r) y_2 - (1+r) y_1 + r^2/(1+r) y_0) / h. Zero-stable for r < 1 + sqrt(2). The first step is implicit
+Euler. Algebraic order 2, L-stable.
+"""
+
+from tolstat.kernel.integrators.state import AHEAD, H_OLD
+from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import where
+
+
+@njit
+def formula(h, h_old):
+    """Return cv = dv/dq of a step `h`, and how much of the last point and of the one before a derivative has."""
+    r = where(h_old > 0, h / h_old, 0.0)
+    return (1 + 2 * r) / (1 + r) / h, -(1 + r) / h, r * r / (1 + r) / h
+
+
+@njit
+def trial(h, of, last, before, known, ahead):
+    """Trial values of an unknown and its derivatives that obey the formula.
+
+    `of`: what `formula` has returned; `last`: (q, v, a) of the last accepted point; `before`: (q, v) of the one before;
+    `ahead`: change of q to expect where one is `known`, else a Taylor series.
+    """
+    cv, b1, b2 = of
+    q = last[0] + where(known, ahead, h * (last[1] + 0.5 * h * last[2]))
+    v = cv * q + (b1 * last[0] + b2 * before[0])
+    return q, v, cv * v + (b1 * last[1] + b2 * before[1])
+
+
+@njit
+def predict(h, state, options):
+    """Write a trial point that obeys the formula; return cv = dv/dq and ca = da/dq."""
+    of = formula(h, state.memory[H_OLD])
+    known = state.memory[AHEAD] > 0
+    for i in range(state.q.size):
+        last, before = (state.q0[i], state.v0[i], state.a0[i]), (state.q1[i], state.v1[i])
+        state.q[i], state.v[i], state.a[i] = trial(h, of, last, before, known, state.ahead[i])
+    return of[0], of[0] * of[0]

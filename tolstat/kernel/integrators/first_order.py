@@ -1,0 +1,68 @@
+"""The joint as a system of first order, y = (q, q'), for integrators of other people: rate, Jacobian, loads."""
+
+from tolstat.kernel.mechanics.dynamics import acceleration, forces
+from tolstat.kernel.mechanics.motion import speed_ratio
+from tolstat.kernel.mechanics.topology import N_DOF, PSI
+from tolstat.kernel.mechanics.vector import copy
+from tolstat.kernel.simd.jit import njit
+
+POSITION_STEP, VELOCITY_STEP = 1e-10, 1e-6
+"""Differences of the Jacobian (m and rad, per s): above rounding, below the micrometre over which contacts rise."""
+
+
+@njit
+def rate(t, y, par, options, work, out):
+    """Write y' to `out`, (110,), at time `t` (s); `y` holds unknowns, then velocities."""
+    for i in range(N_DOF):
+        out[i] = y[N_DOF + i]
+    acceleration(t, y[:N_DOF], y[N_DOF:], par, options, work, out[N_DOF:])
+
+
+@njit
+def jacobian(t, y, par, options, work, column, out):
+    """Write d(rate)/dy to `out`, (110, 110), by forward differences; `column`, (3, 110), is scratch."""
+    base, moved, there = column[0], column[1], column[2]
+    rate(t, y, par, options, work, base)
+    copy(y, moved)
+    for j in range(2 * N_DOF):
+        moved[j] = y[j] + (POSITION_STEP if j < N_DOF else VELOCITY_STEP)
+        step = moved[j] - y[j]
+        rate(t, moved, par, options, work, there)
+        moved[j] = y[j]
+        for i in range(2 * N_DOF):
+            out[i, j] = (there[i] - base[i]) / step
+
+
+@njit
+def rate_of_row(t, y, params, options, works, out):
+    """`rate` of the first row of `params`, (1,), with ``works``, (1,): arrays cross from Python faster than records."""
+    rate(t, y, params[0], options, works[0], out)
+
+
+@njit
+def jacobian_of_row(t, y, params, options, works, column, out):
+    """`jacobian` in the same way."""
+    jacobian(t, y, params[0], options, works[0], column, out)
+
+
+@njit
+def sample(times, states, par, work, loads, contact, psi):
+    """Evaluate the loads along a solution.
+
+    Parameters
+    ----------
+    times, states : ndarray, shapes (m,) and (m, 110)
+        The solution, s; m and rad, per s.
+    par, work : records of PARAM and WORK
+        As elsewhere.
+    loads, contact, psi : ndarray, shapes (m, 8, 6), (m, 4, 3) and (m,)
+        Written as in `settle.Ring`: N, N m; N; Psi of eq. (13).
+    """
+    for k in range(times.size):
+        forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
+        for bushing in range(8):
+            copy(work.load[bushing], loads[k, bushing])
+        for pin in range(4):
+            copy(work.contact[pin], contact[k, pin])
+        tau = (work.shaft[0] + states[k, N_DOF + PSI]) / par.omega
+        psi[k] = (tau - speed_ratio(par.omega * times[k], par.alpha)) / tau

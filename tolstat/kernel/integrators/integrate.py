@@ -1,0 +1,267 @@
+"""Fixed-step implicit integration of second-order systems, with bounded halving inside a step.
+
+`build_integrator` binds the equations of any system to one Newton iteration and one stepping scheme. A method is a file
+with `predict` (write a trial point that obeys the method's formulas, return how velocity and acceleration follow the
+unknowns) and, where it remembers more than the last points, what it does when a stage or a step is accepted.
+
+The output grid is kept: a step that Newton cannot solve, or whose estimated error is above the tolerance where the
+method has an estimate, is halved, at most ``options.max_halvings`` times; steps grow again by factors of two where the
+grid allows. An unconverged point is never accepted.
+"""
+
+from tolstat.common.tables import Method
+from tolstat.kernel.integrators import bdf2, generalized_alpha, quadrature, trbdf2
+from tolstat.kernel.integrators.state import (
+    AHEAD,
+    ATTEMPTS_LEFT,
+    CLOSE,
+    CV_FACTORISED,
+    FACTORISATIONS,
+    H_OLD,
+    HALVINGS,
+    ITERATIONS,
+    STAGED,
+    STEPS,
+)
+from tolstat.kernel.simd.jit import closure, njit
+from tolstat.kernel.simd.lane import where
+
+BDF2, GENERALIZED_ALPHA, TR_BDF2 = int(Method.BDF2), int(Method.GENERALIZED_ALPHA), int(Method.TR_BDF2)
+SLOW = 0.2
+"""Contraction per iteration above which the tangent is renewed."""
+ROUNDOFF = 10 * 2.0**-52
+NO, IF_STALLED, YES, LOST = range(4)
+"""Whether a change of the unknowns ends Newton's iteration."""
+ERROR_TO_GROW = 0.1
+"""Estimated error, in units of the tolerance, below which a step may be doubled."""
+MAX_RATIO = 2.0
+"""Largest ratio of a step to the one before, for BDF2's stability and where the error is controlled."""
+START_LEVEL = 4
+"""BDF2 has no past at its first step, which is implicit Euler over 1/16 of the step."""
+
+bdf2_predict = bdf2.predict
+alpha_predict, alpha_accept = generalized_alpha.predict, generalized_alpha.accept
+tr_predict, keep_stage, embedded_error = trbdf2.predict, trbdf2.keep_stage, trbdf2.error
+quadrature_error = quadrature.error
+UNLIMITED = 2**62
+
+
+@njit
+def stages(options):
+    """Number of stages of the method in use."""
+    return trbdf2.STAGES if options.method == TR_BDF2 else 1
+
+
+@njit
+def predict(h, stage, state, options):
+    """Trial point of the method in use; returns cv, ca and the share of the step that the stage reaches."""
+    if options.method == TR_BDF2:
+        if stage > 0:
+            keep_stage(state)
+        cv, ca = tr_predict(h, stage, state, options)
+        return cv, ca, (trbdf2.GAMMA if stage == 0 else 1.0)
+    if options.method == BDF2:
+        cv, ca = bdf2_predict(h, state, options)
+    else:
+        cv, ca = alpha_predict(h, state, options)
+    return cv, ca, 1.0
+
+
+@njit
+def accept(h, state, options):
+    """Make the trial point the last accepted one."""
+    if options.method == GENERALIZED_ALPHA:
+        alpha_accept(h, state, options)
+    for i in range(state.q.size):
+        state.q1[i], state.v1[i], state.a1[i] = state.q0[i], state.v0[i], state.a0[i]
+        state.q0[i], state.v0[i], state.a0[i] = state.q[i], state.v[i], state.a[i]
+    state.memory[H_OLD], state.memory[AHEAD] = h, 0.0
+    state.memory[STAGED] = h if options.method == TR_BDF2 else 0.0
+    state.counters[STEPS] += 1
+
+
+@njit
+def fitting(level, h, h_old, options):
+    """Least level from `level` on whose sub-step of h / 2^level is not too long after a step of `h_old`."""
+    while level < options.max_halvings and h_old > 0 and h / (1 << level) > 1.0001 * MAX_RATIO * h_old:
+        level += 1
+    return level
+
+
+@njit
+def grown(level, done, whole, error):
+    """Level of the next sub-step: longer ones where the grid allows them, and where they would not be refused.
+
+    `done`: parts of the step that are behind, of `whole`; `error`: of the last sub-step, in units of the tolerance.
+    """
+    while level > 0 and done % (whole >> (level - 1)) == 0 and error < ERROR_TO_GROW:
+        level -= 1
+        error *= 8
+    return level
+
+
+@njit
+def reset(state):
+    """Forget everything but the last accepted point."""
+    state.memory[:] = 0.0
+    state.counters[:] = 0
+    state.counters[ATTEMPTS_LEFT] = UNLIMITED
+    for i in range(state.q.size):
+        state.q1[i], state.v1[i], state.a1[i] = state.q0[i], state.v0[i], state.a0[i]
+        state.aux[i] = state.a0[i]
+
+
+@njit
+def estimate(h, state, options):
+    """Estimated error of the step in units of the tolerance; 0 where none is kept."""
+    if options.rtol <= 0:
+        return 0.0
+    if options.method == TR_BDF2:
+        return embedded_error(h, state, options)
+    return quadrature_error(h, state, options)
+
+
+@njit
+def scaled_size(cv, ca, state):
+    """Largest residual, weighted; NaN if one is."""
+    size = total = 0.0
+    for i in range(state.q.size):
+        one = abs(state.residual[i]) * state.weight[i]
+        size, total = max(size, one), total + one
+    return where(total == total, size, total)  # a comparison a value, instead of two of which the next one waits
+
+
+@njit
+def at_rounding(cv, ca, fresh, options, work, state):
+    """`YES` when the last change of the unknowns is no more than their rounding."""
+    step = largest = 0.0
+    for i in range(state.q.size):
+        step, largest = max(step, abs(work.solution[i])), max(largest, abs(state.q[i]))
+    return YES if step <= ROUNDOFF * largest else NO
+
+
+def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding):
+    """Bind a system to Newton's iteration; arguments and the function returned as in `build_integrator`."""
+
+    @closure
+    def newton(t, cv, ca, par, options, work, state):
+        q, v, a = state.q, state.v, state.a
+        before = 0.0
+        negligible = NO
+        for iteration in range(options.newton_max_iter + 1):
+            residual(t, q, v, a, par, options, work, state.residual)
+            now = size(cv, ca, state)
+            if now <= options.newton_tol or (negligible == YES and now < 1e300):
+                return True
+            if negligible == IF_STALLED and SLOW * before < now <= before / SLOW:
+                return True
+            if not now < 1e300 or iteration == options.newton_max_iter:
+                break
+            fresh = state.memory[CV_FACTORISED] != cv or (iteration > 0 and now > SLOW * before)
+            last = now <= state.memory[CLOSE] and not fresh
+            if fresh:
+                state.memory[CV_FACTORISED] = cv
+                state.counters[FACTORISATIONS] += 1
+                if not factorise(t, q, v, a, cv, ca, par, options, work):
+                    break
+            before = now
+            for i in range(q.size):
+                work.solution[i] = -state.residual[i]
+            solve(q, work)
+            state.counters[ITERATIONS] += 1
+            for i in range(q.size):
+                change = work.solution[i]
+                q[i] += change
+                v[i] += cv * change
+                a[i] += ca * change
+            negligible = small(cv, ca, fresh, options, work, state)
+            if negligible == LOST:
+                break
+            if last:
+                return True
+        state.memory[CV_FACTORISED] = 0.0
+        return False
+
+    return newton
+
+
+def build_advance(newton):
+    """Bind Newton's iteration for a system to the stepping scheme.
+
+    Returns
+    -------
+    substeps : jitted function (t, h, level, par, options, work, state) -> bool
+        One step of the output grid, tried first in sub-steps of h / 2^level; False when it failed at the smallest.
+    advance : jitted function (t, h, par, options, work, state) -> bool
+        The same, tried first as a whole.
+    """
+
+    @closure
+    def attempt(t, h, par, options, work, state):
+        for stage in range(stages(options)):
+            cv, ca, share = predict(h, stage, state, options)
+            if not newton(t + share * h, cv, ca, par, options, work, state):
+                return False, 0.0
+        error = estimate(h, state, options)
+        return error <= 1, error
+
+    @closure
+    def substeps(t, h, level, par, options, work, state):
+        whole = 1 << options.max_halvings  # the step is counted in parts of its smallest sub-step
+        done = 0
+        while done < whole:
+            if options.method == BDF2 or options.rtol > 0:
+                level = fitting(level, h, state.memory[H_OLD], options)
+            if state.counters[ATTEMPTS_LEFT] <= 0:
+                return False
+            state.counters[ATTEMPTS_LEFT] -= 1
+            part = h / (1 << level)
+            good, error = attempt(t + h * (done / whole), part, par, options, work, state)
+            if good:
+                accept(part, state, options)
+                done += whole >> level
+                level = grown(level, done, whole, error)
+            else:
+                level += 1
+                state.memory[AHEAD] = state.memory[STAGED] = 0.0
+                state.counters[HALVINGS] += 1
+                if level > options.max_halvings:
+                    return False
+        return True
+
+    @closure
+    def advance(t, h, par, options, work, state):
+        level = 0
+        if options.method == BDF2 and state.memory[H_OLD] == 0:
+            level = min(START_LEVEL, options.max_halvings)
+        return substeps(t, h, level, par, options, work, state)
+
+    return substeps, advance
+
+
+def build_integrator(residual, factorise, solve, size=scaled_size, small=at_rounding):
+    """Bind the equations of a system to Newton's iteration and the stepping scheme.
+
+    Parameters
+    ----------
+    residual : jitted function (t, q, v, a, par, options, work, out) -> None
+        Equations of motion, zero when met.
+    factorise : jitted function (t, q, v, a, cv, ca, par, options, work) -> bool
+        Makes and factorises d(residual)/dq + cv d/dv + ca d/da at the point last evaluated; False when singular.
+    solve : jitted function (q, work) -> None
+        Solves for ``work.solution`` in place.
+    size : jitted function (cv, ca, state) -> float
+        Norm of ``state.residual`` that is compared with ``options.newton_tol``.
+    small : jitted function (cv, ca, fresh, options, work, state) -> int
+        Whether the change just made, ``work.solution``, leaves nothing to gain: `NO`, `YES`, or `IF_STALLED` when it
+        does so only if the residual did not fall, `LOST` when there is no hope; `fresh` tells that its tangent is new.
+
+    Returns
+    -------
+    newton : jitted function (t, cv, ca, par, options, work, state) -> bool
+        Solves for the trial point; True when converged.
+    advance : jitted function (t, h, par, options, work, state) -> bool
+        One step of the output grid; False when it failed at the smallest sub-step, or no attempt is left.
+    """
+    newton = build_newton(residual, factorise, solve, size, small)
+    return newton, build_advance(newton)[1]

@@ -1,0 +1,1 @@
+"""Many joints in lock-step, one in each SIMD lane."""

@@ -1,0 +1,332 @@
+"""The way of a lane's joint: through its equilibrium, sub-steps, grid points and angles, one lane at a time.
+
+Each function sends a lane on to its next trial point, or says how the joint has ended: `NOT_SETTLED` while it is to go
+on, `OK`, or `NEWTON_FAILED` when it is to be begun anew. `control` and `motion` are a batch's records read joint by
+joint; `lanes` are its joints, work and motion read as lanes.
+"""
+
+from tolstat.common.tables import MAX_ITERATIONS
+from tolstat.kernel.integrators.integrate import START_LEVEL, fitting, grown
+from tolstat.kernel.integrators.mesh import cells_of, next_level, note_cell
+from tolstat.kernel.integrators.state import AHEAD, H_OLD, STAGED
+from tolstat.kernel.integrators.trbdf2 import GAMMA
+from tolstat.kernel.lanes.batch import ANGLE, CHECK, HOLD, PART, RELAX, STEP, rest
+from tolstat.kernel.mechanics.topology import N_DOF, PSI
+from tolstat.kernel.revolution.closeup import count_in
+from tolstat.kernel.revolution.equilibrium import FIRST, GROWTH, HELD, LARGEST, MAX_STEPS, SHRINK, SMALLEST
+from tolstat.kernel.revolution.quasistatic import angle_time, end_closure
+from tolstat.kernel.revolution.resolve import begin_turns, clear_extremes, follows_error, merge_extremes, revolved
+from tolstat.kernel.revolution.settle import foresee, grid_step, record
+from tolstat.kernel.revolution.simulate import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, judge
+from tolstat.kernel.simd.jit import njit
+
+GIVEN_UP = -1
+"""Beside the states of a joint: it has made all its revolutions and has not settled."""
+FROM_GUESS, FROM_ZERO, AT_ANGLE = range(3)
+"""From where a lane goes in pseudo-time; at an angle, the third way to hold it: from the angle before, relaxed."""
+
+
+@njit
+def stand(lane, motion):
+    """Let the trial point of a lane be its last accepted one."""
+    for i in range(N_DOF):
+        motion.q0[i, lane] = motion.q[i, lane]
+
+
+@njit
+def relax(lane, par, options, control, motion):
+    """Send a lane a step on in pseudo-time, as `equilibrium` does: at its start from the guess, else from zero.
+
+    In vain it goes on from where it has got, and at an angle tries once more to hold.
+    """
+    if control.tries[lane] == MAX_STEPS or control.pseudo[lane] < SMALLEST:
+        control.factorised[lane] = 0.0
+        if control.level[lane] > FROM_GUESS:
+            resume(lane, par, options, control, motion)
+            return
+        for i in range(N_DOF):
+            motion.q0[i, lane] = 0.0
+        start_relaxing(lane, FROM_ZERO, control)
+    control.phase[lane] = RELAX
+    control.tries[lane] += 1
+    step = control.pseudo[lane]
+    rest(lane, 1 / step, 1 / (step * step), control, motion)
+
+
+@njit
+def start_relaxing(lane, level, control):
+    """Begin pseudo-time in a lane."""
+    control.level[lane], control.tries[lane], control.pseudo[lane] = level, 0, FIRST
+
+
+@njit
+def resume(lane, par, options, control, motion):
+    """Send a lane on from where pseudo-time has brought it: to its first step or angle, or to an angle once more."""
+    if control.level[lane] == AT_ANGLE:
+        control.phase[lane] = ANGLE
+        rest(lane, HELD, 0.0, control, motion)
+    else:
+        depart(lane, par, options, control, motion)
+
+
+@njit
+def depart(lane, par, options, control, motion):
+    """Send a lane from its start to its first grid point, or its first angle."""
+    control.done[lane] = 0
+    if options.fidelity == QUASISTATIC:
+        control.phase[lane] = ANGLE
+        face(lane, 0, par, options, control)
+    else:
+        for i in range(N_DOF):
+            motion.q1[i, lane] = motion.q0[i, lane]
+        control.phase[lane], control.factorised[lane], control.k[lane] = STEP, 0.0, 1
+        control.level[lane] = min(START_LEVEL, options.max_halvings)
+        if follows_error(options):
+            control.phase[lane], control.k[lane] = PART, 0  # for `set_out` to go on with
+        else:
+            aim(lane, options, control, motion)
+
+
+@njit
+def face(lane, k, par, options, control):
+    """Send a lane to angle `k`."""
+    control.k[lane], control.level[lane], control.fresh[lane] = k, 0, 1.0
+    control.t[lane] = angle_time(k, options.steps_per_rev, par)
+
+
+@njit
+def aim(lane, options, control, motion):
+    """Send a lane to the end of its next sub-step."""
+    grid, whole = control.grid[lane], 1 << options.max_halvings
+    level = fitting(control.level[lane], grid, motion.memory[H_OLD, lane], options)
+    h = grid / (1 << level)
+    control.level[lane], control.h[lane], control.fresh[lane] = level, h, 1.0
+    control.t[lane] = control.origin[lane] + grid * (control.done[lane] / whole) + h
+
+
+@njit
+def advance(lane, options, control, motion):
+    """Accept a lane's sub-step; returns whether it was the last of its step, else sends the lane on."""
+    whole = 1 << options.max_halvings
+    control.steps[lane] += 1
+    control.passed[lane] = 1.0
+    motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = control.h[lane], 0.0
+    control.done[lane] += whole >> control.level[lane]
+    control.level[lane] = grown(control.level[lane], control.done[lane], whole, 0.0)
+    if control.done[lane] < whole:
+        aim(lane, options, control, motion)
+        return False
+    control.done[lane] = control.level[lane] = 0
+    return True
+
+
+@njit
+def step(lane, lanes, options, control, motion, samples, notes, out):
+    """Record the grid point that a lane has reached, and send it on; returns a status as `judge` does."""
+    k = control.k[lane]
+    record(k, lane, k > options.steps_per_rev, lanes[0], lanes[1], lanes[2].v, samples)
+    motion.memory[AHEAD, lane] = foresee(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
+    status = judge(k, int(control.iterations[lane]), options, samples, notes, out)
+    if status != NOT_SETTLED:
+        return status
+    if k == options.max_revs * options.steps_per_rev:
+        return GIVEN_UP
+    control.k[lane], control.origin[lane] = k + 1, k * control.grid[lane]
+    aim(lane, options, control, motion)
+    return NOT_SETTLED
+
+
+@njit
+def glance(lane, par, lanes, options, control, motion, fine, out):
+    """Record a part of a step that a lane has taken again, and send it on; `OK` after the last part."""
+    j, part = control.looked[lane], control.grid[lane]
+    record(j, lane, True, lanes[0], lanes[1], lanes[2].v, fine)
+    count_in(j, fine, out)
+    control.looked[lane] += 1
+    control.part[lane] += 1
+    if control.part[lane] == options.peak_substeps:
+        return OK
+    n, h = options.steps_per_rev, grid_step(par, options)
+    control.origin[lane] = (n + control.k[lane] - 1) * h + control.part[lane] * part
+    aim(lane, options, control, motion)
+    return NOT_SETTLED
+
+
+@njit
+def turn(lane, par, lanes, options, control, motion, samples, out):
+    """Record the angle that a lane has solved, and send it on to the next."""
+    k, n = control.k[lane], options.steps_per_rev
+    control.steps[lane] += 1
+    control.passed[lane] = 1.0
+    record(k, lane, True, lanes[0], lanes[1], lanes[2].v, samples)
+    samples[k % n].tau = motion.q[PSI, lane]
+    if k == n:
+        k = 0
+        control.done[lane] += 1
+        out.closure, out.revolutions = end_closure(samples), float(control.done[lane])
+        if out.closure <= options.settle_tol:
+            return OK
+        tired = control.iterations[lane] > MAX_ITERATIONS * n * options.max_revs
+        if tired or control.done[lane] == options.max_revs:
+            return NEWTON_FAILED
+    face(lane, k + 1, par, options, control)
+    return NOT_SETTLED
+
+
+@njit
+def find(lane, par, options, control, motion):
+    """Send a lane on that has found its equilibrium, or come nearer in pseudo-time."""
+    phase = control.phase[lane]
+    if phase != CHECK:
+        stand(lane, motion)
+    if phase == RELAX:
+        control.phase[lane] = CHECK
+        rest(lane, HELD, 0.0, control, motion)
+    elif phase == CHECK:
+        resume(lane, par, options, control, motion)
+    else:
+        depart(lane, par, options, control, motion)
+
+
+@njit
+def retry(lane, par, options, control, motion):
+    """Let a lane try otherwise that has failed at what it was at; returns a status as `step` and `turn` do."""
+    phase = control.phase[lane]
+    if phase == CHECK:
+        control.pseudo[lane] = min(GROWTH * control.pseudo[lane], LARGEST)
+        relax(lane, par, options, control, motion)
+        return NOT_SETTLED
+    control.factorised[lane] = 0.0
+    if phase == HOLD:
+        start_relaxing(lane, FROM_GUESS, control)
+        relax(lane, par, options, control, motion)
+    elif phase == RELAX:
+        control.pseudo[lane] *= SHRINK
+        relax(lane, par, options, control, motion)
+    elif phase == ANGLE:
+        if control.level[lane] == AT_ANGLE:
+            return NEWTON_FAILED
+        if control.level[lane] == 0:
+            control.halvings[lane] += 1
+            control.level[lane] = 1
+            rest(lane, HELD, 0.0, control, motion)
+        else:
+            start_relaxing(lane, AT_ANGLE, control)
+            relax(lane, par, options, control, motion)
+    else:
+        control.halvings[lane] += 1
+        control.level[lane] += 1
+        if control.level[lane] > options.max_halvings:
+            return NEWTON_FAILED
+        motion.memory[AHEAD, lane] = 0.0
+        aim(lane, options, control, motion)
+    return NOT_SETTLED
+
+
+@njit
+def set_out(lane, par, options, control, motion, past):
+    """Send a lane from its start into the steps that follow the error."""
+    begin_turns(par, options, motion.memory[:, lane], motion.weight[:, lane], past)
+    control.grid[lane] = grid_step(par, options) / cells_of(options.steps_per_rev)
+    leave_for(lane, 1, options, control, motion, past)
+
+
+@njit
+def leave_for(lane, c, options, control, motion, past):
+    """Send a lane that stands at the end of a cell to that of the next one, `c`."""
+    own, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
+    for i in range(N_DOF):
+        past.begun[0, i], past.begun[1, i] = motion.q0[i, lane], motion.v0[i, lane]
+        past.begun[2, i] = motion.a0[i, lane]
+    control.k[lane], control.origin[lane] = c, (c - 1) * control.grid[lane]
+    turns = past.turns
+    again = next_level(turns.revolution - turns.since, own, before)
+    control.level[lane] = again if turns.beside == 0 else int(own.level)
+    control.began[lane] = control.level[lane]
+    divide(lane, options, control, past)
+
+
+@njit
+def divide(lane, options, control, past):
+    """Send a lane into the first part of a cell."""
+    control.done[lane] = control.part[lane] = 0
+    control.worst[lane] = 0.0
+    clear_extremes(past.extremes[0])
+    head(lane, 0, options, control)
+
+
+@njit
+def head(lane, stage, options, control):
+    """Send a lane to the end of a stage of the part that it is at."""
+    grid, whole = control.grid[lane], 1 << options.max_halvings
+    h = grid / (1 << control.level[lane])
+    reach = GAMMA if stage == 0 else 1.0
+    control.stage[lane], control.h[lane], control.fresh[lane] = stage, h, 1.0
+    control.t[lane] = control.origin[lane] + grid * (control.done[lane] / whole) + reach * h
+
+
+@njit
+def refuse(lane, options, control, motion, past):
+    """Begin a lane's cell anew in smaller parts; returns a status as `step` does."""
+    control.halvings[lane] += 1
+    control.level[lane] += 1
+    control.factorised[lane] = control.passed[lane] = motion.memory[STAGED, lane] = 0.0
+    if control.level[lane] > options.max_halvings:
+        return NEWTON_FAILED
+    for i in range(N_DOF):
+        motion.q0[i, lane], motion.v0[i, lane] = past.begun[0, i], past.begun[1, i]
+        motion.a0[i, lane] = past.begun[2, i]
+    divide(lane, options, control, past)
+    return NOT_SETTLED
+
+
+@njit
+def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
+    """Go on with a lane that has solved a stage of a part; returns its status, and whether it goes on."""
+    if control.stage[lane] == 0:
+        head(lane, 1, options, control)
+        return NOT_SETTLED, True
+    controlled, whole = past.turns.beside == 0, 1 << options.max_halvings
+    if controlled:
+        control.worst[lane] = max(control.worst[lane], control.error[lane])
+        if not control.error[lane] <= 1:
+            status = refuse(lane, options, control, motion, past)
+            return status, status == NOT_SETTLED
+        record(control.part[lane], lane, True, lanes[0], lanes[1], lanes[2].v, fine)
+        count_in(control.part[lane], fine, past.extremes[0])
+    control.steps[lane] += 1
+    control.done[lane] += whole >> control.level[lane]
+    control.part[lane] += 1
+    motion.memory[STAGED, lane] = control.h[lane]
+    if control.done[lane] < whole:
+        control.passed[lane] = 1.0
+        head(lane, 0, options, control)
+        return NOT_SETTLED, True
+    return arrive(lane, par, lanes, options, control, motion, samples, past, out)
+
+
+@njit
+def arrive(lane, par, lanes, options, control, motion, samples, past, out):
+    """Send a lane on that has reached the end of a cell; a grid point there is recorded. Returns as `part` does."""
+    c, turns, status, goes_on = control.k[lane], past.turns, NOT_SETTLED, True
+    for i in range(N_DOF):
+        motion.q0[i, lane], motion.v0[i, lane] = motion.q[i, lane], motion.v[i, lane]
+        motion.a0[i, lane] = motion.a[i, lane]
+    if turns.beside == 0:
+        refused = control.level[lane] > control.began[lane]
+        note_cell(control.level[lane], refused, control.worst[lane], turns.revolution, past.mesh[c % past.mesh.size])
+        merge_extremes(past.extremes[0], past.extremes[1])
+        cells = past.mesh.size // samples.size
+        if c % cells == 0:
+            k = c // cells
+            record(k, lane, True, lanes[0], lanes[1], lanes[2].v, samples)
+            foresee(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
+    if c % past.mesh.size == 0:
+        point = motion.q0[:, lane], motion.v0[:, lane], motion.a0[:, lane]
+        memory, weight, spent = motion.memory[:, lane], motion.weight[:, lane], int(control.iterations[lane])
+        status, goes_on = revolved(point, memory, weight, spent, par, options, samples, past, out)
+        if turns.beside == 1:
+            c -= past.mesh.size
+    if goes_on:
+        leave_for(lane, c + 1, options, control, motion, past)
+    return status, goes_on

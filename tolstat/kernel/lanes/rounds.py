@@ -1,0 +1,156 @@
+"""What a round of the lock-step does to all lanes at once: trial points, verdicts, tangents, corrections."""
+
+from tolstat.kernel.integrators import bdf2, trbdf2
+from tolstat.kernel.integrators.integrate import ROUNDOFF, SLOW, scaled_size
+from tolstat.kernel.integrators.state import AHEAD, CLOSE, H_OLD, STAGED
+from tolstat.kernel.lanes.batch import CHECK
+from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.revolution.equilibrium import CA_REGULAR, CV_REGULAR, ENOUGH, FAR, HELD
+from tolstat.kernel.revolution.quasistatic import extrapolate, keep
+from tolstat.kernel.revolution.resolve import follows_error
+from tolstat.kernel.revolution.simulate import QUASISTATIC, assemble, eliminate, solve
+from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import retain, where
+
+formula, trial = bdf2.formula, bdf2.trial
+first_and_second, first, second = trbdf2.formula, trbdf2.first, trbdf2.second
+
+
+@njit
+def begin_steps(begins, passed, motion, control):
+    """Make trial points in the lanes that begin a step, accepting those of the step before that has `passed`."""
+    h = control.h
+    of = formula(h, motion.memory[H_OLD])
+    known = motion.memory[AHEAD] > 0
+    for i in range(N_DOF):
+        q, v, a, q0, v0 = motion.q[i], motion.v[i], motion.a[i], motion.q0[i], motion.v0[i]
+        before = retain(passed, q0, motion.q1[i]), retain(passed, v0, motion.v1[i])
+        last = retain(passed, q, q0), retain(passed, v, v0), retain(passed, a, motion.a0[i])
+        motion.q1[i], motion.v1[i] = before
+        motion.q0[i], motion.v0[i], motion.a0[i] = last
+        guess = trial(h, of, last, before, known, motion.ahead[i])
+        motion.q[i] = retain(begins, guess[0], q)
+        motion.v[i] = retain(begins, guess[1], v)
+        motion.a[i] = retain(begins, guess[2], a)
+    control.cv = where(begins, of[0], control.cv)
+    control.ca = where(begins, of[0] * of[0], control.ca)
+
+
+@njit
+def begin_parts(begins, passed, motion, control):
+    """The same in lanes that begin a stage of a part of a step that follows the error."""
+    of, later = first_and_second(control.h, motion.memory[STAGED]), control.stage > 0
+    held = begins & later
+    for i in range(N_DOF):
+        q, v, a = motion.q[i], motion.v[i], motion.a[i]
+        last = retain(passed, q, motion.q0[i]), retain(passed, v, motion.v0[i]), retain(passed, a, motion.a0[i])
+        motion.q0[i], motion.v0[i], motion.a0[i] = last
+        one, two = first(of, last, motion.aux[i]), second(of, last, (q, v, a))
+        motion.v1[i], motion.aux[i] = retain(held, v, motion.v1[i]), retain(held, a, motion.aux[i])
+        motion.q[i] = retain(begins, where(later, two[0], one[0]), q)
+        motion.v[i] = retain(begins, where(later, two[1], one[1]), v)
+        motion.a[i] = retain(begins, where(later, two[2], one[2]), a)
+    control.cv = where(begins, of[0], control.cv)
+    control.ca = where(begins, of[0] * of[0], control.ca)
+
+
+@njit
+def begin_angles(begins, passed, motion, control):
+    """The same in lanes that begin an angle."""
+    keep(passed, motion)
+    extrapolate(begins, control.steps, motion)
+    for i in range(N_DOF):
+        motion.v[i], motion.a[i] = where(begins, 0.0, motion.v[i]), where(begins, 0.0, motion.a[i])
+    control.cv, control.ca = where(begins, HELD, control.cv), where(begins, 0.0, control.ca)
+
+
+@njit
+def begin(options, motion, control):
+    """Begin a step, or an angle, in the lanes that are to."""
+    begins, passed = control.fresh > 0, control.passed > 0
+    if options.fidelity == QUASISTATIC:
+        begin_angles(begins, passed, motion, control)
+    elif follows_error(options):
+        begin_parts(begins, passed, motion, control)
+    else:
+        begin_steps(begins, passed, motion, control)
+    control.iteration = where(begins, 0.0, control.iteration)
+    control.at_roundoff = where(begins, 0.0, control.at_roundoff)
+    control.fresh = control.passed = 0.0 * control.fresh
+
+
+@njit
+def verdict(options, motion, control):
+    """Which lanes have solved what they are at, have failed to, need a new tangent, or are to be corrected: four masks.
+
+    The fifth mask tells which of the last need no other look; the sixth value is the size of the residuals.
+    """
+    now = scaled_size(control.cv, control.ca, motion)
+    finite, live, checked = now < 1e300, control.live > 0, control.phase == CHECK
+    small = (now <= options.newton_tol) | ((control.at_roundoff > 0) & finite)
+    solved = live & ((checked & (now < ENOUGH)) | (~checked & small))
+    failed = live & ~solved & (checked | ~finite | (control.iteration == options.newton_max_iter))
+    going = live & ~solved & ~failed
+    slow = (control.iteration > 0) & (now > SLOW * control.before)
+    stale = going & ((control.factorised != control.cv) | slow)
+    control.before = where(going & ~stale, now, control.before)
+    moving = going & ~stale
+    return solved, failed, stale, moving, moving & (now <= motion.memory[CLOSE]), now
+
+
+@njit
+def keep_blocks(mask, new, old):
+    """Copy matrices, shape (n, m, m), in the lanes of the mask."""
+    for b in range(new.shape[0]):
+        for i in range(new.shape[1]):
+            for j in range(new.shape[2]):
+                old[b, i, j] = retain(mask, new[b, i, j], old[b, i, j])
+
+
+@njit
+def keep_rows(mask, new, old):
+    """Copy vectors, shape (n, m), in the lanes of the mask."""
+    for b in range(new.shape[0]):
+        for i in range(new.shape[1]):
+            old[b, i] = retain(mask, new[b, i], old[b, i])
+
+
+@njit
+def renew(mask, control, par, work, kept):
+    """Make a new tangent in the lanes of the mask; returns in which of all lanes that can be done."""
+    held = control.cv == HELD
+    assemble(where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca), par, work)
+    good = eliminate(work)
+    keep_blocks(mask, work.lump_block, kept.lump_block)
+    keep_blocks(mask, work.hub_pin, kept.hub_pin)
+    keep_blocks(mask, work.pin_hub, kept.pin_hub)
+    keep_blocks(mask, work.pin_arm, kept.pin_arm)
+    keep_blocks(mask, work.arm_pin, kept.arm_pin)
+    keep_blocks(mask, work.core, kept.core)
+    keep_rows(mask, work.arm_psi, kept.arm_psi)
+    keep_rows(mask, work.psi_arm, kept.psi_arm)
+    keep_rows(mask, work.pin_psi, kept.pin_psi)
+    keep_rows(mask, work.psi_pin, kept.psi_pin)
+    control.factorised = where(mask, control.cv, control.factorised)
+    control.factorisations = where(mask, control.factorisations + 1, control.factorisations)
+    return good
+
+
+@njit
+def correct(mask, kept, motion, control):
+    """Newton's correction in the lanes of the mask; returns in which of them it is lost."""
+    for i in range(N_DOF):
+        kept.solution[i] = -motion.residual[i]
+    solve(motion.q, kept)
+    step = largest = 0.0 * control.cv
+    for i in range(N_DOF):
+        change = where(mask, kept.solution[i], 0.0)
+        motion.q[i] = retain(mask, motion.q[i] + change, motion.q[i])
+        motion.v[i] = retain(mask, motion.v[i] + control.cv * change, motion.v[i])
+        motion.a[i] = retain(mask, motion.a[i] + control.ca * change, motion.a[i])
+        step, largest = max(step, abs(change)), max(largest, abs(motion.q[i]))
+    lost = mask & (control.cv == HELD) & (largest > FAR)
+    control.at_roundoff = where(mask & (step <= ROUNDOFF * largest), 1.0, 0.0)
+    control.iteration = where(mask, control.iteration + 1, control.iteration)
+    control.iterations = where(mask, control.iterations + 1, control.iterations)
+    return lost

@@ -1,0 +1,130 @@
+"""Pins in holes: penetration, contact forces and contact modes (model, section 5; Cirelli et al. 2021, eqs. 3-7).
+
+A pin touches its hole at stations along its axis, each a spring of its own: whatever the contact law, the forces have
+a potential. At each station n is the direction of the pin's displacement in the hole, h the hole axis and m = h x n;
+f acts on the pin along -n, the film's drag along -m.
+"""
+
+import math
+
+from tolstat.common.tables import INNER, OUTER, RESULTANT
+from tolstat.common.tables import Mode as ContactMode
+from tolstat.kernel.mechanics.bushing import accumulate
+from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, PIN
+from tolstat.kernel.mechanics.vector import add, axpy, choose, cross, dot, row, scale, sub, turn, turn_back
+from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, POINT, RHO, SLOPE, TANGENT, V_NORMAL, V_TANGENT
+from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import all_of, any_of, where
+
+NONE, ONE_POINT, TWO_POINT, UNIFORM = (float(m) for m in ContactMode)
+SMALLEST_RHO = 1e-15
+"""Below it (m) the pin is centred and has no direction of displacement."""
+
+
+@njit
+def smooth_step(x):
+    """Cubic step S: 0 below 0, x^2 (3 - 2 x), 1 beyond 1."""
+    return where(x <= 0, 0.0, where(x >= 1, 1.0, x * x * (3 - 2 * x)))
+
+
+@njit
+def smooth_step_slope(x):
+    """Derivative of `smooth_step`."""
+    return where((x <= 0) | (x >= 1), 0.0, 6 * x * (1 - x))
+
+
+@njit
+def locate(pin, par, work):
+    """Find where each station of `pin` stands in its hole; written to ``work.station[pin]``."""
+    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
+    frame = FRAME[arm]
+    axis = turn(work.rot, arm, row(par.hole_axis, ARM_OF_PIN[pin]))
+    centre = add(row(work.pos, arm), turn(work.rot, arm, row(par.hole_point, ARM_OF_PIN[pin])))
+    origin = turn(work.rot, body, row(par.pin_point, pin))
+    direction = turn(work.rot, body, row(par.pin_axis, pin))
+    for j in range(par.n_stations):
+        lever = axpy(par.station_s[j], direction, origin)
+        # the pin's point and its velocity against the arm's ideal frame, in axes of that frame
+        point = turn(work.relative, frame, add(row(work.pos, body), lever))
+        velocity = turn(work.relative, frame, add(row(work.vel, body), cross(row(work.spin, body), lever)))
+        velocity = add(velocity, cross(row(work.relative_w, frame), point))
+        arm_lever = sub(point, row(work.pos, arm))
+        velocity = sub(velocity, add(row(work.vel, arm), cross(row(work.spin, arm), arm_lever)))
+
+        d = sub(point, centre)
+        gap = axpy(-dot(d, axis), axis, d)
+        rho = math.sqrt(dot(gap, gap))
+        displaced = rho > SMALLEST_RHO
+        n = scale(1 / where(displaced, rho, 1.0), gap)
+        if not all_of(displaced):  # else any direction across the hole: no force acts
+            across = cross(axis, direction)
+            length = math.sqrt(dot(across, across))
+            oblique = length > 0
+            across = choose(oblique, scale(1 / where(oblique, length, 1.0), across), cross(axis, (0.0, 0.0, 1.0)))
+            n = choose(displaced, n, across)
+        m = cross(axis, n)
+        station = work.station[pin, j]
+        for k in range(3):
+            station[POINT + k], station[NORMAL + k], station[TANGENT + k] = point[k], n[k], m[k]
+        station[RHO], station[DELTA] = rho, rho - par.clearance[pin]
+        station[V_NORMAL], station[V_TANGENT] = dot(velocity, n), dot(velocity, m)
+
+
+@njit
+def press(pin, par, work):
+    """Normal force of each station and its slope by delta at constant rate, eq. (5); to ``work.station[pin]``."""
+    for j in range(par.n_stations):
+        station = work.station[pin, j]
+        delta = station[DELTA]
+        touching = delta > 0
+        if not any_of(touching):
+            station[FORCE] = station[SLOPE] = 0.0
+            continue
+        damping = par.c_d * par.station_weight[j]
+        ramp = smooth_step(delta / par.delta_d)
+        ramp_slope = smooth_step_slope(delta / par.delta_d) / par.delta_d
+        elastic = (par.station_k1[j] * delta + par.station_k2[j]) * delta
+        slope = 2 * par.station_k1[j] * delta + par.station_k2[j]
+        total = elastic + damping * ramp * station[V_NORMAL]
+        pressed = touching & (total > 0)
+        station[FORCE] = where(pressed, total, 0.0)
+        station[SLOPE] = where(pressed, slope + damping * ramp_slope * station[V_NORMAL], 0.0)
+
+
+@njit
+def classify(pin, par, work):
+    """Contact mode of `pin`, by its two end stations: which of them touch, and whether on the same side."""
+    outer, inner = work.station[pin, 0], work.station[pin, par.n_stations - 1]
+    cosine = 0.0
+    for k in range(3):
+        cosine += outer[NORMAL + k] * inner[NORMAL + k]
+    at_outer, at_inner = outer[DELTA] > 0, inner[DELTA] > 0
+    both = where(cosine < 0, TWO_POINT, UNIFORM)
+    return where(at_outer & at_inner, both, where(at_outer | at_inner, ONE_POINT, NONE))
+
+
+@njit
+def contact_load(pin, par, work):
+    """Contact forces of `pin`: added to pin and arm; ``work.contact[pin]`` and ``work.mode[pin]`` are written."""
+    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
+    locate(pin, par, work)
+    press(pin, par, work)
+    total = (0.0, 0.0, 0.0)
+    for j in range(par.n_stations):
+        station = work.station[pin, j]
+        if not any_of(station[DELTA] > 0):
+            continue
+        drag = par.c_t * par.station_weight[j] * smooth_step(station[DELTA] / par.delta_d) * station[V_TANGENT]
+        n = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
+        m = (station[TANGENT], station[TANGENT + 1], station[TANGENT + 2])
+        point = (station[POINT], station[POINT + 1], station[POINT + 2])
+        f_arm = axpy(station[FORCE], n, scale(drag, m))
+        total = add(total, f_arm)
+        accumulate(work.force, arm, f_arm, cross(sub(point, row(work.pos, arm)), f_arm))
+        f_pin = scale(-1.0, turn_back(work.relative, FRAME[arm], f_arm))
+        lever = sub(turn_back(work.relative, FRAME[arm], point), row(work.pos, body))
+        accumulate(work.force, body, f_pin, cross(lever, f_pin))
+    work.contact[pin, OUTER] = work.station[pin, 0, FORCE]
+    work.contact[pin, INNER] = work.station[pin, par.n_stations - 1, FORCE]
+    work.contact[pin, RESULTANT] = math.sqrt(dot(total, total))
+    work.mode[pin] = classify(pin, par, work)

@@ -1,0 +1,149 @@
+"""The joint as a second-order system: forces of one state, residual of the equations of motion, accelerations.
+
+Equations of motion of model section 3. Residuals are forces and torques about the reference points in axes of the
+ideal frames, in the order of the unknowns.
+"""
+
+import math
+
+from tolstat.common.tables import Start
+from tolstat.kernel.mechanics.bushing import bushing_load
+from tolstat.kernel.mechanics.contact import contact_load, smooth_step
+from tolstat.kernel.mechanics.motion import ideal_motion
+from tolstat.kernel.mechanics.rotation import exponential, spin, spin_bias, spin_rate, unspin
+from tolstat.kernel.mechanics.topology import ARM, FRAME, HUB, INPUT_SHAFT, N_BODIES, N_LUMPS, OUTPUT_SHAFT, PSI, TRIAD
+from tolstat.kernel.mechanics.triad import from_triad, to_triad
+from tolstat.kernel.mechanics.vector import add, axpy, cross, put, row, scale, sub, turn, turn_back
+from tolstat.kernel.simd.jit import njit
+
+RAMP = int(Start.RAMP)
+
+
+@njit
+def mass_of(body, par):
+    """Mass and principal inertia of a lump, about the axes of its triad."""
+    if body == HUB:
+        return par.hub_mass, (par.hub_inertia[0], par.hub_inertia[1], par.hub_inertia[2])
+    if body < ARM:
+        return par.pin_mass, (par.pin_inertia[0], par.pin_inertia[1], par.pin_inertia[2])
+    return par.arm_mass, (par.arm_inertia[0], par.arm_inertia[1], par.arm_inertia[2])
+
+
+@njit
+def place(q, v, par, work):
+    """Position, attitude and velocity of every body against its ideal frame."""
+    for body in range(N_LUMPS):
+        i = 6 * body
+        distance = 0.0 if body == HUB else par.R
+        phi = (q[i + 3], q[i + 4], q[i + 5])
+        put(work.pos, body, axpy(distance, row(TRIAD[body], 0), (q[i], q[i + 1], q[i + 2])))
+        put(work.vel, body, (v[i], v[i + 1], v[i + 2]))
+        exponential(phi, work.rot, body)
+        put(work.spin, body, spin(phi, (v[i + 3], v[i + 4], v[i + 5])))
+    place_shaft(INPUT_SHAFT, 0.0 * q[PSI], 0.0 * v[PSI], work)
+    place_shaft(OUTPUT_SHAFT, q[PSI], v[PSI], work)
+
+
+@njit
+def place_shaft(body, angle, rate, work):
+    """Attitude and angular velocity of a shaft that turns about z."""
+    put(work.pos, body, (0.0, 0.0, 0.0))
+    put(work.vel, body, (0.0, 0.0, 0.0))
+    exponential((0.0, 0.0, angle), work.rot, body)
+    put(work.spin, body, (0.0, 0.0, rate))
+
+
+@njit
+def forces(t, q, v, par, work):
+    """Evaluate all bushings and contacts at one state; ``work.force`` and the loads are written."""
+    ideal_motion(par.omega * t, par.alpha, par.omega, work)
+    place(q, v, par, work)
+    for body in range(N_BODIES):
+        for k in range(6):
+            work.force[body, k] = 0.0
+    for i in range(8):
+        bushing_load(i, par, work)
+    for pin in range(4):
+        contact_load(pin, par, work)
+
+
+@njit
+def resisting_torque(t, par, ramped):
+    """T_r, risen by the cubic step over the first quarter revolution when `ramped`."""
+    if not ramped:
+        return par.torque
+    return par.torque * smooth_step(t * abs(par.omega) / (0.5 * math.pi))
+
+
+@njit
+def body_inertia(body, a, par, work):
+    """Inertia force and rate of angular momentum of a lump at absolute accelerations.
+
+    `a`: its acceleration against the ideal frame, and angular acceleration in the same sense, (u'', w').
+    """
+    mass, inertia = mass_of(body, par)
+    omega, domega = row(work.frame_w, FRAME[body]), row(work.frame_dw, FRAME[body])
+    x, dx, w = row(work.pos, body), row(work.vel, body), row(work.spin, body)
+    ddx, dw = a
+    centripetal = cross(omega, axpy(2.0, dx, cross(omega, x)))
+    acceleration = add(add(ddx, centripetal), cross(domega, x))
+    total = to_triad(body, turn_back(work.rot, body, add(omega, w)))
+    angular = add(add(domega, dw), cross(omega, w))
+    angular = to_triad(body, turn_back(work.rot, body, angular))
+    momentum = (inertia[0] * total[0], inertia[1] * total[1], inertia[2] * total[2])
+    rate = (inertia[0] * angular[0], inertia[1] * angular[1], inertia[2] * angular[2])
+    rate = add(rate, cross(total, momentum))
+    return scale(mass, acceleration), turn(work.rot, body, from_triad(body, rate))
+
+
+@njit
+def residual(t, q, v, a, par, options, work, out):
+    """Inertia less forces at one state; zero when `a` is the acceleration.
+
+    Parameters
+    ----------
+    t : float
+        Time, s.
+    q, v, a : ndarray, shape (55,)
+        Unknowns and their first and second derivatives; m and rad.
+    par : record of PARAM
+        The joint.
+    options : Options
+        ``start`` decides whether the resisting torque is ramped.
+    work : record of WORK
+        Rewritten.
+    out : ndarray, shape (55,)
+        N and N m.
+    """
+    forces(t, q, v, par, work)
+    for body in range(N_LUMPS):
+        i = 6 * body
+        phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
+        dw = spin_rate(phi, rate, (a[i + 3], a[i + 4], a[i + 5]))
+        f, torque = body_inertia(body, ((a[i], a[i + 1], a[i + 2]), dw), par, work)
+        for k in range(3):
+            out[i + k] = f[k] - work.force[body, k]
+            out[i + 3 + k] = torque[k] - work.force[body, 3 + k]
+    resisting = resisting_torque(t, par, options.start == RAMP)
+    out[PSI] = par.Js * (work.shaft[1] + a[PSI]) - work.force[OUTPUT_SHAFT, 5] + resisting
+
+
+@njit
+def acceleration(t, q, v, par, options, work, out):
+    """Second derivatives of the unknowns, for integrators that want q'' = f(t, q, q'); arguments as in `residual`."""
+    forces(t, q, v, par, work)
+    zero = (0.0, 0.0, 0.0)
+    for body in range(N_LUMPS):
+        i = 6 * body
+        phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
+        f, torque = body_inertia(body, (zero, spin_bias(phi, rate)), par, work)
+        mass, inertia = mass_of(body, par)
+        torque = sub((work.force[body, 3], work.force[body, 4], work.force[body, 5]), torque)
+        torque = to_triad(body, turn_back(work.rot, body, torque))
+        dw = (torque[0] / inertia[0], torque[1] / inertia[1], torque[2] / inertia[2])
+        ddphi = unspin(phi, turn(work.rot, body, from_triad(body, dw)))
+        for k in range(3):
+            out[i + k] = (work.force[body, k] - f[k]) / mass
+            out[i + 3 + k] = ddphi[k]
+    resisting = resisting_torque(t, par, options.start == RAMP)
+    out[PSI] = (work.force[OUTPUT_SHAFT, 5] - resisting) / par.Js - work.shaft[1]

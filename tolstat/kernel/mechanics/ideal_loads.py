@@ -1,0 +1,124 @@
+"""Loads of the ideal joint in closed form: rigid bodies without errors, each pin in touch at the outer end of its hole.
+
+The cross turns about O, so the forces across the two pins of an axis are opposite. With R' the distance of the contacts
+from O, M the moment that moves hub and pins (C axes), T the load's torque and what moves shaft and output arms:
+
+    2 R' F_t cos(gamma) = T + M_x sin(gamma)    each output pin, in the plane of the cross
+    2 R' F_t = the same + M_z                   each input pin
+    2 R' F_z = M_x on the output pins, M_y on the input pins, across that plane
+
+Without inertia it is the statics of Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and Driveshafts, ch. 4: the
+couple on the cross T / cos(gamma) along its normal, and the secondary couples on the forks that tilt with it.
+"""
+
+import math
+
+from tolstat.common.tables import INNER, OUTER, RESULTANT, Mode
+from tolstat.kernel.mechanics.bushing import accumulate, markers
+from tolstat.kernel.mechanics.dynamics import body_inertia, place
+from tolstat.kernel.mechanics.motion import ideal_motion
+from tolstat.kernel.mechanics.topology import (
+    ARM,
+    ARM_OF_PIN,
+    BUSHING_LUMP,
+    FRAME,
+    FRAME_F,
+    N_BODIES,
+    N_LUMPS,
+    PIN,
+    TRIAD,
+)
+from tolstat.kernel.mechanics.triad import to_triad
+from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub, turn
+from tolstat.kernel.simd.jit import njit
+
+NONE, ONE_POINT = int(Mode.NONE), int(Mode.ONE_POINT)
+ZERO = (0.0, 0.0, 0.0)
+
+
+@njit
+def contact_radius(par):
+    """Distance R' (m) of the contacts from O: the hole's centre and the outermost station."""
+    return par.R + par.station_s[0]
+
+
+@njit
+def moving_moments(par, work):
+    """Moment that moves the cross, about O in C axes, and the one about z that moves shaft and output arms.
+
+    Force and torque that move each lump go to ``work.force``, which contacts are taken off later.
+    """
+    on_cross, on_shaft = ZERO, par.Js * work.shaft[1]
+    for body in range(N_BODIES):
+        for k in range(6):
+            work.force[body, k] = 0.0
+    for body in range(N_LUMPS):
+        f, torque = body_inertia(body, (ZERO, ZERO), par, work)
+        accumulate(work.force, body, f, torque)
+        about = add(torque, cross(row(work.pos, body), f))
+        if body < ARM:
+            on_cross = add(on_cross, about)
+        elif FRAME[body] == FRAME_F:
+            on_shaft += about[2]
+    return on_cross, on_shaft
+
+
+@njit
+def ideal_loads(theta, par, state, work):
+    """Write loads of the bushings, contact forces and modes of the ideal joint at one input angle.
+
+    Parameters
+    ----------
+    theta : float
+        Input angle, rad.
+    par : record of PARAM
+        The joint; its errors and clearances are not looked at.
+    state : State
+        Its ``q0`` and ``v0`` are set to zero.
+    work : record of WORK
+        ``load``, ``contact`` and ``mode`` are written, and whatever leads to them.
+    """
+    state.q0[:] = 0.0
+    state.v0[:] = 0.0
+    ideal_motion(theta, par.alpha, par.omega, work)
+    place(state.q0, state.v0, par, work)
+    radius = contact_radius(par)
+    moment, torque = moving_moments(par, work)
+    sin_gamma, cos_gamma = work.relative[FRAME_F, 2, 0], work.relative[FRAME_F, 2, 2]
+    output = (par.torque + torque + moment[0] * sin_gamma) / cos_gamma
+    for pin in range(4):
+        e, t = row(TRIAD[PIN + pin], 0), row(TRIAD[PIN + pin], 1)
+        # about O: output pins give -output about z and M_x, input pins the rest
+        couple = -output if pin < 2 else output + moment[2]
+        along_t = couple / (2 * radius)
+        along_z = (moment[0] * e[1] if pin < 2 else -moment[1] * e[0]) / (2 * radius)
+        force = add(scale(along_t, t), (0.0, 0.0, along_z))
+        touch(pin, radius, force, par, work)
+    for i in range(8):
+        carry(i, par, work)
+
+
+@njit
+def touch(pin, radius, force, par, work):
+    """Contact force on `pin`, in C axes: kept, and taken off what moves pin and arm."""
+    arm = ARM + ARM_OF_PIN[pin]
+    size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
+    work.contact[pin, OUTER] = work.contact[pin, RESULTANT] = size
+    work.contact[pin, INNER] = 0.0
+    work.mode[pin] = ONE_POINT if size > 0 else NONE
+    on_arm = turn(work.relative, FRAME[arm], force)
+    for body, off in ((PIN + pin, scale(-1.0, force)), (arm, on_arm)):
+        lever = scale(radius - par.R, row(TRIAD[body], 0))
+        accumulate(work.force, body, off, cross(lever, off))
+
+
+@njit
+def carry(i, par, work):
+    """Load of bushing `i`: what its lump still needs, about the marker and in its triad."""
+    lump = BUSHING_LUMP[i]
+    lever, _ = markers(i, par)
+    f = row(work.force, lump)
+    torque = sub((work.force[lump, 3], work.force[lump, 4], work.force[lump, 5]), cross(lever, f))
+    f, torque = to_triad(lump, f), to_triad(lump, torque)
+    for k in range(3):
+        work.load[i, k], work.load[i, 3 + k] = f[k], torque[k]

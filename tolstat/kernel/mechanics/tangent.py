@@ -1,0 +1,234 @@
+"""Tangent of the residual: S = d(residual) / d(unknowns) when velocity and acceleration follow as cv dq and ca dq.
+
+Columns are increments of displacement and of attitude (du, dtheta in the frame's axes, attitude exp(dtheta x) R),
+not of the rotation vector; `linsolve.solve` converts. Levers and attitudes are the actual ones, so that a rigid
+motion of pins and hub together costs exactly nothing. Left out, each a few per cent of what stands beside it at most:
+turning of the loads themselves with the bodies, gyroscopic terms (2 Omega / cv of the inertia), and rates of levers.
+"""
+
+from tolstat.kernel.mechanics.bushing import markers
+from tolstat.kernel.mechanics.contact import smooth_step, smooth_step_slope
+from tolstat.kernel.mechanics.dynamics import mass_of
+from tolstat.kernel.mechanics.topology import (
+    ARM,
+    ARM_OF_PIN,
+    BUSHING_BASE,
+    BUSHING_LUMP,
+    FRAME,
+    HUB,
+    N_LUMPS,
+    OUTPUT_SHAFT,
+    PIN,
+    QUARTERS,
+)
+from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn, turn_back
+from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, POINT, PSI_PSI, RHO, SLOPE, TANGENT, V_NORMAL, V_TANGENT
+from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import any_of, fma, where
+
+
+@njit
+def clear(work):
+    """Set all blocks of the tangent to zero."""
+    work.lump_block[:] = 0.0
+    work.hub_pin[:] = 0.0
+    work.pin_hub[:] = 0.0
+    work.pin_arm[:] = 0.0
+    work.arm_pin[:] = 0.0
+    work.arm_psi[:] = 0.0
+    work.psi_arm[:] = 0.0
+    work.core[0, PSI_PSI, 0] = 0.0
+
+
+@njit
+def spread(matrices, i, body, k):
+    """Columns of R diag(k) R^T, R being matrix `i` and k given along the triad of `body`: a symmetric tensor turned."""
+    x, y = (k[1], k[0]) if QUARTERS[body] % 2 == 1 else (k[0], k[1])
+    columns = of_column(matrices, i, 0), of_column(matrices, i, 1), of_column(matrices, i, 2)
+    return (
+        _spread_column(columns, (x * columns[0][0], y * columns[1][0], k[2] * columns[2][0])),
+        _spread_column(columns, (x * columns[0][1], y * columns[1][1], k[2] * columns[2][1])),
+        _spread_column(columns, (x * columns[0][2], y * columns[1][2], k[2] * columns[2][2])),
+    )
+
+
+@njit
+def _spread_column(columns, s):
+    return axpy(s[2], columns[2], axpy(s[1], columns[1], scale(s[0], columns[0])))
+
+
+@njit
+def turning(a, lever):
+    """Columns of the displacements u x lever of small turns about the axes, after the tensor with columns `a`."""
+    x, y, z = lever
+    return (
+        axpy(y, a[2], scale(-z, a[1])),
+        axpy(z, a[0], scale(-x, a[2])),
+        axpy(x, a[1], scale(-y, a[0])),
+    )
+
+
+@njit
+def crossed(lever, a):
+    """Columns of lever x a."""
+    return cross(lever, a[0]), cross(lever, a[1]), cross(lever, a[2])
+
+
+@njit
+def transposed(a):
+    """Columns of the transpose of the matrix with columns `a`."""
+    return (
+        (a[0][0], a[1][0], a[2][0]),
+        (a[0][1], a[1][1], a[2][1]),
+        (a[0][2], a[1][2], a[2][2]),
+    )
+
+
+@njit
+def plus(a, b):
+    """Columns of a + b."""
+    return add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])
+
+
+@njit
+def put(blocks, b, i, j, a):
+    """Add the 3 x 3 matrix with columns `a` to block `b` from row `i` and column `j` on."""
+    for k in range(3):
+        blocks[b, i + k, j] += a[0][k]
+        blocks[b, i + k, j + 1] += a[1][k]
+        blocks[b, i + k, j + 2] += a[2][k]
+
+
+@njit
+def take(blocks, b, i, j, a):
+    """As `put`, subtracted."""
+    for k in range(3):
+        blocks[b, i + k, j] -= a[0][k]
+        blocks[b, i + k, j + 1] -= a[1][k]
+        blocks[b, i + k, j + 2] -= a[2][k]
+
+
+@njit
+def inertia_tangent(body, ca, par, work):
+    """Add ca M of a lump to its diagonal block."""
+    mass, inertia = mass_of(body, par)
+    for j in range(3):
+        work.lump_block[body, j, j] += ca * mass
+    put(work.lump_block, body, 3, 3, spread(work.rot, body, body, scale(ca, inertia)))
+
+
+@njit
+def bushing_tangent(i, cv, par, work):
+    """Add bushing `i`: stiffness and cv times damping between lump and base.
+
+    With a and b the stiffness against displacements and turns in axes of the frame, the lump's lever l and the base's
+    m, columns and rows of a turn are those of the displacement that it makes: the tangent is symmetric.
+    """
+    base, lump = BUSHING_BASE[i], BUSHING_LUMP[i]
+    k, c = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
+    on_lump, _ = markers(i, par)
+    lever = turn(work.rot, lump, on_lump)
+    base_lever = sub(add(row(work.pos, lump), lever), row(work.pos, base))
+    a = spread(work.rot, base, lump, (fma(cv, c[0], k[0]), fma(cv, c[1], k[1]), fma(cv, c[2], k[2])))
+    b = spread(work.rot, base, lump, (fma(cv, c[3], k[3]), fma(cv, c[4], k[4]), fma(cv, c[5], k[5])))
+    by_lump, by_base = turning(a, lever), turning(a, base_lever)
+    block = work.lump_block
+    put(block, lump, 0, 0, a)
+    put(block, lump, 0, 3, by_lump)
+    put(block, lump, 3, 0, transposed(by_lump))
+    put(block, lump, 3, 3, plus(b, crossed(lever, by_lump)))
+    between = plus(b, crossed(lever, by_base))
+    if base == HUB:
+        pin = lump - PIN
+        put(block, HUB, 0, 0, a)
+        put(block, HUB, 0, 3, by_base)
+        put(block, HUB, 3, 0, transposed(by_base))
+        put(block, HUB, 3, 3, plus(b, crossed(base_lever, by_base)))
+        take(work.pin_hub, pin, 0, 0, a)
+        take(work.pin_hub, pin, 0, 3, by_base)
+        take(work.pin_hub, pin, 3, 0, transposed(by_lump))
+        take(work.pin_hub, pin, 3, 3, between)
+        take(work.hub_pin, pin, 0, 0, a)
+        take(work.hub_pin, pin, 0, 3, by_lump)
+        take(work.hub_pin, pin, 3, 0, transposed(by_base))
+        take(work.hub_pin, pin, 3, 3, transposed(between))
+    elif base == OUTPUT_SHAFT:  # of the shaft only rotation about z is free
+        arm = lump - ARM
+        for n in range(3):
+            work.arm_psi[arm, n] -= by_base[2][n]
+            work.psi_arm[arm, n] -= by_base[2][n]
+            work.arm_psi[arm, 3 + n] -= between[2][n]
+            work.psi_arm[arm, 3 + n] -= between[2][n]
+        work.core[0, PSI_PSI, 0] += b[2][2] + cross(base_lever, by_base[2])[2]
+
+
+@njit
+def _directions(pin, j, work):
+    """Write how a displacement along n and m at a station follows from pin and arm; ``work.vectors``."""
+    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
+    frame = FRAME[arm]
+    station = work.station[pin, j]
+    point = (station[POINT], station[POINT + 1], station[POINT + 2])
+    lever = sub(turn_back(work.relative, frame, point), row(work.pos, body))
+    arm_lever = sub(point, row(work.pos, arm))
+    for k, first in ((0, NORMAL), (1, TANGENT)):
+        u = (station[first], station[first + 1], station[first + 2])
+        u_pin = turn_back(work.relative, frame, u)
+        about_pin, about_arm = cross(lever, u_pin), cross(arm_lever, u)
+        for i in range(3):
+            work.vectors[k, i], work.vectors[k, 3 + i] = u_pin[i], about_pin[i]
+            work.vectors[k, 6 + i], work.vectors[k, 9 + i] = -u[i], -about_arm[i]
+
+
+@njit
+def _add_dyads(pin, n, by_n, m, by_m, work):
+    """Add n by_n^T + m by_m^T, all over (pin, arm), to the four blocks of a pin and its arm."""
+    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
+    for i in range(6):
+        for j in range(6):
+            here, there = work.lump_block[body, i, j], work.pin_arm[pin, i, j]
+            work.lump_block[body, i, j] = fma(m[i], by_m[j], fma(n[i], by_n[j], here))
+            work.pin_arm[pin, i, j] = fma(m[i], by_m[6 + j], fma(n[i], by_n[6 + j], there))
+            here, there = work.arm_pin[pin, i, j], work.lump_block[arm, i, j]
+            work.arm_pin[pin, i, j] = fma(m[6 + i], by_m[j], fma(n[6 + i], by_n[j], here))
+            work.lump_block[arm, i, j] = fma(m[6 + i], by_m[6 + j], fma(n[6 + i], by_n[6 + j], there))
+
+
+@njit
+def contact_tangent(pin, cv, par, work):
+    """Add the contact of `pin`: elastic, damping, film. Symmetric but for what film and damping add."""
+    by_n, by_m = work.by_n, work.by_m
+    for j in range(par.n_stations):
+        station = work.station[pin, j]
+        touching = station[DELTA] > 0
+        if not any_of(touching):
+            continue
+        x, weight = station[DELTA] / par.delta_d, par.station_weight[j]
+        film = par.c_t * weight * smooth_step(x)
+        damping = where(station[FORCE] > 0, par.c_d * weight * smooth_step(x), 0.0)
+        # zero where nothing touches: film, damping and force are, but the pin may be centred
+        by_rho = where(touching, 1 / station[RHO], 0.0)
+        turning = station[V_TANGENT] * by_rho
+        nn = station[SLOPE] + cv * damping
+        nm = (damping - film) * turning
+        mn = par.c_t * weight * smooth_step_slope(x) / par.delta_d * station[V_TANGENT]
+        mm = station[FORCE] * by_rho + film * (cv - station[V_NORMAL] * by_rho)
+        _directions(pin, j, work)
+        n, m = work.vectors[0], work.vectors[1]
+        for i in range(12):
+            by_n[i] = fma(nm, m[i], nn * n[i])
+            by_m[i] = fma(mm, m[i], mn * n[i])
+        _add_dyads(pin, n, by_n, m, by_m, work)
+
+
+@njit
+def assemble(cv, ca, par, work):
+    """Assemble the tangent at the state that ``dynamics.forces`` was last evaluated at."""
+    clear(work)
+    for body in range(N_LUMPS):
+        inertia_tangent(body, ca, par, work)
+    for i in range(8):
+        bushing_tangent(i, cv, par, work)
+    for pin in range(4):
+        contact_tangent(pin, cv, par, work)
+    work.core[0, PSI_PSI, 0] += ca * par.Js

@@ -1,0 +1,28 @@
+"""Components along the bodies' triads (e, t, z), which are quarter turns of their frames' axes about z: no products."""
+
+from tolstat.kernel.mechanics.topology import QUARTERS
+from tolstat.kernel.simd.jit import njit
+
+
+@njit
+def to_triad(body, a):
+    """Components along e, t and z of a vector in axes of the body's frame."""
+    quarters = QUARTERS[body]
+    x, y = a[0], a[1]
+    if quarters % 2 == 1:
+        x, y = y, -x
+    if quarters >= 2:
+        x, y = -x, -y
+    return (x, y, a[2])
+
+
+@njit
+def from_triad(body, a):
+    """Components in axes of the body's frame of a vector given along e, t and z."""
+    quarters = QUARTERS[body]
+    x, y = a[0], a[1]
+    if quarters % 2 == 1:
+        x, y = -y, x
+    if quarters >= 2:
+        x, y = -x, -y
+    return (x, y, a[2])

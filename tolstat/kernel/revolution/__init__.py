@@ -1,0 +1,1 @@
+"""One joint, from its equilibrium through revolution after revolution until it settles."""

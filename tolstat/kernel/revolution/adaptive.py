@@ -1,0 +1,109 @@
+"""One joint whose steps follow the error (`mesh`), from its start to its end (`resolve`)."""
+
+from tolstat.kernel.integrators import integrate
+from tolstat.kernel.integrators.mesh import cells_of, load_error, next_level, note_cell
+from tolstat.kernel.integrators.state import CV_FACTORISED, HALVINGS, ITERATIONS, STAGED
+from tolstat.kernel.revolution.closeup import count_in
+from tolstat.kernel.revolution.resolve import (
+    NEWTON_FAILED,
+    NOT_SETTLED,
+    begin_turns,
+    clear_extremes,
+    merge_extremes,
+    revolved,
+)
+from tolstat.kernel.revolution.settle import foresee, grid_step, record
+from tolstat.kernel.simd.jit import closure
+
+predict, accept, stages = integrate.predict, integrate.accept, integrate.stages
+REFUSED = 1e300
+"""Error of a part that Newton's iteration has not solved."""
+
+
+def build_resolve(newton, begin):
+    """Bind Newton's iteration for the joint, and its start.
+
+    Returns
+    -------
+    resolve : jitted function (par, options, work, state, ring, past, out) -> status
+        Fills the ring; writes `out` where the joint has results, and ``out.failed_step`` where a step failed.
+    """
+
+    @closure
+    def parts(origin, length, level, controlled, par, options, work, state, fine, extremes):
+        """Take a cell in 2^level parts; returns the error of the worst, above 1 where one is refused."""
+        whole = 1 << options.max_halvings
+        h, share = length / (1 << level), whole >> level
+        worst, done, j = 0.0, 0, 0
+        clear_extremes(extremes)
+        while done < whole:
+            for stage in range(stages(options)):
+                cv, ca, reach = predict(h, stage, state, options)
+                if not newton(origin + length * (done / whole) + reach * h, cv, ca, par, options, work, state):
+                    return REFUSED
+            if controlled:
+                error = load_error(h, par, state)
+                worst = max(worst, error)
+                if not error <= 1:
+                    return max(2.0, worst)
+                record(j, 0, True, par, work, state.v, fine)
+                count_in(j, fine, extremes)
+            accept(h, state, options)
+            done += share
+            j += 1
+        return worst
+
+    @closure
+    def cell(c, length, par, options, work, state, ring, past):
+        """Take cell `c`; False when it failed with the smallest parts."""
+        mesh, begun, turns = past.mesh, past.begun, past.turns
+        own, before = mesh[c % mesh.size], mesh[(c - 1) % mesh.size]
+        for i in range(state.q0.size):
+            begun[0, i], begun[1, i], begun[2, i] = state.q0[i], state.v0[i], state.a0[i]
+        controlled = turns.beside == 0
+        level = next_level(turns.revolution - turns.since, own, before) if controlled else int(own.level)
+        first = level
+        while True:
+            origin = (c - 1) * length
+            worst = parts(origin, length, level, controlled, par, options, work, state, ring.fine, past.extremes[0])
+            if worst <= 1:
+                break
+            level += 1
+            state.counters[HALVINGS] += 1
+            state.memory[CV_FACTORISED] = state.memory[STAGED] = 0.0
+            if level > options.max_halvings:
+                return False
+            for i in range(state.q0.size):
+                state.q0[i], state.v0[i], state.a0[i] = begun[0, i], begun[1, i], begun[2, i]
+        if controlled:
+            note_cell(level, level > first, worst, turns.revolution, own)
+            merge_extremes(past.extremes[0], past.extremes[1])
+        return True
+
+    @closure
+    def resolve(par, options, work, state, ring, past, out):
+        begin(par, options, work, state)
+        begin_turns(par, options, state.memory, state.weight, past)
+        cells = cells_of(options.steps_per_rev)
+        length = grid_step(par, options) / cells
+        c = 0
+        status = NOT_SETTLED
+        goes_on = True
+        while goes_on:
+            c += 1
+            k = (c + cells - 1) // cells
+            if not cell(c, length, par, options, work, state, ring, past):
+                out.failed_step = k
+                return NEWTON_FAILED
+            if c % cells == 0 and past.turns.beside == 0:
+                record(k, 0, True, par, work, state.v0, ring.samples)
+                foresee(k, state.q0, state.v0, state.ahead, ring.samples)
+            if c % past.mesh.size == 0:
+                point, spent = (state.q0, state.v0, state.a0), state.counters[ITERATIONS]
+                memory, weight = state.memory, state.weight
+                status, goes_on = revolved(point, memory, weight, spent, par, options, ring.samples, past, out)
+                if past.turns.beside == 1:
+                    c -= past.mesh.size
+        return status
+
+    return resolve

@@ -1,0 +1,142 @@
+"""A closer look at the peaks of loads where contacts switch.
+
+When a contact opens or closes the bodies ring at kilohertz. Steps that a revolution needs do not resolve that, nor must
+they: it decays within a few degrees. But where it stands on top of a peak it decides the largest load. There the two
+steps about the switch are taken again, from the recorded motion and in parts; what they show counts among the largest
+and smallest loads, while the recorded samples stay as they are.
+"""
+
+import math
+
+from tolstat.common.tables import CONTACTS
+from tolstat.kernel.integrators.integrate import UNLIMITED
+from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD
+from tolstat.kernel.revolution.settle import peak, record
+from tolstat.kernel.simd.jit import closure, njit
+
+NEAR = 0.005
+"""Distance of a load from its largest value, in units of the largest of its kind, that ringing may bridge."""
+KINK = 5e-4
+"""Third difference of a load's samples, in the same units, below which a switch is too soft to ring that far."""
+STEPS = 2
+"""Steps of the grid that are taken again: the one in which the contact switches, and the next."""
+
+
+@njit
+def switches(s, samples):
+    """Whether a contact station has begun or ceased to carry between samples `s - 1` and `s`."""
+    switched = False
+    for pin in range(4):
+        switched |= samples[s].pressed[pin] != samples[s - 1].pressed[pin]
+    return switched
+
+
+@njit
+def on_a_peak(s, samples, out):
+    """Whether a load has a kink between samples `s - 1` and `s`, and is near its largest value there."""
+    n = samples.size
+    for kind in (0, 1):
+        largest = out.F_max if kind == 0 else out.T_max
+        size = 0.0
+        for b in range(8):
+            size = max(size, largest[b])
+        for b in range(8):
+            m0, m1 = samples[s - 2].modulus[b, kind], samples[s - 1].modulus[b, kind]
+            m2, m3 = samples[s].modulus[b, kind], samples[(s + 1) % n].modulus[b, kind]
+            m4 = samples[(s + 2) % n].modulus[b, kind]
+            kink = max(abs(m3 - m0 - 3 * (m2 - m1)), abs(m4 - m1 - 3 * (m3 - m2)))
+            if max(m1, m2, m3) > largest[b] - NEAR * size and kink > KINK * size:
+                return True
+    return False
+
+
+@njit
+def extend(load, top, reach):
+    """Largest value and range of a curve that has a further value."""
+    low = min(top - reach, load)
+    top = max(top, load)
+    return top, top - low
+
+
+@njit
+def height(before, here, ahead):
+    """Height of a peak that the middle one of three samples is; its own value elsewhere."""
+    return peak(before, here, ahead) if here >= before and here >= ahead else here
+
+
+@njit
+def count_in(j, fine, out):
+    """Let sample `j` of the closer look, and the peak that the one before may be, count among the extremes."""
+    here, before, first = fine[j % 3], fine[(j - 1) % 3], fine[(j - 2) % 3]
+    for b in range(8):
+        for kind in (0, 1):
+            load = here.modulus[b, kind]
+            if j > 1:
+                load = max(load, height(first.modulus[b, kind], before.modulus[b, kind], load))
+            if kind == 0:
+                out.F_max[b], out.F_range[b] = extend(load, out.F_max[b], out.F_range[b])
+            else:
+                out.T_max[b], out.T_range[b] = extend(load, out.T_max[b], out.T_range[b])
+    for pin in range(4):
+        for i in range(len(CONTACTS)):
+            load = here.contact[pin, i]
+            if j > 1:
+                load = max(load, height(first.contact[pin, i], before.contact[pin, i], load))
+            out.contact_max[pin, i] = max(out.contact_max[pin, i], load)
+    out.psi_max = max(out.psi_max, abs(here.psi))
+
+
+def build_closeup(advance, acceleration):
+    """Bind a stepping scheme and the equations of motion.
+
+    Parameters
+    ----------
+    advance : jitted function
+        As `integrate.build_advance` makes it.
+    acceleration : jitted function (t, q, v, par, options, work, out) -> None
+
+    Returns
+    -------
+    recall : jitted function (s, h, par, options, work, state, samples) -> None
+        Makes recorded sample `s` the last accepted point, the grid's steps being `h` long.
+    look_closer : jitted function (par, options, work, state, samples, fine, out) -> None
+        Takes the steps about switches on peaks of the recorded revolution again, each in ``options.peak_substeps``, and
+        extends the extremes in `out`, a row of RESULT. What it takes is counted in ``state.counters``.
+    """
+
+    @closure
+    def recall(s, h, par, options, work, state, samples):
+        here, before = samples[s], samples[s - 1]
+        for i in range(state.q0.size):
+            state.q0[i], state.v0[i] = here.q[i], here.v[i]
+            state.q1[i], state.v1[i] = before.q[i], before.v[i]
+        acceleration((samples.size + s) * h, state.q0, state.v0, par, options, work, state.a0)
+        for i in range(state.q0.size):
+            state.a1[i] = state.aux[i] = state.a0[i]
+        state.memory[:] = 0.0
+        state.memory[H_OLD], state.counters[ATTEMPTS_LEFT] = h, UNLIMITED
+
+    @closure
+    def look_closer(par, options, work, state, samples, fine, out):
+        n = samples.size
+        h = 2 * math.pi / (abs(par.omega) * n)
+        part = h / options.peak_substeps
+        left = j = 0
+        for k in range(n + 1):
+            if k < n and switches(k, samples) and on_a_peak(k, samples, out):
+                if left == 0:
+                    recall(k - 1, h, par, options, work, state, samples)
+                    j = 0
+                left = STEPS
+            if left == 0:
+                continue
+            left -= 1
+            for i in range(options.peak_substeps):
+                if not advance((n + k - 1) * h + i * part, part, par, options, work, state):
+                    left = 0
+                    break
+                record(j, 0, True, par, work, state.v0, fine)
+                count_in(j, fine, out)
+                j += 1
+
+    return recall, look_closer

@@ -1,0 +1,135 @@
+"""Equilibrium at each input angle under the inertial loads of the ideal motion: one revolution without transients.
+
+The joint's own residual with the deviations' velocities and accelerations zero; the frames' angular velocities and
+accelerations stay, and with them centrifugal loads, the output shaft's inertia and the drag of pins that turn in
+their holes. Continuation in the angle: the solution is extrapolated through the last four angles, or through three
+where that foretold the last angle better (a contact has switched), and corrected by Newton's iteration, with a
+tangent kept from angle to angle. Where that fails it begins at the angle before; where that fails too, pseudo-
+transient continuation finds the equilibrium from there.
+"""
+
+import math
+
+from tolstat.kernel.integrators.state import AHEAD, HALVINGS, STEPS
+from tolstat.kernel.mechanics.motion import speed_ratio
+from tolstat.kernel.mechanics.topology import PSI
+from tolstat.kernel.mechanics.vector import larger
+from tolstat.kernel.simd.jit import closure, njit
+from tolstat.kernel.simd.lane import where
+
+
+@njit
+def angle_time(k, n, par):
+    """Time (s) at angle `k` of `n`, from the second revolution on: a torque that rises at the start has risen."""
+    return 2 * math.pi * (n + k) / (n * abs(par.omega))
+
+
+@njit
+def extrapolate(begins, known, state):
+    """Trial point, in lanes that begin an angle, when `known` angles are solved.
+
+    Through the last four equally spaced angles, or three where no more are known or where that was better;
+    ``state.aux`` and ``state.a1`` are the third and fourth last. Before that, the angle before.
+    """
+    cubic, square = (known > 3) & (state.memory[AHEAD] > 0), known > 2
+    for i in range(state.q.size):
+        by_four = 4 * (state.q0[i] + state.aux[i]) - 6 * state.q1[i] - state.a1[i]
+        by_three = 3 * (state.q0[i] - state.q1[i]) + state.aux[i]
+        guess = where(cubic, by_four, where(square, by_three, state.q0[i]))
+        state.q[i] = where(begins, guess, state.q[i])
+
+
+@njit
+def stay(state):
+    """Trial point: that of the angle before."""
+    for i in range(state.q.size):
+        state.q[i] = state.q0[i]
+
+
+@njit
+def keep(solved, state):
+    """Make the trial point the last angle's solution, in lanes that have one.
+
+    ``state.memory[AHEAD]``: whether four angles foretold it better than three.
+    """
+    by_three = by_four = 0.0 * state.q[0]
+    for i in range(state.q.size):
+        third = state.q[i] - 3 * (state.q0[i] - state.q1[i]) - state.aux[i]
+        by_three += abs(third)
+        by_four += abs(third - (state.q0[i] - 3 * (state.q1[i] - state.aux[i]) - state.a1[i]))
+        state.a1[i] = where(solved, state.aux[i], state.a1[i])
+        state.aux[i] = where(solved, state.q1[i], state.aux[i])
+        state.q1[i] = where(solved, state.q0[i], state.q1[i])
+        state.q0[i] = where(solved, state.q[i], state.q0[i])
+    state.memory[AHEAD] = where(solved, where(by_four < by_three, 1.0, 0.0), state.memory[AHEAD])
+
+
+@njit
+def end_closure(samples):
+    """Change of the loads' moduli at theta = 0 over the revolution, relative to the largest of their kind."""
+    worst = 0.0
+    for kind in (0, 1):
+        largest = 0.0
+        for s in range(samples.size):
+            for b in range(8):
+                largest = max(largest, samples[s].modulus[b, kind])
+        change = samples[0].change[kind]
+        worst = larger(worst, change / largest if largest > 0 else change)
+    return worst
+
+
+@njit
+def speed_ratios(par, samples):
+    """Write ``tau`` and ``psi`` of the samples from the deviation of the output shaft's angle, which ``tau`` holds.
+
+    Its slope over the input angle is taken by central differences around the revolution.
+    """
+    n = samples.size
+    by_sample = n / (4 * math.pi) if par.omega > 0 else -n / (4 * math.pi)
+    first, before = samples[0].tau, samples[n - 1].tau
+    for s in range(n):
+        here, ahead = samples[s].tau, samples[s + 1].tau if s + 1 < n else first
+        slope = (ahead - before) * by_sample
+        before = here
+        samples[s].tau = speed_ratio(2 * math.pi * s / n, par.alpha) + slope
+        samples[s].psi = slope / samples[s].tau
+
+
+def build_quasistatic(hold, relax, record):
+    """Bind the equilibria of a system to a revolution.
+
+    Parameters
+    ----------
+    hold, relax : jitted functions
+        As `equilibrium.build_equilibrium` makes them.
+    record : jitted function (k, lane, in_full, par, work, v, samples) -> None
+        Keeps an angle.
+
+    Returns
+    -------
+    jitted function (first, par, options, work, state, ring) -> bool
+        Goes once around from the equilibrium ``state.q0`` at theta = 0; False when an angle has none in reach.
+        ``first``: whether there is no revolution before.
+    """
+
+    @closure
+    def revolution(first, par, options, work, state, ring):
+        n = ring.samples.size
+        for k in range(0 if first else 1, n + 1):
+            t = angle_time(k, n, par)
+            extrapolate(True, state.counters[STEPS], state)
+            if not hold(t, par, options, work, state):
+                state.counters[HALVINGS] += 1
+                stay(state)
+                if not hold(t, par, options, work, state):
+                    relax(t, par, options, work, state)
+                    stay(state)
+                    if not hold(t, par, options, work, state):
+                        return False
+            keep(True, state)
+            state.counters[STEPS] += 1
+            record(k, 0, True, par, work, state.v0, ring.samples)
+            ring.samples[k % n].tau = state.q0[PSI]
+        return True
+
+    return revolution

@@ -1,0 +1,221 @@
+"""The recorded revolution: a ring of samples by input angle, and the closure error between revolutions."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tolstat.common.tables import CONTACTS
+from tolstat.kernel.mechanics.scale import stiffness
+from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PSI
+from tolstat.kernel.mechanics.vector import larger
+from tolstat.kernel.mechanics.work import FORCE
+from tolstat.kernel.revolution.trail import make_notes
+from tolstat.kernel.simd.borrow import fetch
+from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import pick
+
+SAMPLE = np.dtype(
+    [
+        ("loads", "f8", (8, 6)),  # N, N m
+        ("contact", "f8", (4, len(CONTACTS))),  # N
+        ("modulus", "f8", (8, 2)),  # |F|, |T|
+        ("change", "f8", (2,)),  # largest change of |F| and |T| against the revolution before
+        ("tau", "f8"),
+        ("psi", "f8"),  # Psi, eq. (13)
+        ("mode", "u1", (4,)),
+        ("pressed", "u2", (4,)),  # bit j: station j of the pin carries
+        ("q", "f8", (N_DOF,)),  # m, rad
+        ("v", "f8", (N_DOF,)),  # per s
+    ],
+    align=True,
+)
+"""Sample k of a revolution belongs to theta = 2 pi k / steps_per_rev."""
+
+
+def make_samples(joints: int, steps_per_rev: int) -> np.recarray:
+    """Allocate revolutions, shape (joints, steps_per_rev), filled with NaN."""
+    samples = np.zeros((joints, steps_per_rev), SAMPLE)
+    for name in SAMPLE.names:
+        if SAMPLE[name].base.kind == "f":
+            samples[name] = np.nan
+    return samples.view(np.recarray)
+
+
+class Ring(NamedTuple):
+    """The last revolution of a joint, and what else is remembered of it."""
+
+    samples: np.recarray  # (steps_per_rev,) SAMPLE
+    notes: np.record  # NOTES: closure errors
+    fine: np.recarray  # (3,) SAMPLE, see `closeup`
+
+
+def make_ring(steps_per_rev: int) -> Ring:
+    """Allocate, filled with NaN."""
+    return Ring(make_samples(1, steps_per_rev)[0], make_notes(1)[0], make_samples(1, 3)[0])
+
+
+@njit
+def grid_step(par, options):
+    """Length of a step of the output grid, s."""
+    return 2 * math.pi / (abs(par.omega) * options.steps_per_rev)
+
+
+@njit
+def pressed(pin, lane, par, work):
+    """Which stations of `pin` carry, as bits."""
+    bits = 0
+    for j in range(par.n_stations):
+        if pick(work.station[pin, j, FORCE], lane) > 0:
+            bits |= 1 << j
+    return bits
+
+
+@njit
+def record(k, lane, in_full, par, work, v, samples):
+    """Keep grid point `k` (counted from the start) of the joint in `lane`, as it was last evaluated with rates `v`.
+
+    `in_full`: whether more is wanted than the loads' moduli, which the next revolution is compared with.
+    """
+    sample = samples[k % samples.size]
+    fetch(samples[(k + 2) % samples.size])
+    of_force = of_torque = 0.0
+    for b in range(8):
+        for kind in (0, 1):
+            square = 0.0
+            for i in range(3):
+                load = pick(work.load[b, 3 * kind + i], lane)
+                square += load * load
+                if in_full:
+                    sample.loads[b, 3 * kind + i] = load
+            modulus = math.sqrt(square)
+            change = abs(modulus - sample.modulus[b, kind])  # NaN in the first revolution
+            of_force = larger(of_force, change) if kind == 0 else of_force
+            of_torque = larger(of_torque, change) if kind == 1 else of_torque
+            sample.modulus[b, kind] = modulus
+    sample.change[0], sample.change[1] = of_force, of_torque
+    if not in_full:
+        return
+    for pin in range(4):
+        for i in range(len(CONTACTS)):
+            sample.contact[pin, i] = pick(work.contact[pin, i], lane)
+        sample.mode[pin] = int(pick(work.mode[pin], lane))
+        sample.pressed[pin] = pressed(pin, lane, par, work)
+    omega, rate = pick(par.omega, lane), pick(v[PSI], lane)
+    sample.tau = (pick(work.shaft[0], lane) + rate) / omega
+    sample.psi = rate / (omega * sample.tau)
+
+
+@njit
+def foresee(k, q, v, ahead, samples):
+    """Keep the motion at grid point `k`; expect of the next step the change that it brought a revolution ago.
+
+    Returns
+    -------
+    float
+        1 when there was one, else 0: then nothing is known.
+    """
+    n = samples.size
+    here, following = samples[k % n], samples[(k + 1) % n]
+    known = k > n
+    for i in range(N_DOF):
+        if known:
+            ahead[i] = following.q[i] - here.q[i]
+            here.v[i] = v[i]
+        here.q[i] = q[i]
+    return 1.0 if known else 0.0
+
+
+@njit
+def closure_error(samples):
+    """Largest change of any bushing load's modulus since the revolution before, relative to the largest of its kind."""
+    worst = 0.0
+    for kind in (0, 1):
+        change = largest = 0.0
+        for s in range(samples.size):
+            change = larger(change, samples[s].change[kind])
+            for b in range(8):
+                largest = max(largest, samples[s].modulus[b, kind])
+        error = change / largest if largest > 0 else change
+        worst = larger(worst, error)
+    return worst
+
+
+@njit
+def peak(before, here, ahead):
+    """Height of the parabola through three samples, of which `here` is the largest: a peak lies between samples.
+
+    Where contacts switch, the peak is a kink and not a parabola; the height is then off by an eighth at most of the
+    larger drop to a neighbour.
+    """
+    bend = 2 * here - before - ahead
+    return here + (ahead - before) ** 2 / (8 * bend) if bend > 0 else here
+
+
+@njit
+def extremes(values):
+    """Largest and smallest height of a closed curve given at equally spaced angles, shape (n,)."""
+    n = values.size
+    top = low = 0
+    for s in range(n):
+        if values[s] > values[top]:
+            top = s
+        if values[s] < values[low]:
+            low = s
+    highest = peak(values[top - 1], values[top], values[(top + 1) % n])
+    lowest = -peak(-values[low - 1], -values[low], -values[(low + 1) % n])
+    return highest, lowest
+
+
+@njit
+def step_error(par, samples, out):
+    """Estimated error of a step of BDF2 as a load relative to the largest one, the mean of the recorded revolution.
+
+    A step of BDF2 errs by 2/9 of the third difference of an unknown (Hairer, Wanner: Solving ODEs I, III.2); by the
+    stiffness of the lump's bushing that is a load.
+    """
+    force = torque = 0.0
+    for b in range(8):
+        force, torque = max(force, out.F_max[b]), max(torque, out.T_max[b])
+    total = 0.0
+    for s in range(samples.size):
+        q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q
+        worst = 0.0
+        for body in range(N_LUMPS):
+            k, k_turn = stiffness(body, par)
+            of_force = of_torque = 0.0
+            for i in range(6 * body, 6 * body + 3):
+                j = i + 3
+                of_force = max(of_force, abs(q3[i] - q0[i] - 3 * (q2[i] - q1[i])))
+                of_torque = max(of_torque, abs(q3[j] - q0[j] - 3 * (q2[j] - q1[j])))
+            worst = max(worst, max(k / force * of_force, k_turn / torque * of_torque))
+        total += worst
+    return 2 / 9 * total / samples.size
+
+
+@njit
+def summarise(samples, out):
+    """Write the statistics of the recorded revolution to a row of RESULT."""
+    n = samples.size
+    for b in range(8):
+        for kind in (0, 1):
+            top, low = extremes(samples.modulus[:, b, kind])
+            low = max(low, 0.0)
+            total = 0.0
+            for s in range(n):
+                total += samples[s].modulus[b, kind]
+            if kind == 0:
+                out.F_max[b], out.F_mean[b], out.F_range[b] = top, total / n, top - low
+            else:
+                out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / n, top - low
+    out.psi_max = 0.0
+    for pin in range(4):
+        for i in range(len(CONTACTS)):
+            out.contact_max[pin, i], _ = extremes(samples.contact[:, pin, i])
+        for mode in range(4):
+            count = 0
+            for s in range(n):
+                count += samples[s].mode[pin] == mode
+            out.mode_share[pin, mode] = count / n
+    for s in range(n):
+        out.psi_max = max(out.psi_max, abs(samples[s].psi))

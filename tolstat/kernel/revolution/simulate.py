@@ -1,0 +1,296 @@
+"""One joint from its start to a settled, recorded revolution (model, section 7)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tolstat.common.tables import CONTACTS, MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
+from tolstat.kernel.integrators import integrate
+from tolstat.kernel.integrators.mesh import parts_of
+from tolstat.kernel.integrators.state import AHEAD, FACTORISATIONS, HALVINGS, ITERATIONS, STEPS, make_state_record
+from tolstat.kernel.mechanics import dynamics, linsolve, tangent
+from tolstat.kernel.mechanics.guess import rigid_guess
+from tolstat.kernel.mechanics.ideal_loads import ideal_loads
+from tolstat.kernel.mechanics.scale import set_weight, typical_force
+from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.mechanics.work import make_work
+from tolstat.kernel.revolution.adaptive import build_resolve
+from tolstat.kernel.revolution.closeup import build_closeup
+from tolstat.kernel.revolution.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium, near
+from tolstat.kernel.revolution.quasistatic import angle_time, build_quasistatic, end_closure, speed_ratios
+from tolstat.kernel.revolution.resolve import Past, follows_error, make_past
+from tolstat.kernel.revolution.settle import (
+    Ring,
+    closure_error,
+    foresee,
+    grid_step,
+    make_ring,
+    record,
+    step_error,
+    summarise,
+)
+from tolstat.kernel.revolution.trail import closure_trend, note_closure
+from tolstat.kernel.simd.jit import njit
+
+OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
+NOT_FINITE, OUTSIDE_MODEL, NOT_PERIODIC = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL), int(Status.NOT_PERIODIC)
+PERIODIC, UNKNOWN = int(Motion.PERIODIC), int(Motion.UNKNOWN)
+RAMP = int(Start.RAMP)
+DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)
+CHECKS_PER_REV = 12
+"""How often a revolution the closure error is looked at, once two revolutions are recorded."""
+
+residual, acceleration = dynamics.residual, dynamics.acceleration
+assemble, eliminate, solve = tangent.assemble, linsolve.factorise, linsolve.solve
+
+
+@njit
+def factorise(t, q, v, a, cv, ca, par, options, work):
+    """Tangent at the state that the residual was last evaluated at, factorised."""
+    assemble(cv, ca, par, work)
+    return eliminate(work)
+
+
+@njit
+def factorise_static(t, q, v, a, cv, ca, par, options, work):
+    """Tangent of an equilibrium, regularised and factorised."""
+    assemble(CV_REGULAR, CA_REGULAR, par, work)
+    return eliminate(work)
+
+
+newton = integrate.build_newton(residual, factorise, solve)
+substeps, advance = integrate.build_advance(newton)
+static_newton = integrate.build_newton(residual, factorise_static, solve, small=near)
+hold, relax, equilibrium = build_equilibrium(residual, newton, static_newton, integrate.scaled_size, rigid_guess)
+revolution = build_quasistatic(hold, relax, record)
+recall, look_closer = build_closeup(advance, acceleration)
+reset = integrate.reset
+
+
+@njit
+def inside_model(par):
+    """Whether the model has a meaning for a joint; written so that NaN has none."""
+    good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
+    good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0
+    linear = 0.0
+    for j in range(par.n_stations):
+        good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0
+        linear += par.station_k2[j]
+    good = good and linear > 0
+    for pin in range(4):
+        good = good and par.clearance[pin] >= 0
+    return good
+
+
+@njit
+def clear_results(out):
+    """NaN in everything that may not be computed."""
+    nan = np.nan
+    out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
+    out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
+    out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = out.psi_max = nan
+    out.step_error = out.refinement_change = nan
+    for b in range(8):
+        out.F_max[b] = out.F_mean[b] = out.F_range[b] = nan
+        out.T_max[b] = out.T_mean[b] = out.T_range[b] = nan
+    for pin in range(4):
+        for k in range(len(CONTACTS)):
+            out.contact_max[pin, k] = nan
+        for k in range(4):
+            out.mode_share[pin, k] = nan
+
+
+@njit
+def clear(par, state, samples, notes):
+    """Make ready for another joint."""
+    set_weight(typical_force(par), par, state.weight)
+    state.q0[:] = 0.0
+    state.v0[:] = 0.0
+    state.a0[:] = 0.0
+    reset(state)
+    for s in range(samples.size):
+        samples[s].modulus[:] = np.nan
+    notes.count = 0
+
+
+@njit
+def run(par, options, alone, out):
+    """Fill the ring at the fidelity asked for; return a status.
+
+    ``out.closure`` and ``out.revolutions`` are written, and ``out.failed_step`` where a step failed.
+    """
+    work, state, ring, past = alone
+    if not inside_model(par):
+        return OUTSIDE_MODEL
+    clear(par, state, ring.samples, ring.notes)
+    if options.fidelity == IDEAL:
+        return run_ideal(par, work, state, ring, out)
+    if options.fidelity == QUASISTATIC:
+        return run_quasistatic(par, options, work, state, ring, out)
+    if follows_error(options):
+        return resolve(par, options, work, state, ring, past, out)
+    return run_dynamic(par, options, work, state, ring, out)
+
+
+@njit
+def run_ideal(par, work, state, ring, out):
+    """Fill the ring with the loads of the ideal joint."""
+    n = ring.samples.size
+    for k in range(n):
+        ideal_loads(math.copysign(2 * math.pi * k / n, par.omega), par, state, work)
+        record(k, 0, True, par, work, state.v0, ring.samples)
+    out.closure, out.revolutions = 0.0, 1.0
+    state.counters[STEPS] = n
+    return OK
+
+
+@njit
+def run_quasistatic(par, options, work, state, ring, out):
+    """Go around through equilibria, again where a revolution does not end where it began."""
+    n = ring.samples.size
+    equilibrium(angle_time(0, n, par), par, options, work, state)
+    for revolutions in range(options.max_revs):
+        if not revolution(revolutions == 0, par, options, work, state, ring):
+            return NEWTON_FAILED
+        out.closure, out.revolutions = end_closure(ring.samples), revolutions + 1.0
+        if out.closure <= options.settle_tol:
+            break
+        if state.counters[ITERATIONS] > MAX_ITERATIONS * n * options.max_revs:
+            return NEWTON_FAILED
+    speed_ratios(par, ring.samples)
+    return OK if out.closure <= options.settle_tol else NOT_SETTLED
+
+
+@njit
+def begin(par, options, work, state):
+    """Bring a joint to its start at theta = 0."""
+    if options.start == RAMP:
+        acceleration(0.0, state.q0, state.v0, par, options, work, state.a0)
+    else:
+        equilibrium(0.0, par, options, work, state)
+    iterations, factorisations = state.counters[ITERATIONS], state.counters[FACTORISATIONS]
+    reset(state)
+    state.counters[ITERATIONS], state.counters[FACTORISATIONS] = iterations, factorisations
+
+
+resolve = build_resolve(newton, begin)
+
+
+@njit
+def judge(k, iterations, options, samples, notes, out):
+    """Status of a joint at grid point `k`: `NOT_SETTLED` while it is to go on."""
+    n = options.steps_per_rev
+    out.revolutions = k / n
+    if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
+        out.closure = closure_error(samples)
+        note_closure(out.revolutions, out.closure, notes)
+        if out.closure <= options.settle_tol:
+            return OK
+    return NEWTON_FAILED if iterations > MAX_ITERATIONS * n * options.max_revs else NOT_SETTLED
+
+
+@njit
+def run_dynamic(par, options, work, state, ring, out):
+    """Integrate until settled."""
+    begin(par, options, work, state)
+    n, h = options.steps_per_rev, grid_step(par, options)
+    for k in range(1, options.max_revs * n + 1):
+        if not advance((k - 1) * h, h, par, options, work, state):
+            out.failed_step = k
+            return NEWTON_FAILED
+        record(k, 0, k > n or options.max_revs == 1, par, work, state.v0, ring.samples)
+        state.memory[AHEAD] = foresee(k, state.q0, state.v0, state.ahead, ring.samples)
+        status = judge(k, state.counters[ITERATIONS], options, ring.samples, ring.notes, out)
+        if status == NEWTON_FAILED:
+            out.failed_step = k
+        if status != NOT_SETTLED:
+            return status
+    return NOT_SETTLED
+
+
+@njit
+def is_finite(out):
+    """Whether the statistics of a joint are numbers."""
+    for b in range(8):
+        if not (out.F_max[b] < 1e300 and out.T_max[b] < 1e300 and out.F_mean[b] + out.T_mean[b] < 1e300):
+            return False
+    return True
+
+
+@njit
+def describe(status, options, counters, mesh, out):
+    """Write how a joint ended."""
+    out.status = status
+    out.settled = status == OK
+    out.steps_per_rev = parts_of(mesh) if follows_error(options) else options.steps_per_rev
+    out.steps, out.newton_iterations = counters[STEPS], counters[ITERATIONS]
+    out.halvings, out.factorisations = counters[HALVINGS], counters[FACTORISATIONS]
+
+
+@njit
+def finish(status, failed, options, counters, mesh, out):
+    """Write how a joint ended, and at which step (-1: at none) one without results has `failed`."""
+    if status not in (OK, NOT_SETTLED, NOT_PERIODIC):
+        clear_results(out)
+        if failed > 0:
+            out.failed_step = failed
+            out.failed_theta = 2 * math.pi * ((failed - 1) % options.steps_per_rev) / options.steps_per_rev
+    describe(status, options, counters, mesh, out)
+
+
+@njit
+def conclude(status, par, options, notes, samples, out):
+    """Write the error of the steps, and how the closure error fell: in the second half, where it is not small yet."""
+    if options.fidelity == DYNAMIC:
+        out.step_error = step_error(par, samples, out)
+    since = 0.0 if status == OK else 0.5 * options.max_revs
+    out.closure_trend, _ = closure_trend(since, notes)
+    if status == OK:
+        out.motion, out.period = PERIODIC, 1
+
+
+@njit
+def simulate_joint(par, options, alone, out):
+    """Simulate one joint.
+
+    Parameters
+    ----------
+    par : record of PARAM
+        The joint.
+    options : Options
+        Numerical settings.
+    alone : Scratch
+        Nothing is carried over from one joint to the next. The ring holds the last revolution.
+    out : record of RESULT
+        Written: status, and NaN in what was not computed.
+    """
+    work, state, ring, past = alone
+    clear_results(out)
+    state.counters[:] = 0
+    controlled = follows_error(options)
+    status = run(par, options, alone, out)
+    failed = out.failed_step
+    if status in (OK, NOT_SETTLED) and not controlled:
+        summarise(ring.samples, out)
+        if not is_finite(out):
+            status, failed = NOT_FINITE, state.counters[STEPS]
+    if status in (OK, NOT_SETTLED) and not controlled:
+        conclude(status, par, options, ring.notes, ring.samples, out)
+        if status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1:
+            look_closer(par, options, work, state, ring.samples, ring.fine, out)
+    finish(status, failed, options, state.counters, past.mesh, out)
+
+
+class Scratch(NamedTuple):
+    """Everything a process needs to simulate one joint after the other."""
+
+    work: np.record
+    state: np.record
+    ring: Ring
+    past: Past
+
+
+def make_scratch(options: Options) -> Scratch:
+    """Allocate the work arrays of a process."""
+    return Scratch(make_work(), make_state_record(N_DOF), make_ring(options.steps_per_rev), make_past(options))

@@ -1,0 +1,138 @@
+"""What is remembered of a joint that takes long to settle: closure errors, and whole revolutions to compare.
+
+A joint that settles writes no more than one number a check here. Of one whose steps follow the error (`resolve`) whole
+revolutions are kept: moduli of their loads, for closure errors over several revolutions, and the statistics of each.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tolstat.common.tables import CONTACTS, RESULT
+from tolstat.kernel.mechanics.vector import copy, larger
+from tolstat.kernel.simd.jit import njit
+
+MOST_ANGLES = 360
+"""Input angles a revolution at which moduli are kept."""
+MOST_CHECKS = 192
+"""Closure errors kept."""
+
+
+NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
+"""Closure errors: revolutions and log10 of the error at each check; checks made."""
+
+
+class Trail(NamedTuple):
+    """Work arrays; revolution r lies at index r modulo the number kept."""
+
+    modulus: np.ndarray  # (kept, angles, 8, 2) |F|, |T|
+    revolution: np.ndarray  # (kept,) record of RESULT: statistics of each revolution
+    notes: np.record  # NOTES
+
+
+def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
+    """Allocate the arrays of several trails, for `kept` revolutions."""
+    angles = -(-steps_per_rev // _stride(steps_per_rev))
+    modulus = np.full((joints, kept, angles, 8, 2), np.nan)
+    return modulus, np.zeros((joints, kept), RESULT).view(np.recarray), make_notes(joints)
+
+
+def make_trail(steps_per_rev: int, kept: int) -> Trail:
+    """Allocate for one joint."""
+    modulus, revolution, notes = make_trails(1, steps_per_rev, kept)
+    return Trail(modulus[0], revolution[0], notes[0])
+
+
+def make_notes(joints: int) -> np.recarray:
+    """Allocate, shape (joints,)."""
+    return np.zeros(joints, NOTES).view(np.recarray)
+
+
+def _stride(steps: int) -> int:
+    return -(-steps // MOST_ANGLES)
+
+
+@njit
+def note_closure(revolutions, closure, notes):
+    """Remember a closure error; one that has no logarithm is left out."""
+    if 0 < closure < 1e300:
+        i = notes.count % MOST_CHECKS
+        notes.check[i, 0], notes.check[i, 1] = revolutions, math.log10(closure)
+        notes.count += 1
+
+
+@njit
+def closure_trend(since, notes):
+    """Straight line through the logarithms of the closure errors from revolution `since` on.
+
+    Returns
+    -------
+    slope : float
+        Per revolution; NaN where there are fewer than two.
+    scatter : float
+        Root mean square about the line.
+    """
+    n = 0
+    x = y = xx = xy = yy = 0.0
+    for i in range(min(notes.count, MOST_CHECKS)):
+        if notes.check[i, 0] >= since:
+            dx, value = notes.check[i, 0] - since, notes.check[i, 1]
+            n += 1
+            x, y = x + dx, y + value
+            xx, xy, yy = xx + dx * dx, xy + dx * value, yy + value * value
+    if n < 2:
+        return np.nan, np.nan
+    spread, product = xx - x * x / n, xy - x * y / n
+    slope = product / spread
+    return slope, math.sqrt(max(0.0, yy - y * y / n - slope * product) / n)
+
+
+@njit
+def lag_closure(last, lag, trail):
+    """Closure error of revolution `last` (from 0) against the one `lag` revolutions before, as `closure_error`."""
+    kept, angles = trail.modulus.shape[0], trail.modulus.shape[1]
+    now, before = trail.modulus[last % kept], trail.modulus[(last - lag) % kept]
+    worst = 0.0
+    for kind in (0, 1):
+        change = largest = 0.0
+        for s in range(angles):
+            for b in range(8):
+                change = larger(change, abs(now[s, b, kind] - before[s, b, kind]))
+                largest = max(largest, now[s, b, kind])
+        error = change / largest if largest > 0 else change
+        worst = larger(worst, error)
+    return worst
+
+
+@njit
+def combine(last, count, trail, out):
+    """Write the statistics of the `count` revolutions up to `last` (from 0) to a row of RESULT."""
+    kept = trail.revolution.size
+    first = trail.revolution[last % kept]
+    for b in range(8):
+        for kind in (0, 1):
+            top, low, total = 0.0, np.inf, 0.0
+            for r in range(last - count + 1, last + 1):
+                one = trail.revolution[r % kept]
+                if kind == 0:
+                    most, mean, reach = one.F_max[b], one.F_mean[b], one.F_range[b]
+                else:
+                    most, mean, reach = one.T_max[b], one.T_mean[b], one.T_range[b]
+                top, low, total = max(top, most), min(low, most - reach), total + mean
+            if kind == 0:
+                out.F_max[b], out.F_mean[b], out.F_range[b] = top, total / count, top - low
+            else:
+                out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / count, top - low
+    out.psi_max = first.psi_max
+    for pin in range(4):
+        copy(first.contact_max[pin], out.contact_max[pin])
+    out.mode_share[:] = 0.0
+    for r in range(last - count + 1, last + 1):
+        one = trail.revolution[r % kept]
+        out.psi_max = max(out.psi_max, one.psi_max)
+        for pin in range(4):
+            for i in range(len(CONTACTS)):
+                out.contact_max[pin, i] = max(out.contact_max[pin, i], one.contact_max[pin, i])
+            for mode in range(4):
+                out.mode_share[pin, mode] += one.mode_share[pin, mode] / count

@@ -1,0 +1,1 @@
+"""Compilation, and arithmetic of many joints at once."""

@@ -1,0 +1,1 @@
+"""What is asked of a result file, one folder a question."""

@@ -1,0 +1,1 @@
+"""Which tolerances to change, for what they cost."""

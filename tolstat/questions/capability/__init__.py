@@ -1,0 +1,1 @@
+"""Which specification limits the process meets."""

@@ -1,0 +1,1 @@
+"""Which tolerance causes the load."""

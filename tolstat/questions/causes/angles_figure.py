@@ -1,0 +1,99 @@
+"""Contribution of the errors to a load against the shaft angle: text and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.display import style
+from tolstat.display.text import UNITS, align
+
+if TYPE_CHECKING:
+    from tolstat.questions.causes.angles import AgainstAngle
+
+LINES = 4
+"""Errors whose share is drawn."""
+ORIGIN = {
+    "stored": "from the histories in the file",
+    "harmonics": "restored from the harmonics in the file",
+    "simulated again": "simulated again, since the file holds no histories",
+}
+
+
+def text(found: AgainstAngle, shown: int = 12) -> str:
+    """Table of the `shown` errors with the largest share over the revolution, and where their share is largest."""
+    rows = [["error", "revolution, %", "95 % interval", "largest, %", "at, deg"]]
+    for i, name in enumerate(found.names[:shown]):
+        share, low, high = (100.0 * part[i] for part in found.overall[:3])
+        k = int(np.argmax(found.first.estimate[i]))
+        ends = "-" if np.isnan(low) else f"{low:.1f} .. {high:.1f}"
+        largest = f"{100.0 * found.first.estimate[i, k]:.1f}"
+        rows.append([name, f"{share:.1f}", ends, largest, f"{np.degrees(found.angles[k]):.0f}"])
+    return align(rows)
+
+
+def note(found: AgainstAngle, log: bool = False) -> str:
+    """Sentences on what the shares stand on."""
+    said = (
+        f"Against the angle: the first {found.joints} settled joints, {ORIGIN[found.origin]}; bands are 95 % at each "
+    )
+    said += f"angle. Shares{' of the variance of the logarithm' if log else ''} are corrected for chance: that of an "
+    said += "error without effect is 0 on the average, and may be below."
+    if found.apart:
+        said += f" Their largest loads are up to {found.apart:.1e} off the stored ones: another machine or version."
+    return said
+
+
+def save(found: AgainstAngle, log: bool, path: Path) -> list[Path]:
+    """Draw load and shares below each other, as PNG; the file written."""
+    with style.settings():
+        figure = Figure(figsize=(8.0, 7.6), layout="constrained")
+        upper, lower = figure.subplots(2, 1)
+        upper.set_title(f"{found.load} over the revolution, {found.joints} joints")
+        loads(upper, found)
+        lower.set_title(f"Share of the variance of {'log ' if log else ''}{found.load} that each error explains alone")
+        shares(lower, found)
+    return style.save(figure, path.with_suffix(""), (path.suffix,))
+
+
+def closed(values: FloatArray) -> FloatArray:
+    """A revolution with its first sample at the end again."""
+    return np.concatenate([values, values[..., :1]], axis=-1)
+
+
+def theta_axis(ax: Axes, angles: FloatArray) -> FloatArray:
+    """Make the x axis one of shaft angles; the angles in degrees, closed to a revolution."""
+    ax.set(xlim=(0.0, 360.0), xticks=range(0, 361, 60), xlabel="input shaft angle θ [deg]")
+    return np.append(np.degrees(angles), 360.0)
+
+
+def loads(ax: Axes, angle: AgainstAngle) -> None:
+    """Draw a load over the revolution: the joint without errors, and how the others scatter."""
+    theta = theta_axis(ax, angle.angles)
+    low, middle, high = closed(angle.spread)
+    ax.fill_between(theta, low, high, color=style.COLOURS[0], alpha=0.2, lw=0, label="5 to 95 % of the joints")
+    ax.plot(theta, middle, color=style.COLOURS[0], label="median")
+    if np.isfinite(angle.nominal).all():
+        ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label="without errors")
+    ax.set_ylabel(f"|{angle.load}| [{UNITS.get(angle.unit, angle.unit)}]")
+    ax.set_ylim(0.0, 1.28 * max(high.max(), np.nan_to_num(angle.nominal).max()))
+    ax.legend(loc="upper right", ncols=3, columnspacing=1.2, handlelength=1.8)
+
+
+def shares(ax: Axes, angle: AgainstAngle) -> None:
+    """Draw the shares of the variance of the errors that have the largest over the revolution."""
+    theta = theta_axis(ax, angle.angles)
+    ceiling = 0.0
+    for i, name in enumerate(angle.names[:LINES]):
+        share, low, high = (100.0 * closed(part[i]) for part in angle.first[:3])
+        if np.isfinite(low).all():
+            ax.fill_between(theta, low, high, color=style.COLOURS[i], alpha=0.15, lw=0)
+        ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
+        ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(high), high, share), initial=0.0)))
+    ax.set(ylim=(0.0, 1.3 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
+    ax.legend(loc="upper right", ncols=2, columnspacing=1.2, handlelength=2.6)

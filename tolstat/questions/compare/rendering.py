@@ -1,0 +1,188 @@
+"""Two campaigns side by side: text, CSV and a picture of their curves and the difference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from tolstat.analysis import difference, exceedance
+from tolstat.common.tables import VALID
+from tolstat.display import style
+from tolstat.display.text import UNITS, align, csv
+
+if TYPE_CHECKING:
+    from tolstat.questions.compare.query import Change, Comparison, Sides
+
+LEVELS = 200
+"""Points of a curve."""
+COLUMNS = 4
+"""Loads that the picture shows at most."""
+
+
+def text(found: Comparison, loads: bool = False) -> str:
+    """Tables of what differs: shares above limits, then quantiles and means where asked for or without limits."""
+    tables = []
+    if len(found.shares):
+        heads = ["P(load > limit)", "A", "B", "B - A", "95 % interval", "only A", "only B", "p"]
+        tables.append(align([heads, *(_share(row, found.sides.paired) for row in found.shares.to_dict("records"))]))
+    if len(found.shares) and not loads:
+        return tables[0]
+    heads = ["load", "statistic", "A", "B", "B - A", "95 % interval"]
+    tables.append(align([heads, *(_load(row) for row in found.loads.to_dict("records"))]))
+    return "\n\n".join(tables)
+
+
+def note(found: Comparison, a: str, b: str) -> str:
+    """Sentences on what differs between the studies, and what the tables stand on."""
+    sides = found.sides
+    lines = [f"A: {a}", f"B: {b}"]
+    lines += [f"  {_change(change)}" for change in found.changes] or ["  the studies are the same"]
+    if sides.paired:
+        lines.append(f"{len(sides.rows)} pairs of joints with the same random numbers")
+        lines.append(f"{len(found.switched)} times a joint has changed the side of a limit")
+    else:
+        lines.append(f"{len(sides.a.results)} and {len(sides.b.results)} joints with random numbers of their own")
+    lost = int(sum((~np.isin(side.results["status"], VALID)).sum() for side in (sides.a, sides.b)))
+    if lost:
+        lines.append(f"{lost} joints without a valid load: left out, and counted both ways in the bounds of the CSV")
+    if not sides.iid:
+        lines.append("no intervals: they hold for independent samples only")
+    return "\n".join(lines)
+
+
+def write(found: Comparison, stem: Path, names: tuple[str, str]) -> list[Path]:
+    """Write ``STEM_compare.png``, ``.svg``, ``_shares.csv``, ``_loads.csv`` and ``_switched.csv``.
+
+    Parameters
+    ----------
+    found : Comparison
+        The comparison.
+    stem : Path
+        Folder, and what all names begin with.
+    names : tuple of str
+        What the legend calls A and B.
+
+    Returns
+    -------
+    list of Path
+        The files; tables without rows are not written.
+    """
+    files = style.save(figure(found, names), stem.with_name(f"{stem.name}_compare"))
+    for what in ("shares", "loads", "switched"):
+        table = getattr(found, what)
+        if len(table):
+            files.append(csv(table, stem, what))
+    return files
+
+
+def figure(found: Comparison, names: tuple[str, str]) -> Figure:
+    """Draw both exceedance curves of the loads compared, `COLUMNS` at most, and below them the difference.
+
+    Parameters
+    ----------
+    found : Comparison
+        The comparison.
+    names : tuple of str
+        What the legend calls A and B.
+
+    Returns
+    -------
+    Figure
+        Bands are pointwise 95 % intervals, of pairs where joints are paired.
+    """
+    loads = list(dict.fromkeys(found.loads["load"]))[:COLUMNS]
+    with style.settings():
+        page = Figure(figsize=(max(4.2 * len(loads), 6.5), 6.6))
+        axes = page.subplots(2, len(loads), squeeze=False, sharex="col", height_ratios=(3, 2))
+        for (upper, lower), name in zip(axes.T, loads, strict=True):
+            limits = found.shares.loc[found.shares["load"] == name, "level"] if len(found.shares) else ()
+            _curves(upper, found.sides, name)
+            _difference(lower, found.sides, name)
+            for ax in (upper, lower):
+                for level in limits:
+                    ax.axvline(float(level), color=style.FAINT, lw=1.0, ls=style.DASHES[2])
+        axes[0, 0].set_ylabel("share of joints above x")
+        axes[1, 0].set_ylabel("B less A, % of the joints")
+        handles: list[Artist] = [
+            Line2D([], [], color=c, ls=d) for c, d in zip(style.COLOURS, style.DASHES[:2], strict=False)
+        ]
+        labels = [f"A: {names[0]}", f"B: {names[1]}"]
+        if found.sides.iid:
+            handles.append(Patch(color=style.FAINT, alpha=0.3, lw=0))
+            labels.append("95 % band" + (" (below: of pairs)" if found.sides.paired else ""))
+        page.subplots_adjust(
+            left=0.75 / page.get_figwidth(), right=0.985, top=0.93, bottom=0.17, wspace=0.24, hspace=0.09
+        )
+        style.legend(page, handles, labels)
+    return page
+
+
+def _curves(ax: Axes, sides: Sides, name: str) -> None:
+    a, b, _ = sides.load(name)
+    ax.set_title(name)
+    levels, floor = _levels(a, b), 0.5 / max(len(a), len(b))
+    for values, colour, dash in zip((a, b), style.COLOURS, style.DASHES, strict=False):
+        table = exceedance.curve(values, np.ones(len(values), int), levels, iid=sides.iid)
+        ax.step(levels, table["estimate"].clip(0.1 * floor), where="post", color=colour, ls=dash)
+        if sides.iid:
+            _band(ax, levels, table["lower"].clip(0.1 * floor), table["upper"], colour)
+    style.share_axis(ax, floor)
+
+
+def _difference(ax: Axes, sides: Sides, name: str) -> None:
+    a, b, unit = sides.load(name)
+    levels = _levels(a, b)
+    found = difference.shares(a, b, levels, sides.paired, iid=sides.iid)
+    ax.axhline(0.0, color=style.FAINT, lw=1.0)
+    ax.step(levels, 100.0 * found.estimate, where="post", color=style.INK)
+    if sides.iid:
+        _band(ax, levels, 100.0 * found.lower, 100.0 * found.upper, style.INK)
+    ax.set_xlabel(f"x [{UNITS.get(unit, unit)}]" if unit != "1" else "x")
+
+
+def _band(
+    ax: Axes, x: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], colour: str
+) -> None:
+    ax.fill_between(x, lower, upper, step="post", color=colour, alpha=0.2, lw=0)
+
+
+def _levels(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Levels of the curves: quantiles of both sides together, closer in the tail."""
+    both = np.concatenate([a[np.isfinite(a)], b[np.isfinite(b)]])
+    tail = np.geomspace(1.0, 1.0 / both.size, LEVELS // 2)
+    shares = np.union1d(np.linspace(0.0, 1.0, LEVELS // 2), 1.0 - tail)
+    return np.unique(np.quantile(both, shares, method="inverted_cdf"))
+
+
+def _share(row: Mapping[Any, Any], paired: bool) -> list[str]:
+    limit = f"{row['load']} > {row['level']:g} {UNITS.get(row['unit'], row['unit'])}".rstrip()
+    values = [f"{100 * row[key]:.3g} %" for key in ("a", "b")] + [f"{100 * row['estimate']:+.3g} %"]
+    counts = [str(row["only_a"]), str(row["only_b"])] if paired else ["-", "-"]
+    return [limit, *values, _ends(row, 100.0, " %"), *counts, "-" if math.isnan(row["p"]) else f"{row['p']:.2g}"]
+
+
+def _load(row: Mapping[Any, Any]) -> list[str]:
+    unit = f" {UNITS.get(row['unit'], row['unit'])}".rstrip()
+    values = [f"{row[key]:.4g}{unit}" for key in ("a", "b")] + [f"{row['estimate']:+.3g}{unit}"]
+    return [row["load"], row["statistic"], *values, _ends(row, 1.0, unit)]
+
+
+def _ends(row: Mapping[Any, Any], factor: float, unit: str) -> str:
+    low, high = factor * row["lower"], factor * row["upper"]
+    return "-" if math.isnan(low) else f"{low:+.3g} .. {high:+.3g}{unit}"
+
+
+def _change(change: Change) -> str:
+    more = f" and {len(change.keys) - 1} more" if len(change.keys) > 1 else ""
+    a, b = ("nothing" if side is None else str(side) for side in (change.a, change.b))
+    return f"{change.keys[0]}{more}: {a} -> {b}"

@@ -1,0 +1,1 @@
+"""What load is exceeded by which share of the joints."""

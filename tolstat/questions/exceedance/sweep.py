@@ -1,0 +1,199 @@
+"""Loads of a sweep: largest force and torque of every bushing against the swept value."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from tolstat.common import selected_results as kept
+from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, Status
+from tolstat.display import style
+from tolstat.store.view import Axis, Campaign, load, swept_axes
+from tolstat.study.selection import LIMIT_UNITS
+
+Mask = NDArray[np.bool_]
+MAX_LEGEND = 6
+"""Most values of the second swept quantity that the legend names."""
+
+
+def table(campaign: Campaign) -> pd.DataFrame:
+    """Largest loads of every joint of a sweep.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        A campaign of the method ``sweep``.
+
+    Returns
+    -------
+    DataFrame
+        One row a joint, pending and failed ones included: the swept values, headed by label and unit
+        for the reader (``pin*.diameter [mm]``); ``status``; force and torque of each bushing, SI, headed likewise;
+        ``psi``. Loads that the study does not keep have no column.
+    """
+    columns: dict[str, object] = {_head(axis): axis.values for axis in swept_axes(campaign)}
+    columns["status"] = [Status(int(code)).label for code in campaign.results["status"]]
+    for name in campaign.listed:
+        values, unit = load(campaign.results, name)
+        columns[name if unit == "1" else f"{name} [{unit}]"] = values
+    if kept.holds(campaign.columns, "psi"):
+        columns["psi"] = load(campaign.results, "psi")[0]
+    return pd.DataFrame(columns)
+
+
+def worst(campaign: Campaign) -> pd.DataFrame:
+    """Short form of `table`: of the cross and of the fork bushings the largest force and torque."""
+    full = table(campaign)
+    loads = [c for c in full.columns if str(c).partition(" ")[0] in LIMIT_UNITS] if campaign.drawn else []
+    short = full[[c for c in full.columns if c not in loads]].copy()
+    for group in ("cross", "fork"):
+        for unit in ("N", "N*m"):
+            letter = "F" if unit == "N" else "T"
+            columns = [c for c in loads if str(c).startswith(group) and str(c).endswith(f".{letter} [{unit}]")]
+            if columns:
+                short[f"{group}.{letter} [{unit}]"] = full[columns].max(axis=1)
+    return short
+
+
+def figure(campaign: Campaign) -> Figure:
+    """Draw the loads against the first swept quantity.
+
+    One swept quantity gives a line for each bushing. Several give a line for each combination of the others,
+    of the largest load among the four bushings, coloured by the second.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        A campaign of the method ``sweep``.
+
+    Returns
+    -------
+    Figure
+        Four panels; joints that did not settle are hollow, those without a result are crosses at the foot.
+    """
+    axes = swept_axes(campaign)
+    with style.settings():
+        title = f"{campaign.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
+        page, panels = style.panels(title, f"{campaign.head()}\n{_note(axes)}")
+        for group, letter, ax in panels:
+            panel(ax, campaign, group, letter)
+        style.legend(page, *key(campaign))
+    return page
+
+
+def panel(ax: Axes, campaign: Campaign, group: str, letter: str) -> None:
+    """Draw the loads of four bushings: ``cross`` or ``fork``, ``F`` or ``T``."""
+    axes = swept_axes(campaign)
+    first = axes[0] if axes else Axis("joint", "", np.arange(1, len(campaign.results) + 1, dtype=np.float64))
+    ax.set_xlabel(_head(first))
+    ax.xaxis.set_major_locator(MaxNLocator(6))
+    ax.set_ylabel(f"largest |{letter}| [{'N' if letter == 'F' else 'N m'}]")
+    _lines(ax, campaign, [first, *axes[1:]], group, letter)
+
+
+def _head(axis: Axis) -> str:
+    return f"{axis.label} [{axis.unit}]" if axis.unit else axis.label
+
+
+def _note(axes: list[Axis]) -> str:
+    if len(axes) < 2:
+        return "largest modulus over the last revolution of each joint"
+    others = ", ".join(axis.label for axis in axes[2:])
+    text = f"largest of the four bushings, coloured by {_head(axes[1])}"
+    return text + (f"; one line for each {others}" if others else "")
+
+
+def _lines(ax: Axes, campaign: Campaign, axes: list[Axis], group: str, letter: str) -> None:
+    names = [name for i in (1, 2, 3, 4) if (name := f"{group}{i}.{letter}") in campaign.drawn]
+    if not names:
+        ax.text(0.5, 0.5, "not kept by the study", ha="center", transform=ax.transAxes)
+        ax.set(xticks=[], yticks=[])
+        return
+    loads = [load(campaign.results, name)[0] for name in names]
+    if len(axes) == 1:
+        for name, values in zip(names, loads, strict=True):
+            i = int(name.partition(".")[0][-1]) - 1
+            every = np.ones(values.size, dtype=bool)
+            _line(ax, campaign, axes[0].values, values, every, style.COLOURS[i], style.DASHES[i])
+    else:
+        for colour, rows in _combinations(axes):
+            _line(ax, campaign, axes[0].values, np.max(loads, axis=0), rows, colour, "-")
+    if len(campaign.nominal):
+        nominal = max(load(campaign.nominal, name)[0][0] for name in names)
+        ax.axhline(nominal, color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0)), zorder=1.5)
+    limits = {campaign.limits[name] for name in names if name in campaign.limits}
+    bottom, top = ax.get_ylim()
+    for limit in sorted(limits):
+        if limit < top + 0.5 * (top - bottom):
+            ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)))
+            text = f"limit {limit:g} {'N' if letter == 'F' else 'N m'}"
+            style.note(ax, text, limit)
+
+
+def _line(
+    ax: Axes,
+    campaign: Campaign,
+    x: NDArray[np.float64],
+    values: NDArray[np.float64],
+    rows: Mask,
+    colour: str,
+    dash: style.Dash,
+) -> None:
+    """Draw one line over the joints `rows`; it is broken where a joint has no result."""
+    order = np.flatnonzero(rows)[np.argsort(x[rows], kind="stable")]
+    status = campaign.results["status"][order]
+    shown = np.where(np.isin(status, SIMULATED), values[order], np.nan)
+    ax.plot(x[order], shown, color=colour, ls=dash, marker="o", ms=3.2, zorder=3)
+    loose = np.isin(status, UNSETTLED)
+    ax.plot(x[order][loose], shown[loose], ls="", marker="o", ms=6.5, mfc="white", mec=colour, zorder=4)
+    gone = np.isin(status, FAILED)
+    foot = np.full(int(gone.sum()), 0.02)
+    ax.plot(x[order][gone], foot, ls="", marker="x", color=style.INK, transform=ax.get_xaxis_transform(), zorder=4)
+
+
+def _combinations(axes: list[Axis]) -> list[tuple[str, Mask]]:
+    """Colour and rows of every combination of the quantities after the first."""
+    second = np.unique(axes[1].values)
+    shades = dict(zip(second, _shades(second.size), strict=True))
+    grid = np.column_stack([axis.values for axis in axes[1:]])
+    return [(shades[point[0]], (grid == point).all(axis=1)) for point in np.unique(grid, axis=0)]
+
+
+def _shades(count: int) -> list[str]:
+    """Colours in order from dark to light that stay in order in grey and for colour-blind readers."""
+    return [to_hex(colormaps["viridis"](x)) for x in np.linspace(0.0, 0.88, count)]
+
+
+def key(campaign: Campaign) -> tuple[list[Artist], list[str]]:
+    """Legend of a panel: its lines and marks, and their meaning."""
+    axes = swept_axes(campaign)
+    handles: list[Artist]
+    if len(axes) < 2:
+        handles = [
+            Line2D([], [], color=c, ls=d, marker="o", ms=3.2) for c, d in zip(style.COLOURS, style.DASHES, strict=True)
+        ]
+        labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
+    else:
+        second = np.unique(axes[1].values)
+        named = np.unique(np.linspace(0, second.size - 1, MAX_LEGEND).round().astype(int))
+        shades = _shades(second.size)
+        handles = [Line2D([], [], color=shades[i], marker="o", ms=3.2) for i in named]
+        labels = [f"{second[i]:.4g} {axes[1].unit}".strip() for i in named]
+    if len(campaign.nominal):
+        handles.append(Line2D([], [], color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0))))
+        labels.append("nominal joint, largest")
+    if campaign.count(*UNSETTLED):
+        handles.append(Line2D([], [], ls="", marker="o", ms=6.5, mfc="white", mec=style.INK))
+        labels.append("not settled")
+    if campaign.count(*FAILED):
+        handles.append(Line2D([], [], ls="", marker="x", color=style.INK))
+        labels.append("no result")
+    return handles, labels

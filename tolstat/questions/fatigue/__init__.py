@@ -1,0 +1,1 @@
+"""Load cycles, damage and equivalent loads."""

@@ -1,0 +1,105 @@
+"""Cycles in the form that pyLife takes: a Series of cycle numbers over classes of range and mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tolstat.common.tables import CHANNELS
+from tolstat.questions.fatigue import query as fatigue
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tolstat.analysis.cycles import FloatArray
+    from tolstat.store import ResultStore
+
+INTERVALS = ("range", "mean")
+
+
+def series(
+    store: ResultStore, channels: Sequence[str] | None = None, bins: int = 100, revolutions: float = 1.0
+) -> pd.Series[float]:
+    """Rainflow cycles of every joint as pyLife's load collectives take them.
+
+    Parameters
+    ----------
+    store : ResultStore
+        A campaign that keeps load histories.
+    channels : sequence of str, optional
+        Channels to keep, keys of `tables.CHANNELS`.
+    bins : int
+        Classes of range from 0 to the largest, and of mean between the extremes; the same for all forces, and for all
+        torques.
+    revolutions : float
+        Revolutions that the cycles are counted for.
+
+    Returns
+    -------
+    pandas.Series
+        Name ``cycles``; index levels ``range`` and ``mean`` (intervals closed on the left, N or N m), ``joint`` (row of
+        the file) and ``channel``. Classes without cycles, and joints without results, are left out.
+
+    Raises
+    ------
+    StoreError
+        When the file holds no histories.
+    ValueError
+        When `bins` is less than 1.
+    """
+    import pandas as pd
+
+    if bins < 1:
+        raise ValueError(f"{bins} classes: at least 1 expected")
+    cycles = fatigue.cycles(store, channels)
+    joint, channel, slot = np.nonzero(cycles.ranges > 0)  # NaN is not
+    values = {"range": cycles.ranges[joint, channel, slot], "mean": cycles.means[joint, channel, slot]}
+    torque = np.array([CHANNELS[name] != "N" for name in cycles.channels], bool)[channel]
+    frame = pd.DataFrame({"joint": joint, "channel": channel, "cycles": cycles.weights[slot] * revolutions})
+    for name in INTERVALS:
+        frame[f"{name}_left"], frame[f"{name}_right"] = np.zeros((2, len(frame)))
+        for kind in (torque, ~torque):
+            edges = _edges(values[name][kind].astype(float), bins, from_zero=name == "range")
+            here = np.searchsorted(edges, values[name][kind], side="right") - 1
+            frame.loc[kind, f"{name}_left"], frame.loc[kind, f"{name}_right"] = edges[here], edges[here + 1]
+    keys = ["joint", "channel", *(f"{name}_{side}" for name in INTERVALS for side in ("left", "right"))]
+    classes = frame.groupby(keys)[["cycles"]].sum().reset_index()
+    classes["channel"] = np.array(cycles.channels, dtype=object)[classes["channel"]]
+    return from_table(classes)
+
+
+def table(collectives: pd.Series[float]) -> pd.DataFrame:
+    """Flat table of `series`: ``joint``, ``channel``, ``unit``, left and right end of range and mean, ``cycles``."""
+    import pandas as pd
+
+    index = collectives.index
+    flat = {name: index.get_level_values(name) for name in ("joint", "channel")}
+    frame = pd.DataFrame(flat | {"unit": [CHANNELS[name] for name in flat["channel"]]})
+    for name in INTERVALS:
+        level = index.get_level_values(name).array
+        frame[f"{name}_left"], frame[f"{name}_right"] = level.left, level.right
+    frame["cycles"] = collectives.to_numpy()
+    return frame
+
+
+def from_table(table: pd.DataFrame) -> pd.Series[float]:
+    """Series of a flat table, as `table` makes it or ``pandas.read_csv`` reads it."""
+    import pandas as pd
+
+    levels = [
+        pd.IntervalIndex.from_arrays(table[f"{name}_left"], table[f"{name}_right"], closed="left") for name in INTERVALS
+    ]
+    names = [*INTERVALS, "joint", "channel"]
+    index = pd.MultiIndex.from_arrays([*levels, table["joint"], table["channel"]], names=names)
+    return pd.Series(table["cycles"].to_numpy(float), index, name="cycles")
+
+
+def _edges(values: FloatArray, bins: int, from_zero: bool) -> FloatArray:
+    """Edges of equal classes that hold all values, the last one above them."""
+    low, high = (0.0 if from_zero else values.min(initial=np.inf), values.max(initial=-np.inf))
+    if not low <= high:
+        return np.array([0.0, 1.0])
+    above = high + 1e-6 * max(high - low, abs(high), 1e-300)
+    return np.linspace(low, above, bins + 1)

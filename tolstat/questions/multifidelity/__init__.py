@@ -1,0 +1,1 @@
+"""The same answer from many cheap and few dear joints."""

@@ -1,0 +1,1 @@
+"""Loads that one joint in a million exceeds."""

@@ -1,0 +1,46 @@
+"""What a subset simulation came to, as a table of its levels and a sentence."""
+
+from __future__ import annotations
+
+import math
+from itertools import accumulate
+from operator import mul
+
+import pandas as pd
+
+from tolstat.analysis.subset import Estimate, Level
+from tolstat.display.text import UNITS
+from tolstat.study.selection import LIMIT_UNITS
+
+
+def table(levels: list[Level], load: str) -> pd.DataFrame:
+    """Levels of a subset simulation.
+
+    Parameters
+    ----------
+    levels : list of Level
+        Loads in SI units.
+    load : str
+        The load that is asked about.
+
+    Returns
+    -------
+    DataFrame
+        One row a level: ``level``, ``load``, ``unit``, ``threshold`` (-inf at level 0), ``probability`` of a load above
+        it, then the other fields of `analysis.subset.Level`.
+    """
+    frame = pd.DataFrame([level._asdict() for level in levels])
+    frame.insert(0, "level", range(len(levels)))
+    frame.insert(1, "load", load)
+    frame.insert(2, "unit", LIMIT_UNITS[load])
+    frame.insert(4, "probability", list(accumulate([1.0, *frame["share"][:-1]], mul)))
+    return frame
+
+
+def sentence(estimate: Estimate, load: str, above: float) -> str:
+    """The probability and its interval; what is left at most where the levels did not reach the limit."""
+    unit = LIMIT_UNITS[load]
+    head = f"P({load} > {above:g} {UNITS.get(unit, unit)}".strip() + ")"
+    if math.isnan(estimate.probability):
+        return f"{head} < {estimate.upper:.2g}: the limit was not reached"
+    return f"{head} = {estimate.probability:.3g}, 95 % interval {estimate.lower:.3g} .. {estimate.upper:.3g}"

@@ -1,0 +1,1 @@
+"""Other tolerances from the same joints."""

@@ -1,0 +1,1 @@
+"""Share of a revolution above a level."""

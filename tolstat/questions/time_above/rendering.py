@@ -1,0 +1,109 @@
+"""Time above levels within a revolution: text, CSV and picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from tolstat.display import style
+from tolstat.display.text import UNITS, align, csv
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tolstat.questions.time_above.query import Duration
+
+COLUMNS = 4
+"""Loads that the picture shows at most."""
+_LINES = {
+    "time": "mean joint",
+    "time_50": "median joint",
+    "time_90": "90 % of the joints below",
+    "time_99": "99 % below",
+}
+
+
+def text(found: Duration) -> str:
+    """Table of `Duration.table`, shares in per cent."""
+    rows = [
+        ["load > level", "joints above it at any time", "time above it: mean", "median", "90 % below", "99 % below"]
+    ]
+    for row in found.table.to_dict("records"):
+        level = f"{row['load']} > {row['level']:g} {UNITS.get(row['unit'], row['unit'])}"
+        rows.append([level, _share(row, "joints_above"), *(_share(row, name) for name in _LINES)])
+    return align(rows)
+
+
+def note(found: Duration) -> str:
+    """Sentence on what the table stands on."""
+    lines = [f"{found.joints} joints, {found.lost} without a valid revolution left out; time: share of a revolution"]
+    if found.table["time_lower"].isna().all():
+        lines.append("no intervals: they hold for independent samples only")
+    return "\n".join(lines)
+
+
+def write(found: Duration, stem: Path) -> list[Path]:
+    """Write ``STEM_time_above.csv``, ``.png`` and ``.svg``.
+
+    Parameters
+    ----------
+    found : Duration
+        With curves.
+    stem : Path
+        Folder, and what all names begin with.
+
+    Returns
+    -------
+    list of Path
+        The files.
+    """
+    files = [csv(found.curves, stem, "time_above")]
+    return files + style.save(figure(found), stem.with_name(f"{stem.name}_time_above"))
+
+
+def figure(found: Duration) -> Figure:
+    """Draw the curves of each load, `COLUMNS` at most: above, share of the joints; below, share of the revolution."""
+    loads = list(dict.fromkeys(found.curves["load"]))[:COLUMNS]
+    with style.settings():
+        page = Figure(figsize=(max(4.2 * len(loads), 6.5), 6.6))
+        axes = page.subplots(2, len(loads), squeeze=False, sharex="col", sharey="row")
+        for (upper, lower), name in zip(axes.T, loads, strict=True):
+            part = found.curves[found.curves["load"] == name]
+            unit = part["unit"].iloc[0]
+            upper.set_title(name)
+            _curve(upper, part, "joints_above", style.COLOURS[0], "-", band=True)
+            for line, colour, dash in zip(_LINES, style.COLOURS, style.DASHES, strict=True):
+                _curve(lower, part, line, colour, dash, band=line == "time")
+            for level in found.table.loc[found.table["load"] == name, "level"]:
+                for ax in (upper, lower):
+                    ax.axvline(float(level), color=style.FAINT, lw=1.0, ls=style.DASHES[2])
+            lower.set_xlabel(f"x [{UNITS.get(unit, unit)}]")
+        axes[0, 0].set_ylabel("joints that exceed x, %")
+        axes[1, 0].set_ylabel("time above x, % of a revolution")
+        handles: list[Artist] = [
+            Line2D([], [], color=c, ls=d) for c, d in zip(style.COLOURS, style.DASHES, strict=True)
+        ]
+        margin = 0.75 / page.get_figwidth()
+        page.subplots_adjust(left=margin, right=0.985, top=0.93, bottom=0.17, wspace=0.12, hspace=0.09)
+        style.legend(page, handles, list(_LINES.values()))
+    return page
+
+
+def _curve(ax: Axes, part: pd.DataFrame, name: str, colour: str, dash: style.Dash, band: bool) -> None:
+    ax.plot(part["level"], 100.0 * part[name], color=colour, ls=dash)
+    if band and part[f"{name}_lower"].notna().all():
+        ax.fill_between(
+            part["level"], 100.0 * part[f"{name}_lower"], 100.0 * part[f"{name}_upper"], color=colour, alpha=0.2, lw=0
+        )
+
+
+def _share(row: Mapping[Any, Any], name: str) -> str:
+    own, low, high = (100.0 * row[name + end] for end in ("", "_lower", "_upper"))
+    return f"{own:.3g}" if math.isnan(low) else f"{own:.3g} ({low:.3g} .. {high:.3g}) %"

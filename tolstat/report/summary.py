@@ -1,0 +1,72 @@
+"""All statistics of a campaign at once, for other programs: what the report has, as JSON has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.tables import Status
+from tolstat.display import text
+from tolstat.questions.capability import rendering as capability
+from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.questions.exceedance.accuracy import usual
+from tolstat.solver.fidelity import sentence
+from tolstat.store import ResultStore
+from tolstat.store import view as source
+
+
+def of_store(store: ResultStore, confidence: float = 0.95) -> dict[str, Any]:
+    """Put the statistics of a campaign together.
+
+    Parameters
+    ----------
+    store : ResultStore
+        File of a study whose joints are drawn from tolerances.
+    confidence : float
+        Of all intervals.
+
+    Returns
+    -------
+    dict
+        JSON values, SI, null for what is not known: ``study``, ``method``, ``confidence``; ``joints`` by status;
+        ``limits`` (share above each, as `report.exceedance.limits`), ``quantiles`` of every load kept, ``capability``
+        (as `report.capability.limits`; not of weighted joints); ``numerical_error`` by kind of load; ``fidelity``, what
+        the results stand on; ``provenance``.
+
+    Raises
+    ------
+    StoreError
+        When the file holds listed joints or a sweep.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as store:
+    ...     found = tolstat.statistics(store)
+    >>> found["joints"], round(found["limits"][0]["estimate"], 2)
+    ({'ok': 12000}, 0.15)
+    """
+    if store.sampling["method"] in ("cases", "sweep"):
+        remedy = "its joints are in: tolstat export --csv"
+        raise StoreError(str(Fault(str(store.path), "holds no sample of a production, and has no statistics", remedy)))
+    campaign = source.read(store, source.LOAD_FIELDS, (), weighted=True)
+    states = campaign.results["status"]
+    judged = bool(campaign.limits)
+    counted = judged and campaign.weights is None
+    return {
+        "study": store.study_name,
+        "method": campaign.method,
+        "confidence": confidence,
+        "joints": {s.label: int((states == s).sum()) for s in Status if (states == s).any()},
+        "limits": text.records(exceedance.limits(campaign, confidence)) if judged else [],
+        "quantiles": text.records(exceedance.quantiles(campaign, confidence)) if campaign.listed else [],
+        "capability": text.records(capability.limits(campaign, confidence)) if counted else [],
+        "numerical_error": usual(campaign.verification) if campaign.verification else {},
+        "fidelity": sentence(store.options, store.fidelity),
+        "provenance": {
+            "created": store.created,
+            "git_commit": store.git_commit,
+            "versions": store.versions,
+            "sampling": store.sampling,
+            "stop": store.stop,
+        },
+    }

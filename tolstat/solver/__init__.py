@@ -1,0 +1,1 @@
+"""From parameters to results around the kernel: rows, refinement, fidelity, references."""

@@ -1,0 +1,210 @@
+"""``solver.fidelity = "auto"``: the cheapest rung of the fidelity ladder that a pilot shows to be good enough.
+
+A few joints of the campaign are solved on every rung and on a finer one, the reference. What decides is counted, not
+timed: the same study chooses the same rung on a loaded machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.tables import BUSHINGS, FINEST_STEPS, PINS, Fidelity, Options, Simulation, Status
+
+Array = NDArray[np.float64]
+
+
+class Rung(NamedTuple):
+    """A fidelity and the steps a revolution that it takes."""
+
+    fidelity: Fidelity
+    steps_per_rev: int
+
+    def __str__(self) -> str:
+        return f"{self.fidelity.name.lower()} at {self.steps_per_rev} steps a revolution"
+
+
+RUNGS = (
+    Rung(Fidelity.IDEAL, 90),
+    *(Rung(Fidelity.QUASISTATIC, steps) for steps in (36, 60, 90, 180)),
+    *(Rung(Fidelity.DYNAMIC, steps) for steps in (36, 60, 90, 180, FINEST_STEPS)),
+)
+REFERENCE = Rung(Fidelity.DYNAMIC, 2 * FINEST_STEPS)
+JOINTS = 24
+"""Random joints of a pilot, beside the nominal one."""
+MARGIN = 1.5
+"""What the worst error of the pilot is multiplied by before the budget must hold: a campaign has worse joints than a
+pilot of two dozen."""
+WEIGHTS = {"steps": 2.3, "newton_iterations": 2.6, "factorisations": 4.3}
+"""Cost of a joint by its counts: microseconds of one core, fitted over fidelities and steps a revolution."""
+LOADS = tuple(f"{bushing}.{kind}" for bushing in BUSHINGS for kind in "FT")
+"""What a study without limits is taken to ask for."""
+
+
+class Choice(NamedTuple):
+    """The rung that a campaign is computed with, and why.
+
+    Attributes
+    ----------
+    rung : Rung
+        The rung.
+    met : bool
+        Whether it meets the budget; if not it is the finest.
+    record : dict
+        All that was measured, as the result file keeps it: ``fidelity``, ``steps_per_rev``, ``met``, ``reason``,
+        ``budget``, ``margin``, ``joints``, ``loads`` and, by rung, ``table``.
+    """
+
+    rung: Rung
+    met: bool
+    record: dict[str, Any]
+
+
+def pilot(rows: int, nominal_first: bool, seed: int) -> NDArray[np.intp]:
+    """Rows of a campaign to choose by: the nominal joint, if it has one, and random others; ascending."""
+    first = int(nominal_first)
+    count = min(JOINTS, rows - first)
+    drawn = first + np.random.default_rng([seed, JOINTS]).choice(rows - first, count, replace=False)
+    return np.sort(np.concatenate([np.arange(first), drawn])).astype(np.intp)
+
+
+def choose(
+    params: NDArray[np.void],
+    options: Options,
+    budget: float,
+    loads: Sequence[str],
+    simulate: Callable[..., Simulation],
+    least_steps: int = 0,
+) -> Choice:
+    """Choose a rung by a pilot of joints.
+
+    A rung is good enough when the error of every load asked for, times `MARGIN`, is within the budget for every joint
+    of the pilot that settles in the reference, and when no joint ends in another state than there. Errors are relative
+    to the joint's largest load of the kind.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (n,)
+        The pilot.
+    options : Options
+        Settings but for fidelity and steps a revolution.
+    budget : float
+        Largest error allowed.
+    loads : sequence of str
+        Loads asked for: ``cross1.F``, ``fork3.T``, ``pin1.contact``, ``psi``; all forces and torques if none.
+    simulate : callable
+        (n,) table PARAM, Options -> Simulation.
+    least_steps : int
+        Steps a revolution that histories need.
+
+    Returns
+    -------
+    Choice
+    """
+    names = tuple(loads) or LOADS
+    truth = simulate(params, _at(options, REFERENCE)).results
+    table = []
+    for rung in RUNGS:
+        if rung.steps_per_rev >= least_steps:
+            table.append(_entry(rung, simulate(params, _at(options, rung)).results, truth, names))
+    good = [entry for entry in table if _meets(entry, budget)]
+    met = bool(good)
+    best = min(good, key=lambda entry: float(entry["cost"])) if met else table[-1]
+    rung = Rung(Fidelity[best["fidelity"].upper()], best["steps_per_rev"])
+    record = {
+        "fidelity": best["fidelity"],
+        "steps_per_rev": best["steps_per_rev"],
+        "met": met,
+        "reason": _reason(rung, best, met, budget, len(params)),
+        "budget": budget,
+        "margin": MARGIN,
+        "joints": len(params),
+        "loads": list(names),
+        "table": table,
+    }
+    return Choice(rung, met, record)
+
+
+def apply(options: Options, record: Mapping[str, Any]) -> Options:
+    """Options of a campaign whose choice is on record."""
+    return _at(options, Rung(Fidelity[record["fidelity"].upper()], record["steps_per_rev"]))
+
+
+def describe(record: Mapping[str, Any]) -> str:
+    """The choice and the table that it rests on, as aligned text; a line a rung."""
+    lines = [str(record["reason"]), "  rung                    error worst     q95    cost  other states"]
+    for entry in record["table"]:
+        name = f"{entry['fidelity']} {entry['steps_per_rev']}"
+        error = f"{_figure(entry['worst']):>14} {_figure(entry['q95']):>7}"
+        lines.append(f"  {name:<20} {error} {entry['cost']:>7.0f} {entry['differing']:>13}")
+    return "\n".join(lines)
+
+
+def sentence(options: Mapping[str, Any], record: Mapping[str, Any]) -> str:
+    """What the numbers of a file stand on, for its report; empty for the dynamic joint at steps that the user gave."""
+    if record:
+        return str(record["reason"])
+    rung = Rung(Fidelity(options["fidelity"]), options["steps_per_rev"])
+    return "" if rung.fidelity == Fidelity.DYNAMIC else f"fidelity: {rung}"
+
+
+def values(results: NDArray[np.void], name: str) -> tuple[Array, Array]:
+    """A load of each joint and the joint's largest of the kind, which errors are relative to; (n,) each, SI."""
+    part, _, kind = name.partition(".")
+    if kind == "contact":
+        contact = results["contact_max"].max(axis=2)
+        return contact[:, PINS.index(part)], contact.max(axis=1)
+    if name == "psi":
+        return results["psi_max"], results["psi_max"]
+    moduli = results[f"{kind}_max"]
+    return moduli[:, BUSHINGS.index(part)], moduli.max(axis=1)
+
+
+def _at(options: Options, rung: Rung) -> Options:
+    return options._replace(fidelity=int(rung.fidelity), steps_per_rev=rung.steps_per_rev)
+
+
+def _entry(rung: Rung, results: NDArray[np.void], truth: NDArray[np.void], names: Sequence[str]) -> dict[str, Any]:
+    """What the pilot shows of one rung: plain values for the result file; errors None where no joint has one."""
+    settled = (results["status"] == Status.OK) & (truth["status"] == Status.OK)
+    errors = {name: _error(results[settled], truth[settled], name) for name in names}
+    worst = np.max(list(errors.values()), axis=0)
+    cost = sum(weight * float(results[name].mean()) for name, weight in WEIGHTS.items())
+    return {
+        "fidelity": rung.fidelity.name.lower(),
+        "steps_per_rev": rung.steps_per_rev,
+        "worst": float(worst.max()) if worst.size else None,
+        "q95": float(np.quantile(worst, 0.95)) if worst.size else None,
+        "errors": {name: float(error.max()) if error.size else None for name, error in errors.items()},
+        "cost": cost,
+        "differing": int((results["status"] != truth["status"]).sum()),
+    }
+
+
+def _meets(entry: Mapping[str, Any], budget: float) -> bool:
+    return entry["differing"] == 0 and entry["worst"] is not None and MARGIN * entry["worst"] <= budget
+
+
+def _error(results: NDArray[np.void], truth: NDArray[np.void], name: str) -> Array:
+    found, _ = values(results, name)
+    true, scale = values(truth, name)
+    change = np.abs(found - true)
+    return np.divide(change, scale, out=np.where(change > 0, np.inf, 0.0), where=scale > 0)
+
+
+def _reason(rung: Rung, entry: Mapping[str, Any], met: bool, budget: float, joints: int) -> str:
+    worst = _figure(entry["worst"])
+    if met:
+        return f"auto: {rung}, the cheapest with {MARGIN:g} x worst error {worst} of {joints} joints within {budget:g}"
+    return (
+        f"warning: auto: no rung meets the error budget {budget:g} over {joints} joints; "
+        f"the finest is used, {rung} (worst error {worst})\n"
+        f'  hint: give a larger solver.error_budget, or fidelity = "dynamic" with more steps_per_rev'
+    )
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1e}"

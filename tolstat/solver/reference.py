@@ -1,0 +1,270 @@
+"""Tight reference solutions of single joints by integrators of scipy, and the joint as they take it.
+
+Only the equations of motion are shared with the solver: its integrators, linear algebra and analytic tangent are not.
+The Jacobian is made of differences of the accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.tables import CONTACTS, RESULT, SIMULATED, Fidelity, Options, Start, Status, without_results
+
+FloatArray = NDArray[np.float64]
+IntegratorName = Literal["Radau", "BDF", "LSODA"]
+
+SAMPLES_PER_REV = 2880
+"""Angles at which loads are looked at, beside the integrator's own steps: a peak is met within 1e-6 of its height."""
+LENGTH, VELOCITY = 1e-4, 1.0
+"""Sizes (m or rad, per s) below which errors of unknowns and velocities are absolute: a clearance, and what moves a
+bushing's damping force by its tolerance."""
+MAX_STEPS = 50_000
+"""Bound on the work of a joint: half a minute. Where contacts ring it takes a few thousand steps."""
+MAX_REVS = 6
+"""Revolutions after which a joint whose largest loads still change is not periodic."""
+
+
+class Largest(NamedTuple):
+    """Largest loads along a solution.
+
+    Attributes
+    ----------
+    F, T : ndarray, shape (8,)
+        Moduli of the bushing loads cross 1-4, fork 1-4, N and N m.
+    contact : ndarray, shape (4, 3)
+        Contact forces of each pin, in the order of `tables.CONTACTS`, N.
+    psi : float
+        Modulus of Psi, eq. (13).
+    """
+
+    F: FloatArray
+    T: FloatArray
+    contact: FloatArray
+    psi: float
+
+
+class FirstOrder(NamedTuple):
+    """A joint as y' = f(t, y), y = (q, q') of 110 components (m and rad, per s), and a state to begin from.
+
+    Attributes
+    ----------
+    rate : callable
+        (t, y) -> y', (110,); t in s.
+    jacobian : callable
+        (t, y) -> df/dy, (110, 110).
+    t0 : float
+        Time, s, of that state: of the settled one in its revolution.
+    y0 : ndarray, shape (110,)
+        The state.
+    period : float
+        Time of a revolution, s.
+    scale : ndarray, shape (110,)
+        Size of each component below which its error is absolute: ``atol = rtol * scale``.
+    largest : callable
+        Times (m,) and states (m, 110) -> Largest.
+    settled : ndarray of RESULT, shape (1,)
+        What the solver made of the joint. Without results in it (its status says so) there is no state to begin from.
+    """
+
+    rate: Callable[[float, FloatArray], FloatArray]
+    jacobian: Callable[[float, FloatArray], FloatArray]
+    t0: float
+    y0: FloatArray
+    period: float
+    scale: FloatArray
+    largest: Callable[[FloatArray, FloatArray], Largest]
+    settled: NDArray[np.void]
+
+
+def first_order(params: NDArray[np.void], options: Options, from_start: bool = False) -> FirstOrder:
+    """Settle a joint with the solver and give it as a system of first order from there.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (1,)
+        The joint.
+    options : Options
+        Settings of the solver that settles it, at dynamic fidelity whatever they say.
+    from_start : bool
+        Begin where the solver does instead, at time zero.
+
+    Returns
+    -------
+    FirstOrder
+        Its functions share work arrays: not for several threads.
+    """
+    from tolstat.kernel.integrators import first_order as kernel
+    from tolstat.kernel.mechanics.topology import N_DOF
+    from tolstat.kernel.mechanics.work import WORK
+    from tolstat.kernel.revolution.simulate import make_scratch, simulate_joint
+    from tolstat.kernel.simd.jit import bare
+
+    par = params.view(np.recarray)[0]
+    options = options._replace(fidelity=int(Fidelity.DYNAMIC))
+    alone = make_scratch(options)
+    work, state = alone.work, alone.state
+    settled = np.zeros(1, RESULT)
+    simulate_joint(par, options, alone, settled.view(np.recarray)[0])
+    period = 2 * np.pi / abs(float(par.omega))
+    t0, y0 = period * (float(settled["revolutions"][0]) % 1.0), np.concatenate([state.q0, state.v0])
+    if from_start:
+        t0, y0 = 0.0, _start(par, options)
+    else:
+        options = options._replace(start=int(Start.STATIC))  # the torque has risen
+
+    n = 2 * N_DOF
+    works, scratch = np.zeros(1, WORK), np.empty((3, n))
+    fast_rate = bare(kernel.rate_of_row, t0, y0, params, options, works, y0)
+    fast_jacobian = bare(kernel.jacobian_of_row, t0, y0, params, options, works, scratch, scratch)
+
+    def rate(t: float, y: FloatArray) -> FloatArray:
+        out = np.empty(n)
+        fast_rate(t, np.ascontiguousarray(y, np.float64), params, options, works, out)
+        return out
+
+    def jacobian(t: float, y: FloatArray) -> FloatArray:
+        out = np.empty((n, n))
+        fast_jacobian(t, np.ascontiguousarray(y, np.float64), params, options, works, scratch, out)
+        return out
+
+    def largest(times: FloatArray, states: FloatArray) -> Largest:
+        m = len(times)
+        loads, contact, psi = np.empty((m, 8, 6)), np.empty((m, 4, len(CONTACTS))), np.empty(m)
+        kernel.sample(times, np.ascontiguousarray(states), par, work, loads, contact, psi)
+        force, torque = (np.linalg.norm(loads[..., k : k + 3], axis=2).max(axis=0) for k in (0, 3))
+        return Largest(force, torque, contact.max(axis=0), float(np.abs(psi).max()))
+
+    scale = np.repeat([LENGTH, VELOCITY], N_DOF)
+    return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
+
+
+def _start(par: np.record, options: Options) -> FloatArray:
+    """State at time zero that the solver starts from, (110,)."""
+    from tolstat.kernel.revolution.simulate import make_scratch
+    from tolstat.kernel.revolution.trajectory import follow
+
+    work, state, *_ = make_scratch(options)
+    point = np.empty((1, 3, len(state.q)))
+    follow(par, options, work, state, point)
+    return point[0, :2].ravel()
+
+
+def reference_rows(
+    params: NDArray[np.void],
+    options: Options,
+    rtol: float = 1e-7,
+    integrator: IntegratorName = "Radau",
+    closure_tol: float = 1e-5,
+    max_steps: int = MAX_STEPS,
+    angles: int | None = None,
+) -> NDArray[np.void]:
+    """Solve joints tightly from their settled state: one revolution to forget it, then until the largest loads repeat.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (n,)
+        The joints.
+    options : Options
+        Settings of the solver that gives the state to begin from.
+    rtol : float
+        Relative tolerance; the absolute one is `rtol` times `LENGTH` and `VELOCITY`.
+    integrator : {"Radau", "BDF", "LSODA"}
+        Of ``scipy.integrate``.
+    closure_tol : float
+        Change of the largest loads between two revolutions, relative to the largest of the kind, at which they repeat.
+    max_steps : int
+        Steps of the integrator after which a joint is given up.
+    angles : int, optional
+        Look for the largest loads at this many angles only, as the solver does with ``steps_per_rev``; without it at
+        `SAMPLES_PER_REV` angles and at all steps, so that no peak is missed.
+
+    Returns
+    -------
+    ndarray of RESULT, shape (n,)
+        ``status``, ``settled``, ``closure`` (that change), ``revolutions``, ``steps`` and the largest loads of the last
+        revolution; all else is NaN. A joint that the solver cannot simulate keeps its status; one that does not repeat
+        within `MAX_REVS` or `max_steps` is ``NOT_SETTLED``, and ``NEWTON_FAILED`` if that came before the second
+        revolution ended.
+    """
+    results = without_results(len(params), Status.NEWTON_FAILED)
+    for i in range(len(params)):
+        system = first_order(params[i : i + 1], options)
+        status = Status(system.settled["status"][0])
+        if status in SIMULATED:
+            status = _periodic(system, rtol, integrator, closure_tol, max_steps, angles, results[i : i + 1])
+        results["status"][i] = status
+    results["settled"] = results["status"] == Status.OK
+    return results
+
+
+def _periodic(
+    system: FirstOrder,
+    rtol: float,
+    integrator: IntegratorName,
+    closure_tol: float,
+    max_steps: int,
+    angles: int | None,
+    out: NDArray[np.void],
+) -> Status:
+    """Integrate until the largest loads repeat; write them and what it took to `out`, (1,)."""
+    import scipy.integrate
+
+    end = system.t0 + (MAX_REVS + 0.5) * system.period
+    settings: dict[str, Any] = {"rtol": rtol, "atol": rtol * system.scale, "jac": system.jacobian}
+    make: Callable[..., Any] = getattr(scipy.integrate, integrator)
+    solver = make(system.rate, system.t0, system.y0, end, max_step=0.1 * system.period, **settings)
+    before = None
+    for last, steps in _revolutions(system, solver, max_steps, angles):
+        out["revolutions"], out["steps"] = 1 + np.nan_to_num(out["revolutions"]), steps
+        out["F_max"], out["T_max"], out["contact_max"], out["psi_max"] = last
+        if before is not None:
+            out["closure"] = _change(before, last)
+            if out["closure"][0] <= closure_tol:
+                return Status.OK
+            if out["revolutions"][0] == MAX_REVS:
+                return Status.NOT_SETTLED
+        before = last
+    if np.isfinite(out["closure"][0]):
+        return Status.NOT_SETTLED
+    for name in ("F_max", "T_max", "contact_max", "psi_max"):
+        out[name] = np.nan
+    return Status.NEWTON_FAILED
+
+
+def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | None) -> Iterator[tuple[Largest, int]]:
+    """Largest loads of each revolution and steps taken until then; ends early when the integrator gives up."""
+    times, states = np.empty(0), np.empty((0, len(system.y0)))
+    new_times, new_states = [], []
+    spacing, done = system.period / (angles or SAMPLES_PER_REV), 0
+    boundary = system.t0 + (1 + 1e-9) * system.period
+    for step in range(1, max_steps + 1):
+        solver.step()
+        if solver.status == "failed":
+            return
+        reached = int((solver.t - system.t0) / spacing)
+        grid = system.t0 + spacing * np.arange(done + 1, reached + 1)
+        done = reached
+        new_times.append(grid)
+        new_states.append(solver.dense_output()(grid).T)
+        if angles is None:
+            new_times.append(np.array([solver.t]))
+            new_states.append(solver.y[None].copy())
+        if solver.t >= boundary:
+            times, states = np.concatenate([times, *new_times]), np.concatenate([states, *new_states])
+            new_times, new_states = [], []
+            inside = times <= boundary
+            yield system.largest(times[inside], states[inside]), step
+            times, states = times[~inside], states[~inside]
+            boundary += system.period
+        if solver.status == "finished":
+            return
+
+
+def _change(before: Largest, last: Largest) -> float:
+    """Largest change of any largest load, relative to the largest of its kind."""
+    pairs = ((before.F, last.F), (before.T, last.T))
+    return max(float(np.abs(b - a).max() / max(b.max(), 1e-300)) for a, b in pairs)

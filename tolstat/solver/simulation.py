@@ -1,0 +1,252 @@
+"""From parameters to results, row by row: the stage between `joint.perturb` and the store."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.tables import CONTACTS, PARAM, RESULT, SIMULATED, Fidelity, HistorySpec, Method, Options, Simulation
+from tolstat.solver import rainflow, refinement, stationary
+
+if TYPE_CHECKING:
+    from tolstat.kernel.lanes.batch import Batch
+    from tolstat.kernel.revolution.simulate import Scratch
+
+Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
+
+MOST_KEPT = 12_000
+"""Samples that are in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
+
+NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
+"""Where no statistics of single revolutions are asked for."""
+
+
+def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
+    """Describe the load histories that are kept of each joint.
+
+    Parameters
+    ----------
+    options : Options
+        ``steps_per_rev`` gives the number of samples; sample k belongs to the input angle 2 pi k / steps_per_rev.
+    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
+        What is kept.
+    n_harmonics : int
+        Highest multiple of the input speed that ``"harmonics"`` keeps.
+
+    Returns
+    -------
+    dict of str to HistorySpec
+    """
+    n = options.steps_per_rev
+    loads = "force e, t, z (N), torque e, t, z (N m) of bushings cross 1-4, fork 1-4 on the lump, in base marker axes"
+    if histories == "full":
+        contact = "contact force of pins 1-4: of the outermost station, of the innermost one, resultant of all stations"
+        modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
+        return {
+            "loads": HistorySpec((n, 8, 6), "f4", "N, N*m", loads, ("theta", "bushing", "component")),
+            "contact": HistorySpec((n, 4, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
+            "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
+            "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
+        }
+    specs = dict(rainflow.SPECS) if "cycles" in histories else {}
+    if "harmonics" in histories:
+        axes = ("bushing", "component", "harmonic")
+        shape = (8, 6, min(n_harmonics, (n - 1) // 2) + 1)
+        text = f"part of the Fourier coefficients c_h: {loads}; load(theta) = Re(c_0 + 2 sum c_h exp(i h theta))"
+        error = "largest deviation of the load so restored, relative to the largest |F| and |T| of the joint"
+        specs |= {
+            "coefficients_real": HistorySpec(shape, "f4", "N, N*m", f"real {text}", axes),
+            "coefficients_imag": HistorySpec(shape, "f4", "N, N*m", f"imaginary {text}", axes),
+            "harmonics_error": HistorySpec((2,), "f8", "1", error, ("load",)),
+        }
+    return specs
+
+
+def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.float64]:
+    """Restore load histories from their harmonics.
+
+    Parameters
+    ----------
+    real, imag : ndarray, shape (..., harmonics + 1)
+        Fourier coefficients as stored, N and N m.
+    samples : int
+        Number of equally spaced input angles, from zero.
+
+    Returns
+    -------
+    ndarray, shape (samples, ...)
+    """
+    spectrum = np.zeros((*real.shape[:-1], samples // 2 + 1), complex)
+    kept = min(real.shape[-1], spectrum.shape[-1])
+    spectrum[..., :kept] = real[..., :kept] + 1j * imag[..., :kept].astype(np.float64)
+    return np.moveaxis(np.fft.irfft(spectrum * samples, samples), -1, 0)
+
+
+def _harmonics(loads: NDArray[np.float64], kept: int) -> dict[str, NDArray[Any]]:
+    spectrum = np.moveaxis(np.fft.rfft(loads, axis=0) / len(loads), 0, -1)[..., :kept]
+    real, imag = spectrum.real.astype("f4"), spectrum.imag.astype("f4")
+    difference = np.abs(restore(real, imag, len(loads)) - loads).max(axis=(0, 1))
+    size = [np.linalg.norm(loads[..., k : k + 3], axis=-1).max() for k in (0, 3)]
+    error = [difference[k : k + 3].max() / s if s > 0 else 0.0 for k, s in zip((0, 3), size, strict=True)]
+    return {"coefficients_real": real, "coefficients_imag": imag, "harmonics_error": np.array(error)}
+
+
+@cache
+def scratch(options: Options) -> Scratch:
+    """Work arrays of this process for `options`; importing the kernel here keeps it out of light commands."""
+    from tolstat.kernel.revolution.simulate import make_scratch
+
+    return make_scratch(options)
+
+
+@cache
+def lanes(options: Options) -> Batch:
+    """Work arrays of this process for joints in lock-step."""
+    from tolstat.kernel.lanes.batch import make_batch
+
+    return make_batch(options)
+
+
+def in_lanes(options: Options) -> bool:
+    """Whether joints with these settings go in lock-step; all others go one after the other."""
+    from numba import config
+
+    uniform = options.method == Method.BDF2 and options.rtol == 0
+    dynamic = options.fidelity == Fidelity.DYNAMIC and (uniform or follows_error(options))
+    return (dynamic or options.fidelity == Fidelity.QUASISTATIC) and not vars(config)["DISABLE_JIT"]
+
+
+def follows_error(options: Options) -> bool:
+    """Whether the steps of joints with these settings follow the error."""
+    return options.fidelity == Fidelity.DYNAMIC and options.method == Method.TR_BDF2 and options.rtol > 0
+
+
+def simulate_rows(
+    params: NDArray[np.void], options: Options, histories: Histories = "none", n_harmonics: int = 16
+) -> Simulation:
+    """Simulate joints; row i of the result is joint i, and depends on no other row.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (n,)
+        The joints.
+    options : Options
+        Numerical settings.
+    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
+        Load histories to keep, see `history_specs`.
+    n_harmonics : int
+        Highest harmonic kept.
+
+    Returns
+    -------
+    Simulation
+        Results, and histories; NaN (mode: 0) where a joint has none.
+    """
+    specs = history_specs(options, histories, n_harmonics)
+    kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
+
+    def simulate(rows: NDArray[np.intp], settings: Options) -> tuple[NDArray[np.void], NDArray[np.void]]:
+        found = np.zeros(len(rows), RESULT).view(np.recarray)
+        revolutions = settings.max_revs if follows_error(settings) else 0
+        blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
+        run = _together if in_lanes(settings) else _alone
+        for i, samples in run(params[rows], settings, bool(specs), found, blocks):
+            if found[i].status in SIMULATED:
+                for name, values in _sample(samples, histories, specs).items():
+                    kept[name][rows[i]] = values
+        return found.view(np.ndarray), blocks.view(np.ndarray)
+
+    results, _ = simulate(np.arange(len(params)), options)
+    refinement.refine(results, options, simulate)
+    stationary.fill_ends(results)
+    return Simulation(results, kept)
+
+
+def _alone(
+    params: NDArray[np.void],
+    options: Options,
+    keep: bool,
+    results: NDArray[np.void],
+    blocks: NDArray[np.void] = NO_BLOCKS,
+) -> Iterator[tuple[int, NDArray[np.void]]]:
+    """Simulate joints one after the other; gives the samples of each if they are to be kept."""
+    from tolstat.kernel.revolution.simulate import simulate_joint
+
+    alone = scratch(options)
+    rows = params.view(np.recarray)
+    for i in range(len(params)):
+        simulate_joint(rows[i], options, alone, results[i])
+        if len(blocks):
+            blocks[i] = alone.past.trail.revolution
+        if keep:
+            yield i, alone.ring.samples
+
+
+def _together(
+    params: NDArray[np.void],
+    options: Options,
+    keep: bool,
+    results: NDArray[np.void],
+    blocks: NDArray[np.void] = NO_BLOCKS,
+) -> Iterator[tuple[int, NDArray[np.void]]]:
+    """Simulate joints in lock-step, those with as many contact stations together; gives their samples if kept."""
+    from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
+    from tolstat.kernel.revolution.settle import make_samples
+
+    batch, tally = lanes(options), np.zeros(3, np.int64)
+    most = max(1, MOST_KEPT // options.steps_per_rev) if keep else len(params)
+    for here in _groups(params, most):
+        part = np.ascontiguousarray(params[here])
+        batch.par.n_stations = part["n_stations"][0]
+        words = part.view(np.float64).reshape(len(part), -1)
+        samples = make_samples(len(part) if keep else 0, options.steps_per_rev)
+        own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), RESULT).view(np.recarray)
+        out = np.zeros(len(part), RESULT).view(np.recarray)
+        rows = part.view(np.recarray)
+        lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+        results[here] = out
+        if len(blocks):
+            blocks[here] = own
+        yield from zip(here.tolist(), samples, strict=False)
+
+
+def _groups(params: NDArray[np.void], most: int) -> Iterator[NDArray[np.intp]]:
+    """Rows with one number of contact stations, `most` at a time."""
+    for stations in np.unique(params["n_stations"]):
+        rows = np.flatnonzero(params["n_stations"] == stations)
+        for first in range(0, len(rows), most):
+            yield rows[first : first + most]
+
+
+def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:
+    """What is kept of the revolution recorded last, its samples given."""
+    if histories == "full":
+        return {name: samples[name] for name in specs}
+    loads = np.ascontiguousarray(samples["loads"])
+    sample = rainflow.count(loads) if "cycles" in histories else {}
+    if "harmonics" in histories:
+        sample |= _harmonics(loads, specs["coefficients_real"].shape[-1])
+    return sample
+
+
+def is_compiled(options: Options | None = None) -> bool:
+    """Whether the kernels that `options` need lie in the cache, so that `warm_up` only has to load them."""
+    from pathlib import Path
+
+    from tolstat.kernel.simd.jit import CACHE_DIRECTORY
+
+    name = "lockstep.lockstep" if in_lanes(options or Options()) else "simulate.simulate_joint"
+    return any(Path(CACHE_DIRECTORY).rglob(f"{name}*.nbc"))
+
+
+def warm_up(options: Options | None = None) -> None:
+    """Compile the kernels that `options` need, or load them from the cache, with a joint that has no clearance."""
+    options = options or Options()
+    params = np.zeros(1, PARAM)
+    params["clearance"] = -1.0
+    simulate_rows(params, options)
+    rainflow.count(np.zeros((2, 8, 6)))

@@ -1,0 +1,160 @@
+"""Joints whose motion never repeats, but whose largest loads do not change any more: stationary ones.
+
+Such a joint is watched for some revolutions. Their largest loads, one of each load a revolution (block maxima), tell
+how large the largest of ``solver.duration`` revolutions is: values above a threshold follow a generalised Pareto
+distribution (Pickands 1975), fitted by probability-weighted moments (Hosking and Wallis 1987). Its shape is kept from
+being heavy: a driven joint with losses has bounded loads.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.tables import LARGEST, VALID, Motion, Status
+
+SETTLING = 1 / 3
+"""Share of the revolutions watched that is left out at their beginning."""
+FEWEST = 16
+"""Of a joint with less revolutions to go by nothing is told."""
+ALIKE, SPREAD_ALIKE = 3.5, 3.0
+"""Halves are alike when their means differ by no more than this many standard errors, or `NEGLIGIBLE`, and when the
+ratio of their standard deviations is no more than this, or these are negligible."""
+NEGLIGIBLE = 0.01
+"""Part of a load that nobody would tell from it."""
+TAIL = 0.4
+"""Share of the revolutions that the tail's distribution is fitted to."""
+DRAWS, SEED = 400, 5
+"""Of the bootstrap, and its seed: one joint's interval is the same wherever it is computed."""
+CONFIDENCE = 0.95
+STEPS = 0.005
+"""Part of a load that the steps may be off by: no interval is narrower on either side."""
+
+FloatArray = NDArray[np.float64]
+Table = NDArray[np.void]
+
+
+class Interval(NamedTuple):
+    """Largest of many revolutions: median, and ends of the interval; each shape (m,)."""
+
+    median: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+def tell(results: Table, blocks: Table, duration: int) -> None:
+    """Make joints stationary that are; write their largest loads, and for each kind the widest interval of any of them.
+
+    Parameters
+    ----------
+    results : ndarray of RESULT, shape (n,)
+        Joints; written.
+    blocks : ndarray of RESULT, shape (n, revolutions)
+        Statistics of their last revolutions, revolution r at r modulo their number.
+    duration : int
+        Revolutions whose largest loads are asked for.
+    """
+    for i in np.flatnonzero(np.isin(results["status"], (Status.NOT_SETTLED, Status.NOT_PERIODIC))):
+        if results["motion"][i] == Motion.SUBHARMONIC:
+            results["status"][i] = Status.STATIONARY
+            continue
+        made = int(results["revolutions"][i])
+        kept = min(made, blocks.shape[1])
+        watched = blocks[i, np.arange(made - kept, made) % blocks.shape[1]][int(SETTLING * kept) :]
+        if len(watched) < FEWEST or not is_stationary(watched):
+            continue
+        results["status"][i] = Status.STATIONARY
+        for load in LARGEST:
+            own = results[f"{load}_max"]
+            median, lower, upper = largest(watched[f"{load}_max"].reshape(len(watched), -1), duration)
+            own[i] = median.reshape(own[i].shape)
+            size = np.where(median > 0, median, 1.0)
+            results[f"{load}_lower"][i], results[f"{load}_upper"][i] = (lower / size).min(), (upper / size).max()
+
+
+def fill_ends(results: Table) -> None:
+    """Write the ends of joints that repeat: 1, as there is no doubt of them; NaN of joints without a valid load.
+
+    Parameters
+    ----------
+    results : ndarray of RESULT, shape (n,)
+        Joints; ends of stationary ones that never repeat are left as they are.
+    """
+    never = (results["status"] == Status.STATIONARY) & (results["motion"] != Motion.SUBHARMONIC)
+    for load in LARGEST:
+        for end in ("lower", "upper"):
+            own = results[f"{load}_{end}"]
+            own[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
+
+
+def is_stationary(watched: Table) -> bool:
+    """Whether largest loads are alike in both halves of the revolutions watched, in level and in spread.
+
+    Parameters
+    ----------
+    watched : ndarray of RESULT, shape (revolutions,)
+        Statistics of one revolution after the other.
+    """
+    return all(_alike(watched[field].max(axis=1)) for field in ("F_max", "T_max"))
+
+
+def _alike(series: FloatArray) -> bool:
+    half = len(series) // 2
+    first, second = series[:half], series[-half:]
+    small = NEGLIGIBLE * float(series.max())
+    spreads = np.array([first.std(ddof=1), second.std(ddof=1)])
+    error = float(np.sqrt((spreads**2).sum() / half))
+    level = abs(float(first.mean() - second.mean())) <= max(ALIKE * error, small)
+    return level and bool(spreads.max() <= max(SPREAD_ALIKE * spreads.min(), small))
+
+
+def largest(values: FloatArray, duration: int) -> Interval:
+    """Largest of `duration` further revolutions, from the largest loads of each of those watched.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, m)
+        m loads of n revolutions.
+    duration : int
+        Revolutions asked about.
+
+    Returns
+    -------
+    Interval
+        Prediction: median, and ends between which the largest lies with `CONFIDENCE`; fits to samples of the fitted
+        distribution (parametric bootstrap) carry the doubt of the fit.
+    """
+    n, m = values.shape
+    count = max(3, round(TAIL * n))
+    ordered = np.sort(values, axis=0)
+    threshold = ordered[n - count - 1]
+    scale, shape = _pareto(ordered[n - count :] - threshold)
+    rng = np.random.default_rng(SEED)
+    again = np.sort(_quantile(rng.random((DRAWS, count, m)), scale, shape), axis=1)
+    scales, shapes = _pareto(again.swapaxes(0, 1))
+    above = np.maximum(1, rng.binomial(duration, rng.beta(count + 0.5, n - count + 0.5, DRAWS)))[:, None]
+    drawn = threshold + _quantile(rng.random((DRAWS, m)) ** (1 / above), scales, shapes)
+    tail = 0.5 * (1 - CONFIDENCE)
+    lower, median, upper = np.quantile(drawn, [tail, 0.5, 1 - tail], axis=0)
+    off = STEPS * np.abs(median)
+    return Interval(median, np.minimum(lower, median - off), np.maximum(upper, median + off))
+
+
+def _pareto(excesses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Scale and shape (negative: bounded) of the generalised Pareto distribution of excesses ascending along axis 0."""
+    k = excesses.shape[0]
+    place = (np.arange(1, k + 1) - 0.35) / k
+    mean = excesses.mean(axis=0)
+    moment = np.tensordot(1 - place, excesses, axes=(0, 0)) / k
+    ratio = np.divide(mean, mean - 2 * moment, out=np.full_like(mean, 2.0), where=mean > 2 * moment * (1 + 1e-12))
+    shape = np.clip(2 - ratio, -6.0, 0.0)
+    return mean * (1 - shape), shape
+
+
+def _quantile(p: FloatArray, scale: FloatArray, shape: FloatArray) -> FloatArray:
+    """Quantiles of the generalised Pareto distribution."""
+    safe = np.where(shape < -1e-9, shape, -1.0)
+    bounded = scale / -safe * (1 - (1 - p) ** -safe)
+    return np.asarray(np.where(shape < -1e-9, bounded, -scale * np.log1p(-p)))

@@ -1,0 +1,93 @@
+"""Parameters of the joints of a campaign and their settings: from its study, or from its result file alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.strict import validate
+from tolstat.common.tables import PARAM, Options
+from tolstat.joint import Joint, perturb, varied
+from tolstat.solver import fidelity
+from tolstat.store import ResultStore
+from tolstat.study.design import nested
+from tolstat.study.model import Solver
+
+if TYPE_CHECKING:
+    from tolstat.study import Study
+
+
+def joint_of(store: ResultStore, row: int) -> Joint:
+    """Nominal joint of a row of the file: the study's, or that of the row's variant.
+
+    Raises
+    ------
+    InputError
+        When the file's joint is not one of this version.
+    """
+    nominal = validate(Joint, store.joint, f"{store.path}: joint")
+    return varied(nominal, _values(store, row))
+
+
+def options_of(store: ResultStore, row: int) -> Options:
+    """Solver options of a row of the file: the study's, its variant's, or those of its last retry.
+
+    Raises
+    ------
+    InputError
+        When the file has options that this version does not know.
+    """
+    attempt = int(store.attempt(slice(row, row + 1))[0])
+    own = {key: value for key, value in _values(store, row).items() if key.startswith("solver.")}
+    if own and not attempt:
+        written = {key: value for key, value in store.identity.items() if key.startswith("solver.")} | own
+        if written.get("solver.fidelity") != "auto":
+            written.pop("solver.error_budget", None)  # identities hold its default, studies must not write it
+        solver = validate(Solver, nested(written)["solver"], f"{store.path}: solver")
+        return settings(solver, store.fidelity)
+    held = store.retries[attempt - 1]["options"] if attempt else store.options
+    unknown = held.keys() - set(Options._fields)
+    if unknown:
+        found = f"has options of the solver that this tolstat does not know: {', '.join(sorted(unknown))}"
+        raise InputError([Fault(str(store.path), found, "use the version that made it")])
+    return Options(**held)
+
+
+def settings(solver: Solver, choice: dict[str, Any]) -> Options:
+    """Settings as the kernel takes them; those of ``auto`` are in the record of the choice."""
+    options = solver.options()
+    return fidelity.apply(options, choice) if solver.fidelity == "auto" else options
+
+
+def parameters(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[np.void]:
+    """Parameters of rows of the file, (m,) table PARAM."""
+    params = np.empty(len(rows), PARAM)
+    for i, row in enumerate(rows.tolist()):
+        params[i : i + 1] = perturb(joint_of(store, row), store.errors(slice(row, row + 1)))
+    return params
+
+
+def perturbed(
+    study: Study, rows: NDArray[np.intp], errors: NDArray[np.void], perturb: Callable[..., NDArray[np.void]]
+) -> NDArray[np.void]:
+    """Parameters of `rows` of the campaign, (m,) table PARAM, each from the joint of its own variant."""
+    params = np.empty(len(rows), PARAM)
+    variant = variants(study, rows)
+    for number in np.unique(variant):
+        here = variant == number
+        params[here] = perturb(study.joints[number], errors[here])
+    return params
+
+
+def variants(study: Study, rows: NDArray[np.intp]) -> NDArray[np.integer]:
+    """Variant of each of `rows` of the campaign, (m,)."""
+    return study.design["variant"][rows] if len(study.joints) > 1 else np.zeros(len(rows), np.intp)
+
+
+def _values(store: ResultStore, row: int) -> dict[str, Any]:
+    """What makes the variant of a row; empty where the study lists none."""
+    return store.variants[store.design()["variant"][row]].values if store.case_names else {}

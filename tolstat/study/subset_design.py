@@ -1,0 +1,49 @@
+"""A study as subset simulation draws its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from tolstat.common import selected_results as kept
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import validate
+from tolstat.study.model import Subset
+from tolstat.study.study import Study
+
+
+def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
+    """Make the study of a subset simulation from one whose tolerances it is about.
+
+    Parameters
+    ----------
+    study : Study
+        Of any method that draws joints; histories are not kept.
+    sampling : mapping
+        Fields of `model.Subset` but those that are the study's own.
+
+    Returns
+    -------
+    Study
+        Its ``sampling`` is a `model.Subset`; the joints of level 0, which it can draw, are those of a random campaign.
+
+    Raises
+    ------
+    InputError
+        When the study has no tolerances or does not keep the load, and with every fault of `sampling`.
+    """
+    faults: list[Fault] = []
+    if not study.tolerances:
+        remedy = 'give a study with [tolerances], as of sampling.method = "random"'
+        faults.append(Fault(str(study.path), "has no tolerances that joints are drawn from", remedy))
+    if not kept.holds(study.output.columns, str(sampling["load"])):
+        remedy = f"add {', '.join(kept.needed(str(sampling['load'])))}"
+        faults.append(Fault(f"{study.path}: output.results", f"leaves out {sampling['load']} of --limit", remedy))
+    own = study.sampling.model_dump(include={"seed", "nominal_first"})
+    with gather(faults):
+        read = validate(Subset, own | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
+    if faults:
+        raise InputError(faults)
+    output = study.output.model_copy(update={"histories": "none"})
+    return replace(study, sampling=read, proposals=(), output=output)

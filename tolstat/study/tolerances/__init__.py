@@ -1,0 +1,1 @@
+"""Tolerances of a study: entries, kinds, distributions, correlation."""

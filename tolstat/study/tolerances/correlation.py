@@ -1,0 +1,145 @@
+"""Correlated errors: ``[[correlation]]`` entries assembled to one Gaussian copula."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import Strict
+from tolstat.common.units import Number
+from tolstat.study.selection import select
+
+Array = NDArray[np.float64]
+
+SMALLEST_EIGENVALUE = 1e-9
+"""A correlation matrix with a smaller eigenvalue does not count as positive definite."""
+
+
+class Correlation(Strict):
+    """One ``[[correlation]]``: every two of the errors named have the correlation `rho`.
+
+    It is the correlation of the normal scores (Gaussian copula): the errors' own where they are normal.
+    """
+
+    between: Annotated[list[str], Field(min_length=1)]
+    rho: Annotated[Number, Field(gt=-1, lt=1)]
+
+
+@dataclass(frozen=True)
+class Copula:
+    """Gaussian copula of the errors `names`; the others are independent.
+
+    Attributes
+    ----------
+    names : tuple of str
+        In the order in which the file first names them, so that errors correlated later in the file leave the
+        draws of these unchanged.
+    matrix : ndarray, (m, m)
+        Correlation of the normal scores.
+    """
+
+    names: tuple[str, ...] = ()
+    matrix: Array = field(default_factory=lambda: np.eye(0))
+
+    def apply(self, u: Array) -> Array:
+        """Correlate independent probabilities.
+
+        Parameters
+        ----------
+        u : ndarray, (n, m)
+            Independent and uniform in (0, 1), one column for each of `names`.
+
+        Returns
+        -------
+        ndarray, (n, m)
+            Uniform in each column, correlated across; the first column is unchanged but for rounding.
+        """
+        from scipy.special import ndtr, ndtri
+
+        scores, factor = ndtri(u), np.linalg.cholesky(self.matrix)
+        # term by term: a matrix product rounds a row by the number of rows that are multiplied with it
+        mixed = np.zeros_like(scores)
+        for i, j in zip(*np.nonzero(factor), strict=True):
+            mixed[:, i] += factor[i, j] * scores[:, j]
+        correlated: Array = ndtr(mixed)
+        return np.clip(correlated, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+
+
+def assemble(entries: Sequence[Correlation], toleranced: dict[str, str], place: str) -> Copula:
+    """Assemble the entries of a file.
+
+    Parameters
+    ----------
+    entries : sequence of Correlation
+        In the order of the file.
+    toleranced : dict
+        Names of the errors that have a tolerance, and their units.
+    place : str
+        File that faults name.
+
+    Returns
+    -------
+    Copula
+        Of all errors that any entry names.
+
+    Raises
+    ------
+    InputError
+        For a name without tolerance, a pair given twice, and a matrix that is not positive definite.
+    """
+    faults: list[Fault] = []
+    rho: dict[frozenset[str], float] = {}
+    order: dict[str, None] = {}
+    for number, entry in enumerate(entries):
+        where = f"{place}: correlation[{number}].between"
+        names: dict[str, None] = {}
+        for pattern in entry.between:
+            with gather(faults):
+                names.update(dict.fromkeys(_named(pattern, toleranced, where)))
+        members = list(names)
+        if len(members) < 2 and not faults:
+            faults.append(Fault(where, f"names one error only, {members[0]}", "name at least two"))
+        order.update(names)
+        pairs = [frozenset((a, b)) for i, a in enumerate(members) for b in members[:i]]
+        for pair in pairs:
+            if pair in rho:
+                text = " and ".join(sorted(pair))
+                faults.append(Fault(where, f"{text} are correlated by an earlier entry", "keep one of the two"))
+            rho[pair] = entry.rho
+    if faults:
+        raise InputError(faults)
+    return _positive_definite(tuple(order), rho, place)
+
+
+def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
+    """Errors of one name or pattern in `between`."""
+    if pattern.endswith(".offset_radial"):
+        remedy = "give offset_t and offset_z tolerances of their own, and correlate those"
+        raise InputError([Fault(where, f"{pattern} has no correlation of its own", remedy)])
+    names = select(pattern, toleranced)
+    if not names:
+        raise InputError([Fault(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or leave it out")])
+    return names
+
+
+def _positive_definite(names: tuple[str, ...], rho: dict[frozenset[str], float], place: str) -> Copula:
+    index = {name: i for i, name in enumerate(names)}
+    matrix = np.eye(len(names))
+    for pair, value in rho.items():
+        i, j = (index[name] for name in pair)
+        matrix[i, j] = matrix[j, i] = value
+    if names:
+        values, vectors = np.linalg.eigh(matrix)
+        if values[0] < SMALLEST_EIGENVALUE:
+            part = np.abs(vectors[:, 0])
+            guilty = [name for name, share in zip(names, part, strict=True) if share > 0.1 * part.max()]
+            found = f"not positive definite: those of {', '.join(guilty)} contradict each other"
+            remedy = "make rho smaller in size, or give the pairs that are left out (they count as rho = 0)"
+            raise InputError([Fault(f"{place}: correlation", found, remedy)])
+    return Copula(names, matrix)

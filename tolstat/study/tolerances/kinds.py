@@ -1,0 +1,263 @@
+"""Entries of ``[tolerances]``, one model for each distribution: their keys, and the distribution they mean.
+
+No statistics of the errors of Cardan crosses are published: which distribution holds is what a study assumes.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tolstat.common import strict as schema
+from tolstat.common import units
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.strict import refuse
+from tolstat.study.tolerances import distributions as tolerance
+from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.entry import Banded, HalfBand, Positive, PositiveNumber, Site, ToleranceEntry, Value
+
+Truncate = Annotated[bool, Field(strict=True)]
+
+
+class NormalEntry(Banded):
+    """Mean in the middle of the band unless given; sigma from `cpk` (1 unless given) or `std`."""
+
+    distribution: Literal["normal"]
+    cpk: PositiveNumber | None = None
+    mean: Value | None = None
+    std: Positive | None = None
+    truncate: Truncate = False
+
+    def build(self, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
+        """See `ToleranceEntry.build`."""
+        if self.std is not None:
+            return self._from_std(self.std, site)
+        lower, upper = self.needed_band(site)
+        mean = 0.5 * (lower + upper) if self.mean is None else self.mean
+        if not lower < mean < upper:
+            raise refuse("mean is outside the band, so that Cpk would not be positive", "give lower < mean < upper")
+        sigma = tolerance.sigma_of(lower, upper, mean, 1.0 if self.cpk is None else self.cpk)
+        if self.truncate:
+            return tolerance.TruncatedNormal(mean, sigma, lower, upper)
+        return tolerance.Normal(mean, sigma)
+
+    def _from_std(self, std: float, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
+        band = self.band(site)
+        if self.cpk is not None:
+            raise refuse("std and cpk both say how wide the scatter is", "keep one of them")
+        if self.truncate != (band is not None):
+            raise refuse(
+                "truncate and a band go together when std is given",
+                "give a band and truncate = true, or neither",
+            )
+        middle = site.center if band is None else 0.5 * sum(band)
+        mean = middle if self.mean is None else self.mean
+        if band is None:
+            return tolerance.Normal(mean, std)
+        if not band[0] < mean < band[1]:
+            raise refuse("mean is outside the band", "give lower < mean < upper")
+        return tolerance.TruncatedNormal(mean, std, *band)
+
+
+class UniformEntry(Banded):
+    """Uniform on the band."""
+
+    distribution: Literal["uniform"]
+
+    def build(self, site: Site) -> tolerance.Uniform:
+        """See `ToleranceEntry.build`."""
+        return tolerance.Uniform(*self.needed_band(site))
+
+
+class TriangularEntry(Banded):
+    """Triangular on the band, most likely at `peak` (the middle unless given)."""
+
+    distribution: Literal["triangular"]
+    peak: Value | None = None
+
+    def build(self, site: Site) -> tolerance.Triangular:
+        """See `ToleranceEntry.build`."""
+        lower, upper = self.needed_band(site)
+        peak = 0.5 * (lower + upper) if self.peak is None else self.peak
+        if not lower <= peak <= upper:
+            raise refuse("peak is outside the band", "give lower <= peak <= upper")
+        return tolerance.Triangular(lower, upper, peak)
+
+
+class LogNormalEntry(Banded):
+    """Lognormal above `threshold` (0 unless given): by band and Cpk of the logarithm, or by mean and std."""
+
+    distribution: Literal["lognormal"]
+    threshold: Value = 0.0
+    cpk: PositiveNumber | None = None
+    mean: Value | None = None
+    std: Positive | None = None
+    truncate: Truncate = False
+
+    def build(self, site: Site) -> tolerance.LogNormal:
+        """See `ToleranceEntry.build`."""
+        band = self.band(site)
+        by_moments = self.mean is not None or self.std is not None
+        if by_moments == (band is not None):
+            raise refuse(
+                "needs either a band or mean and std",
+                "give one of the two; mean and std are those of the value",
+            )
+        if band is not None:
+            return self._from_band(*band)
+        if self.mean is None or self.std is None:
+            raise refuse("mean and std belong together", "give both")
+        if self.cpk is not None or self.truncate:
+            raise refuse("cpk and truncate need a band", "give a band instead of mean and std")
+        if not self.mean > self.threshold:
+            raise refuse("mean is not above threshold", "give mean > threshold")
+        variance = math.log1p((self.std / (self.mean - self.threshold)) ** 2)
+        log = tolerance.Normal(math.log(self.mean - self.threshold) - 0.5 * variance, math.sqrt(variance))
+        return tolerance.LogNormal(self.threshold, log)
+
+    def _from_band(self, lower: float, upper: float) -> tolerance.LogNormal:
+        if not lower > self.threshold:
+            raise refuse("the band reaches down to threshold", "give threshold < lower")
+        low, high = math.log(lower - self.threshold), math.log(upper - self.threshold)
+        mean = 0.5 * (low + high)
+        sigma = tolerance.sigma_of(low, high, mean, 1.0 if self.cpk is None else self.cpk)
+        log = tolerance.TruncatedNormal(mean, sigma, low, high) if self.truncate else tolerance.Normal(mean, sigma)
+        return tolerance.LogNormal(self.threshold, log)
+
+
+class BetaEntry(Banded):
+    """Beta with shapes `a`, `b` on the band."""
+
+    distribution: Literal["beta"]
+    a: PositiveNumber
+    b: PositiveNumber
+
+    def build(self, site: Site) -> tolerance.Beta:
+        """See `ToleranceEntry.build`."""
+        return tolerance.Beta(self.a, self.b, *self.needed_band(site))
+
+
+class RayleighEntry(HalfBand):
+    """Radius of an offset of which each coordinate has sigma = plus_minus / (3 cpk), or `sigma` as given."""
+
+    distribution: Literal["rayleigh"]
+    cpk: PositiveNumber | None = None
+    sigma: Positive | None = None
+    truncate: Truncate = False
+
+    def build(self, site: Site) -> tolerance.Rayleigh:
+        """See `ToleranceEntry.build`."""
+        radius = self.half_width(site)
+        if self.sigma is None and radius is None:
+            raise refuse("no band", "add plus_minus, or iso2768 and nominal, or sigma")
+        if self.sigma is not None and self.cpk is not None:
+            raise refuse("sigma and cpk both say how wide the scatter is", "keep one of them")
+        if radius is None:
+            if self.truncate:
+                raise refuse("truncate needs a band", "add plus_minus")
+            return tolerance.Rayleigh(self.sigma or 0.0)
+        if self.sigma is not None and not self.truncate:
+            raise refuse("the band has no effect beside sigma", "leave it out, or add truncate = true")
+        sigma = self.sigma or tolerance.sigma_of(-radius, radius, 0.0, self.cpk or 1.0)
+        return tolerance.Rayleigh(sigma, radius if self.truncate else None)
+
+
+class MeasuredEntry(ToleranceEntry):
+    """One column of a CSV file with a header row; `unit` is that of the column."""
+
+    distribution: Literal["measured"]
+    file: str
+    column: str
+    unit: str | None = None
+
+    def build(self, site: Site) -> tolerance.Measured:
+        """See `ToleranceEntry.build`."""
+        values = self._column(site.folder / self.file)
+        if self.unit is None and site.unit != "1":
+            raise refuse("missing key unit", 'add the unit of the column, for example unit = "mm"')
+        factor = units.to_si(1.0 if self.unit is None else f"1 {self.unit}", site.unit)
+        return tolerance.Measured.of(factor * value for value in values)
+
+    def _column(self, path: Path) -> list[float]:
+        try:
+            with path.open(encoding="utf-8-sig", newline="") as file:
+                rows = csv.DictReader(line for line in file if line.strip() and not line.startswith("#"))
+                cells = [row.get(self.column) for row in rows]
+                columns = rows.fieldnames or ()
+        except (OSError, UnicodeDecodeError, csv.Error) as error:
+            raise refuse(
+                f"{path} cannot be read: {error}", "give a CSV file; its path starts from the study's folder"
+            ) from error
+        if self.column not in columns:
+            raise refuse(f"{path} has no column {self.column!r}", schema.did_you_mean(self.column, list(columns)))
+        values = []
+        for number, cell in enumerate(cells, start=1):
+            value = _number(cell)
+            if value is None:
+                raise refuse(f"{path}: row {number} of {self.column!r} is {cell!r}", "give a finite number in each row")
+            values.append(value)
+        if len(values) < 2:
+            raise refuse(f"{path} has {len(values)} values in {self.column!r}", "give at least two measured parts")
+        return values
+
+
+def _number(cell: str | None) -> float | None:
+    try:
+        value = float(cell or "")
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+KINDS: dict[str, type[ToleranceEntry]] = {
+    "normal": NormalEntry,
+    "uniform": UniformEntry,
+    "triangular": TriangularEntry,
+    "lognormal": LogNormalEntry,
+    "beta": BetaEntry,
+    "measured": MeasuredEntry,
+}
+RADIAL_KINDS: dict[str, type[ToleranceEntry]] = {"rayleigh": RayleighEntry}
+
+
+def distribution(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> Distribution:
+    """Distribution that an entry means.
+
+    Parameters
+    ----------
+    data : object
+        The entry as parsed from TOML.
+    site : Site
+        The error that it is for.
+    place, path : str, tuple of str
+        File, and key path in it, that faults name.
+
+    Returns
+    -------
+    Distribution
+        In the error's SI unit.
+
+    Raises
+    ------
+    InputError
+        With the faults of the entry.
+    """
+    where = f"{place}: {schema.dotted(path)}"
+    if not isinstance(data, dict):
+        remedy = 'write { plus_minus = ..., distribution = "normal", cpk = 1.0 }'
+        raise InputError([Fault(where, f"{data!r} is not a tolerance", remedy)])
+    kinds = RADIAL_KINDS if site.name.endswith(".offset_radial") else KINDS
+    kind = data.get("distribution")
+    if kind is None:
+        remedy = f"add distribution, one of {', '.join(kinds)}"
+        raise InputError([Fault(f"{where}.distribution", "missing key", remedy)])
+    if not isinstance(kind, str) or kind not in kinds:
+        also = " (rayleigh is for offset_radial)" if kind == "rayleigh" else ""
+        remedy = schema.did_you_mean(str(kind), list(kinds))
+        raise InputError([Fault(f"{where}.distribution", f"{kind!r} is not possible here{also}", remedy)])
+    entry = schema.validate(kinds[kind], data, place, prefix=path, context={"site": site})
+    return entry.build(site)

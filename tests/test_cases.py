@@ -17,7 +17,7 @@ from tolstat.store import ResultStore, recorded
 from tolstat.study import Study
 
 ROOT = Path(__file__).parent.parent
-PAPER = ROOT / "studies" / "cirelli2021.toml"
+PAPER = ROOT / "studies" / "cirelli2021" / "cirelli2021.toml"
 
 TEXT = """
 [joint]

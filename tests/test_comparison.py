@@ -223,7 +223,7 @@ def test_every_fault_of_a_setup_is_told(tmp_path):
     path.write_text(text.replace("joints = 6 ", "joints = 39").replace("iso2768_f.toml", "clearance.toml"))
     with pytest.raises(InputError, match="39 of the 38 joints"):
         setup.load(path)
-    path.write_text(text.replace("iso2768_f.toml", "cirelli2021.toml"))
+    path.write_text(text.replace("iso2768_f.toml", "cirelli2021/cirelli2021.toml"))
     with pytest.raises(InputError, match="lists its joints"):
         setup.load(path)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import doctest
 from collections import Counter
 from importlib.util import find_spec
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -170,9 +169,6 @@ def test_a_duty_cycle_adds_damage_not_loads():
     np.testing.assert_allclose(damage.damage(both, line, 1e6), separate)
     power = sum(s * damage.equivalent_load(p, 3.0) ** 3 for s, p in zip(shares, parts, strict=True))
     np.testing.assert_allclose(damage.equivalent_load(both, 3.0), power ** (1 / 3))
-    levels = np.linspace(-3, 3, 9)
-    crossed = sum(s * cycles.upcrossings(p, levels) for s, p in zip(shares, parts, strict=True))
-    np.testing.assert_allclose(cycles.upcrossings(both, levels), crossed)
     np.testing.assert_allclose(cycles.mix([parts[0]] * 2, [0.5, 0.5]).number, parts[0].number)
     for wrong in ([1.0], [0.5, 0.6], [0.0, 1.0]):
         with pytest.raises(ValueError, match="shares"):
@@ -195,25 +191,6 @@ def test_spectrum_reads_the_ordered_ranges():
     np.testing.assert_allclose(cycles.spectrum(both, numbers)[:, 0], expected)
 
 
-@settings(max_examples=100, deadline=None)
-@given(SIGNALS)
-def test_crossings_of_the_cycles_are_those_of_the_signal(signal):
-    levels = np.arange(-9.5, 10, 0.5)
-    x, following = np.array(signal)[:, None], np.roll(signal, -1)[:, None]
-    counted = ((x < levels) & (following >= levels)).sum(axis=0)
-    assert cycles.upcrossings(of_signals(signal), levels)[0, 0].tolist() == counted.tolist()
-
-
-def test_matrix_holds_every_cycle_once():
-    here = of_signals(noise(1), noise(2), np.zeros(9))
-    edges, means = np.linspace(0, 8, 17), np.linspace(-4, 4, 9)
-    classes = cycles.matrix(here, "cross1.F_e", edges, means)
-    assert classes.shape == (16, 8)
-    assert classes.sum() == pytest.approx(here.number.sum() / 3)
-    by_range = [np.sum((here.ranges >= a) & (here.ranges < b) & (here.ranges > 0)) / 3 for a, b in pairwise(edges)]
-    np.testing.assert_allclose(classes.sum(axis=1), by_range)
-
-
 def test_shortfall_bounds_what_has_no_place():
     ranges = rainflow.periodic(noise())[0]
     kept = Cycles(
@@ -232,13 +209,11 @@ def test_joints_without_results_have_no_values():
         damage.equivalent_load(here, 3.0),
         damage.damage(here, damage.Line(3.0, 1.0, 1e6), 1e6),
         cycles.spectrum(here, [1.0])[..., 0],
-        cycles.upcrossings(here, [0.0])[..., 0],
         cycles.share_of_revolution_above([noise(1), [np.nan] * 500], 0.0)[:, None],
     ]
     for value in values:
         assert np.isfinite(value[0]).all()
         assert np.isnan(value[1]).all()
-    np.testing.assert_allclose(cycles.matrix(here, "cross1.F_e", [0, 9], [-9, 9]), len(rainflow.periodic(noise(1))[0]))
 
 
 def test_share_of_revolution_above_a_level_of_a_cosine():

@@ -15,7 +15,7 @@ from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
 from tolstat.report import compose as pages
 from tolstat.report import html as writer
-from tolstat.report import loads, page, pdf, verdict
+from tolstat.report import loads, page, verdict
 from tolstat.store import ResultStore
 from tolstat.store.view import load
 
@@ -95,20 +95,12 @@ def test_text_of_the_study_is_shown_and_not_run(html):
 def test_same_file_same_bytes(path, found, html, tmp_path):
     with ResultStore.open(path) as store:
         again = pages.compose(page.gather(store, 0.05, 0))
-    for form, write in (("html", writer.write), ("pdf", pdf.write)):
-        contents = []
-        for k, made in enumerate((pages.compose(found), again)):
-            some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
-            write(replace(made, sections=some), tmp_path / f"{k}.{form}")
-            contents.append((tmp_path / f"{k}.{form}").read_bytes())
-        assert contents[0] == contents[1]
-
-
-def test_sheets_hold_every_section(found, tmp_path):
-    pdf.write(pages.compose(found), tmp_path / "page.pdf")
-    content = (tmp_path / "page.pdf").read_bytes()
-    assert content.startswith(b"%PDF")
-    assert len(re.findall(rb"/Type /Page\b", content)) >= 5
+    contents = []
+    for k, made in enumerate((pages.compose(found), again)):
+        some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
+        writer.write(replace(made, sections=some), tmp_path / f"{k}.html")
+        contents.append((tmp_path / f"{k}.html").read_bytes())
+    assert contents[0] == contents[1]
 
 
 def test_limits_and_their_verdicts_stand_on_the_page(found, html):
@@ -188,7 +180,7 @@ def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
     said = words(path)[1][0]
     assert f"{60 - max(0, simulated - 1)} still pending" in said
     if not simulated:
-        page.write(path, tmp_path / "page.html", tmp_path / "page.pdf", again=0)
+        assert page.write(path, tmp_path / "page.html", again=0) == tmp_path / "page.html"
         assert said in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
@@ -212,32 +204,24 @@ def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
     assert read.sections[:2] == ["verdict", "sweep"]
 
 
-def test_text_is_wrapped_and_nothing_of_it_lost():
-    text = "words " * 40 + "x" * 400
-    lines = pdf._wrap(text, 9, 3.0)
-    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
-    assert max(pdf._width(line, 9) for line in lines) <= 3.0
-
-
 @pytest.mark.parametrize(
     ("arguments", "asked"),
     [
-        (["--out", "p.html", "--pdf", "--accept", "5 %", "--replay", "0"], ("p.html", "p.pdf", 0.05, 0)),
-        (["--out", "p.htm", "--accept", "100 ppm", "--replay", "7"], ("p.htm", None, 1e-4, 7)),
-        (["--pdf", "--accept", "0.5", "--replay", "0"], (None, "{file}.pdf", 0.5, 0)),
+        (["--out", "p.html", "--accept", "5 %", "--replay", "0"], ("p.html", 0.05, 0)),
+        (["--out", "p.htm", "--accept", "100 ppm", "--replay", "7"], ("p.htm", 1e-4, 7)),
     ],
 )
-def test_command_asks_for_page_and_sheets(path, tmp_path, monkeypatch, arguments, asked):
+def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     calls = []
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(page, "write", lambda *given: calls.append(given) or [tmp_path / "written"])
+    monkeypatch.setattr(page, "write", lambda *given: calls.append(given) or tmp_path / "written")
     monkeypatch.setattr(page, "simulates", lambda store: False)
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
     assert "wrote" in done.stderr
-    names = [None if x is None else str(x).replace(str(path.with_suffix("")), "{file}") for x in calls[0][1:3]]
-    assert (*names, calls[0][4]) == (*asked[:2], asked[3])
-    assert calls[0][3] == pytest.approx(asked[2])
+    _, out, accepted, again = calls[0]
+    assert (str(out), again) == (asked[0], asked[2])
+    assert accepted == pytest.approx(asked[1])
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,22 +11,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from studies.cirelli2021 import (
-    choices as paper_choices,
-)
-from studies.cirelli2021 import (
-    distances as paper_distances,
-)
-from studies.cirelli2021 import (
-    spectra as paper_spectra,
-)
-from studies.cirelli2021 import (
-    statics as paper_statics,
-)
-from studies.cirelli2021 import (
-    tables as paper,
-)
-from tolstat.common.files import data_dir
+from studies.cirelli2021 import choices as paper_choices
+from studies.cirelli2021 import distances as paper_distances
+from studies.cirelli2021 import spectra as paper_spectra
+from studies.cirelli2021 import statics as paper_statics
+from studies.cirelli2021 import tables as paper
+from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.common.tables import BUSHINGS, RESULT, Status
 from tolstat.joint import ideal
 
@@ -36,7 +28,7 @@ def test_printed_tables_have_128_entries_in_the_paper_s_order():
     assert table.gamma.shape == (4, 2, 8, 2)
     assert np.isfinite(table.gamma).all()
     assert table.tables.tolist() == [[4, 6], [5, 7]]
-    lines = [n for n in (data_dir() / "cirelli2021_tables.csv").read_text().splitlines() if n[:1].isdigit()]
+    lines = [n for n in Path(paper.__file__).with_name("tables.csv").read_text().splitlines() if n[:1].isdigit()]
     assert len(set(lines)) == 64
 
 
@@ -83,14 +75,14 @@ def results(force, torque):
 
 def test_gamma_is_relative_to_the_first_row_of_its_group():
     table = results([100.0, 110.0, 200.0, 150.0], [10.0, 8.0, 20.0, 20.0])
-    gamma = paper.gamma(table, np.array([0, 0, 7, 7], "i4"))
+    gamma = relative_errors(table, np.array([0, 0, 7, 7], "i4"))
     assert_allclose(gamma[:, 3], [[0.0, 0.0], [10.0, -20.0], [0.0, 0.0], [-25.0, 0.0]])
 
 
 def test_gamma_of_joints_that_did_not_settle_is_unknown():
     table = results([100.0, 110.0, 200.0, 150.0], [10.0, 8.0, 20.0, 20.0])
     table["status"][[1, 2]] = Status.NOT_SETTLED, Status.NEWTON_FAILED
-    gamma = paper.gamma(table, np.array([0, 0, 1, 1], "i4"))
+    gamma = relative_errors(table, np.array([0, 0, 1, 1], "i4"))
     assert np.isnan(gamma[1:]).all()
     assert (gamma[0] == 0.0).all()
 

@@ -11,19 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from studies.cirelli2021 import (
-    page_checks as paper_checks,
-)
-from studies.cirelli2021 import (
-    page_equations as paper_equations,
-)
-from studies.cirelli2021 import (
-    page_source as paper_source,
-)
+from studies.cirelli2021 import page_checks as paper_checks
+from studies.cirelli2021 import page_equations as paper_equations
+from studies.cirelli2021 import page_source as paper_source
+from studies.cirelli2021 import reproduce
 from studies.cirelli2021.page import context
 from tolstat import report, study
 from tolstat.campaign import run as campaign
-from tolstat.common import files
 from tolstat.common.tables import Status
 from tolstat.store import ResultStore
 
@@ -55,7 +49,7 @@ vary.cross.R = { from = "60 mm", to = "90 mm" }
 def result(tmp_path_factory) -> Path:
     """File of the study with all of its cases but few of its variants."""
     folder = tmp_path_factory.mktemp("paper")
-    whole = (files.data_dir().parent / "studies" / "cirelli2021.toml").read_text(encoding="utf-8")
+    whole = reproduce.STUDY.read_text(encoding="utf-8")
     (folder / "small.toml").write_text(whole[: whole.index("[[variant]]")] + VARIANTS, encoding="utf-8")
     campaign.run(study.load(folder / "small.toml"), folder / "small.h5", workers=1)
     return folder / "small.h5"
@@ -181,10 +175,9 @@ class Page(HTMLParser):
 
 
 def test_page_is_whole_and_stands_alone(result, tmp_path):
-    built = report.build(result, tmp_path)
-    assert [p.name for p in built.files] == ["small_paper.html", "small_tables.csv", "small_cases.csv"]
-    assert "Table 4" in built.table
-    source = built.files[0].read_text(encoding="utf-8")
+    assert "Table 4" in reproduce.build(result, tmp_path / "small")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["small_paper.html", "small_tables.csv"]
+    source = (tmp_path / "small_paper.html").read_text(encoding="utf-8")
     page = Page()
     page.feed(source)
     assert page.open == []
@@ -194,7 +187,7 @@ def test_page_is_whole_and_stands_alone(result, tmp_path):
     for text in ("Table 4", "Table 7", "Figures 5 and 12 to 22", "Does any choice", "RCCC", "Misprints"):
         assert text in page.text
     assert "nan" not in page.text.replace("Pennestrì", "").split()
-    table = pd.read_csv(built.files[1])
+    table = pd.read_csv(tmp_path / "small_tables.csv")
     assert len(table) == 128
     row = table[(table["case"] == "Ang fork") & (table["bushing"] == "cross1") & (table["load"] == "Gamma_T")]
     assert row["printed"].tolist() == [31.6, 24.9]
@@ -207,6 +200,8 @@ def test_other_cases_get_a_plain_table(result, tmp_path):
         head + '[[case]]\nname = "bent"\nerrors.pin1.tilt_z = "0.5 deg"\n', encoding="utf-8"
     )
     campaign.run(study.load(tmp_path / "own.toml"), tmp_path / "own.h5", workers=1)
+    with pytest.raises(ValueError, match="does not hold the paper's cases"):
+        reproduce.build(tmp_path / "own.h5", tmp_path / "own")
     built = report.build(tmp_path / "own.h5")
     assert [p.name for p in built.files] == ["own_cases.csv"]
     table = pd.read_csv(built.files[0])
@@ -234,9 +229,9 @@ def test_another_joint_is_shown_beside_printed_constants(result, tmp_path):
     assert rows["k_x [N/m]"][3:5] == (2.14e9, 1e9)
     assert rows["k1u [N/m²]"][:2] == (7.5e13, 5e13)
     assert shown["search"] is None
-    built = report.build(tmp_path / "own.h5")
+    reproduce.build(tmp_path / "own.h5", tmp_path / "own")
     page = Page()
-    page.feed(built.files[0].read_text(encoding="utf-8"))
+    page.feed((tmp_path / "own_paper.html").read_text(encoding="utf-8"))
     assert "Does any choice" not in page.text
     assert "7.5e+13" in page.text
     assert "-0.0 " not in page.text

@@ -303,7 +303,8 @@ def test_other_laws_share_the_statics(params, law):
 PROBE = """
 import numpy as np
 from tolstat import joint
-from tolstat.kernel import dynamics, simulate
+from tolstat.kernel.mechanics import dynamics
+from tolstat.kernel.revolution import simulate
 from tolstat.common.tables import RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), joint.nominal_errors(1, operation))

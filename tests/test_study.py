@@ -338,7 +338,7 @@ def test_the_studies_of_the_repository() -> None:
     assert main.tolerances["pin2.tilt_t"] == Normal(0.0, pytest.approx(math.radians(0.5) / 3))
     clearance = study.load(STUDIES / "clearance.toml")
     assert clearance.rows == 39
-    for path in STUDIES.glob("*.toml"):
+    for path in STUDIES.rglob("*.toml"):
         opening = path.read_text(encoding="utf-8").split("[joint]")[0]
         assert all(word in opening for word in ("# Question: ", "# Expected answer: ", "# Run time: "))
 

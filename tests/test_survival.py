@@ -374,7 +374,7 @@ def test_the_last_blocks_are_smaller_and_none_is_left_out() -> None:
 def limited(path: Path, size: int) -> str:
     """Run a campaign in a process whose files cannot grow beyond `size` bytes; gives what it says."""
     code = (
-        "import resource, sys; from pathlib import Path; from tests import fakes; from tolstat import campaign\n"
+        "import resource, sys; from pathlib import Path; from tests import fakes; from tolstat.campaign import run as campaign\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
         "study = fakes.Study(output=fakes.Output('full'))\n"
         f"campaign.run(study, Path({str(path)!r}), 1, 4, stages=fakes.stages())"

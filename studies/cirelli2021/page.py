@@ -7,6 +7,7 @@ import io
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import jinja2
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -14,25 +15,16 @@ from matplotlib.figure import Figure
 import tolstat
 from studies.cirelli2021 import choices as paper_choices
 from studies.cirelli2021 import distances as paper_distances
-from studies.cirelli2021 import (
-    page_checks as paper_checks,
-)
-from studies.cirelli2021 import (
-    page_choices_figures as paper_choices_figures,
-)
-from studies.cirelli2021 import (
-    page_curves as paper_curves,
-)
-from studies.cirelli2021 import (
-    page_equations as paper_equations,
-)
+from studies.cirelli2021 import page_checks as paper_checks
+from studies.cirelli2021 import page_choices_figures as paper_choices_figures
+from studies.cirelli2021 import page_curves as paper_curves
+from studies.cirelli2021 import page_equations as paper_equations
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_main import revolutions
 from studies.cirelli2021.page_source import PaperStudy
 from tolstat.common.files import writing
 from tolstat.common.tables import BUSHINGS
 from tolstat.display import style, text
-from tolstat.report import templates
 
 DPI = 110
 REPRODUCED = 0.5
@@ -88,7 +80,8 @@ def write(study: PaperStudy, path: Path) -> None:
     path : Path
         HTML file.
     """
-    environment = templates.environment()
+    loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["picture"] = _picture
     environment.filters["number"] = _number
     page = environment.get_template("paper.html.j2").render(context(study))

@@ -8,24 +8,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.cirelli2021 import (
-    choices as paper_choices,
-)
-from studies.cirelli2021 import (
-    laws as paper_laws,
-)
+from studies.cirelli2021 import choices as paper_choices
+from studies.cirelli2021 import laws as paper_laws
 from studies.cirelli2021 import page_main as paper_main
-from studies.cirelli2021 import (
-    statements as paper_statements,
-)
-from studies.cirelli2021 import (
-    statics as paper_statics,
-)
-from studies.cirelli2021 import (
-    tables as paper,
-)
+from studies.cirelli2021 import statements as paper_statements
+from studies.cirelli2021 import statics as paper_statics
+from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.evidence import Answer
 from studies.cirelli2021.page_main import Main, revolutions
+from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.tables import Status, Variant
 from tolstat.joint import Joint, varied
@@ -194,7 +185,7 @@ def read(store: ResultStore) -> PaperStudy:
     """Take the study from its file; see `matching`."""
     design, results = store.design(), store.results()
     alpha = store.errors()["operation.alpha"]
-    gamma = paper.gamma(results, design["group"])
+    gamma = relative_errors(results, design["group"])
     base = Joint.model_validate(store.joint)
     rows = _kept(design, alpha)
     own = {v: rows[design["variant"][rows] == v] for v in range(len(store.variants))}

@@ -8,13 +8,13 @@ named: by the modulus of Gamma, and with its sign, as if each printed value were
 from __future__ import annotations
 
 import csv
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.files import data_dir
-from tolstat.common.tables import BUSHINGS, Status
+from tolstat.common.tables import BUSHINGS
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]
@@ -78,8 +78,8 @@ class Match(NamedTuple):
 
 
 def printed() -> Printed:
-    """Read Tables 4 to 7 as printed, from the data that come with the package."""
-    with (data_dir() / "cirelli2021_tables.csv").open(encoding="utf-8", newline="") as file:
+    """Read Tables 4 to 7 as printed, from the table beside this file."""
+    with Path(__file__).with_name("tables.csv").open(encoding="utf-8", newline="") as file:
         lines = list(csv.DictReader(line for line in file if not line.startswith("#")))
     cases = tuple(dict.fromkeys(line["case"] for line in lines))
     degrees = sorted({float(line["alpha_deg"]) for line in lines})
@@ -90,27 +90,6 @@ def printed() -> Printed:
         gamma[cases.index(line["case"]), at, bushing] = float(line["Gamma_F"]), float(line["Gamma_T"])
         tables[at, bushing // 4] = int(line["table"])
     return Printed(cases, np.radians(degrees), gamma, tables)
-
-
-def gamma(results: Table, group: NDArray[np.int32]) -> Array:
-    """Relative errors of the largest bushing loads, eq. (14), against the first row of each row's group.
-
-    Parameters
-    ----------
-    results : ndarray of RESULT, shape (n,)
-        Joints; the first of a group is the one without errors.
-    group : ndarray of int, shape (n,)
-        Rows that differ by their errors only share a number.
-
-    Returns
-    -------
-    ndarray, shape (n, 8, 2)
-        Per cent, with its sign: force, torque. NaN where the joint or its ideal has no settled result.
-    """
-    loads = np.stack([results["F_max"], results["T_max"]], axis=-1)
-    loads[results["status"] != Status.OK] = np.nan
-    _, first, inverse = np.unique(group, return_index=True, return_inverse=True)
-    return np.asarray(100.0 * (loads / loads[first[inverse]] - 1.0))
 
 
 def directions(name: str, cases: tuple[str, ...]) -> list[int]:

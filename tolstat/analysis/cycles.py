@@ -1,4 +1,4 @@
-"""Which cycles does a load go through in a revolution? Spectra, level crossings and range–mean matrices of joints.
+"""Which cycles does a load go through in a revolution? Mixtures, spectra, and the time above a level.
 
 Cycles are those of one revolution that repeats: everything is counted per revolution. What a share of the *joints*
 exceeds is asked of these values by `exceedance` and `quantile`; for which share of a *revolution* a load is above a
@@ -104,60 +104,6 @@ def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
         values[..., q] = np.where(reached[..., -1] >= number, here, 0.0)
     values[np.isnan(cycles.number)] = np.nan
     return values
-
-
-def upcrossings(cycles: Cycles, levels: ArrayLike) -> FloatArray:
-    """Level crossings: how often in a revolution a load rises through a level.
-
-    Rainflow counting keeps them: a signal rises through as many levels as its cycles do.
-
-    Parameters
-    ----------
-    cycles : Cycles
-        Of one revolution, or a mixture.
-    levels : array_like, shape (q,)
-        Loads, N or N m.
-
-    Returns
-    -------
-    ndarray, shape (n, channels, q)
-        Crossings from below a level to it or above, per revolution; NaN for joints without results.
-    """
-    wanted = np.atleast_1d(np.asarray(levels, dtype=float))
-    ranges, means = cycles.ranges.astype(float), cycles.means.astype(float)
-    crossings = np.empty((*cycles.number.shape, wanted.size))
-    for q, level in enumerate(wanted):
-        within = (means - 0.5 * ranges < level) & (level <= means + 0.5 * ranges) & (ranges > 0)
-        crossings[..., q] = within @ cycles.weights
-    crossings[np.isnan(cycles.number)] = np.nan
-    return crossings
-
-
-def matrix(cycles: Cycles, channel: str, range_edges: ArrayLike, mean_edges: ArrayLike) -> FloatArray:
-    """Range–mean matrix of a channel: cycles per revolution and joint in each class.
-
-    Parameters
-    ----------
-    cycles : Cycles
-        Of one revolution, or a mixture.
-    channel : str
-        One of ``cycles.channels``.
-    range_edges, mean_edges : array_like, shape (a + 1,) and (b + 1,)
-        Edges of the classes, ascending; a class has its lower edge, the last one both.
-
-    Returns
-    -------
-    ndarray, shape (a, b)
-        Mean over the joints that have results.
-    """
-    part = cycles.of(channel)
-    valid = np.isfinite(part.number[:, 0])
-    ranges, means = part.ranges[valid, 0], part.means[valid, 0]
-    weights = np.broadcast_to(part.weights, ranges.shape)[ranges > 0]
-    edges = (np.asarray(range_edges, dtype=float), np.asarray(mean_edges, dtype=float))
-    classes = np.histogram2d(ranges[ranges > 0], means[ranges > 0], bins=edges, weights=weights)[0]
-    per_joint: FloatArray = classes / max(int(valid.sum()), 1)
-    return per_joint
 
 
 def share_of_revolution_above(loads: ArrayLike, level: float) -> FloatArray:

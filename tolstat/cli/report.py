@@ -24,9 +24,6 @@ def report(
             help="Folder for the files, made if need be; default that of FILE. Or a page that holds everything.",
         ),
     ] = None,
-    pdf: Annotated[
-        bool, typer.Option("--pdf", help="Write the page as PDF: PAGE.pdf, or FILE.pdf where no page is asked for.")
-    ] = False,
     accept: Annotated[
         str | None,
         typer.Option(
@@ -51,48 +48,41 @@ def report(
     With --out PAGE.html one file with everything inside, for reading and sharing: verdict, exceedance, capability,
     causes, worst joints, fatigue, contact modes, errors, failures, and where the numbers come from.
     """
-    page = out if out is not None and out.suffix.lower() in PAGES else None
-    if page is not None or pdf:
-        _page(file, out, page, pdf, accept, again)
+    if out is not None and out.suffix.lower() in PAGES:
+        _page(file, out, accept, again)
         return
     from tolstat.report import build
     from tolstat.store import ResultStore
 
     if accept is not None:
-        raise InputError([Fault("--accept", "is for a page", "add --out PAGE.html or --pdf")])
+        raise InputError([Fault("--accept", "is for a page", "add --out PAGE.html")])
     if out is not None:
         ResultStore.open(file).close()  # a file that cannot be read leaves no folder behind
         make_folder(out)
     tell(build(file, out))
 
 
-def _page(file: Path, out: Path | None, page: Path | None, pdf: bool, accept: str | None, again: int) -> None:
+def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
     from tolstat.campaign.executors.common import THREAD_VARIABLES
 
     for name in THREAD_VARIABLES:  # many small products: threads of BLAS cost more than they give
         os.environ.setdefault(name, "1")
     from tolstat.common.files import check_target
-    from tolstat.report import page as pages
+    from tolstat.report import page
     from tolstat.store import ResultStore
 
     faults: list[Fault] = []
-    sheets = None
-    if pdf:
-        sheets = page.with_suffix(".pdf") if page is not None else (out or file.parent) / f"{file.stem}.pdf"
-    for target in (page, sheets):
-        if target is not None:
-            with gather(faults):
-                check_target(target, file)
+    with gather(faults):
+        check_target(out, file)
     accepted = float("nan")
     with gather(faults):
         accepted = share_of(accept) if accept is not None else accepted
     if faults:
         raise InputError(faults)
     with ResultStore.open(file) as store:
-        if again and pages.simulates(store):
+        if again and page.simulates(store):
             announce_compilation()
-    for path in pages.write(file, page, sheets, accepted, again):
-        say(f"wrote {path}")
+    say(f"wrote {page.write(file, out, accepted, again)}")
 
 
 def share_of(text: str) -> float:

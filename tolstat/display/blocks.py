@@ -1,4 +1,4 @@
-"""What a report page is made of. HTML and PDF show the same parts, each in its own way."""
+"""What a report page is made of."""
 
 from __future__ import annotations
 

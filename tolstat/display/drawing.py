@@ -34,9 +34,9 @@ class Frame(NamedTuple):
 
 
 @contextmanager
-def settings(scale: float = 1.0) -> Iterator[None]:
-    """House settings with sizes for one panel, times `scale`."""
-    sizes: dict[Any, float] = {
+def settings() -> Iterator[None]:
+    """House settings with sizes for one panel."""
+    given: dict[Any, Any] = {
         "font.size": 9.2,
         "axes.labelsize": 9.0,
         "axes.titlesize": 9.0,
@@ -46,15 +46,17 @@ def settings(scale: float = 1.0) -> Iterator[None]:
         "lines.linewidth": 1.6,
         "axes.linewidth": 0.8,
         "grid.linewidth": 0.7,
+        "legend.frameon": True,
+        "legend.framealpha": 0.8,
+        "legend.facecolor": "white",
+        "legend.edgecolor": "none",
     }
-    legend: dict[Any, Any] = {"frameon": True, "framealpha": 0.8, "facecolor": "white", "edgecolor": "none"}
-    given = {name: scale * size for name, size in sizes.items()} | {f"legend.{k}": value for k, value in legend.items()}
     with style.settings(), mpl.rc_context(given):
         mpl.rcParams["svg.fonttype"] = "none"  # text stays text: small, sharp, to be searched and read aloud
         yield
 
 
-def place(panel: Panel) -> tuple[float, float, float, float]:
+def _place(panel: Panel) -> tuple[float, float, float, float]:
     """Axes of a panel in parts of its width and height: left, bottom, width, height."""
     width, height = panel.size
     return (
@@ -69,7 +71,7 @@ def svg(panel: Panel) -> tuple[str, Frame]:
     """Draw a panel as SVG to stand inside a page: the same bytes for the same panel, no name used twice on the page."""
     with settings():
         figure = Figure(figsize=panel.size, dpi=72)
-        ax = figure.add_axes(place(panel))
+        ax = figure.add_axes(_place(panel))
         panel.draw(ax)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)

@@ -1,7 +1,7 @@
 """Reports of a result file: a table to read, pictures, and their numbers as CSV.
 
 A campaign of random joints gets load exceedance; a sweep gets loads against the swept value; a list of cases
-gets its table, or the page of the paper's study when its cases are the paper's.
+gets its table.
 """
 
 from __future__ import annotations
@@ -51,10 +51,9 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
 
     For ``FILE.h5`` it writes ``FILE_exceedance.png``, ``.svg`` and ``.csv`` (the curves),
     ``FILE_quantiles.csv`` and, where the study sets limits, ``FILE_limits.csv``; for a sweep
-    ``FILE_sweep.png``, ``.svg`` and ``.csv``; for a list of cases ``FILE_cases.csv``, where variants have
-    notes the table ``FILE_cases.md`` and, where the cases are those of the paper's tables, the page ``FILE_paper.html``
-    and its tables ``FILE_tables.csv``. Loads that the study does not keep are left out; without any force or
-    torque there is no picture.
+    ``FILE_sweep.png``, ``.svg`` and ``.csv``; for a list of cases ``FILE_cases.csv`` and, where
+    variants have notes, the table ``FILE_cases.md``. Loads that the study does not keep are left out; without any
+    force or torque there is no picture.
 
     Parameters
     ----------
@@ -133,24 +132,15 @@ def _accuracy(campaign: Campaign) -> str:
 
 
 def _cases(store: ResultStore, stem: Path) -> Report:
-    from studies.cirelli2021 import page as paper
-    from studies.cirelli2021 import page_source as paper_source
     from tolstat.report import cases
 
     full = cases.table(store)
     files = [text.csv(full, stem, "cases")]
     counts = store.counts()
-    notes = f"{counts.done} of {counts.total} joints, {counts.shortfall}"
-    if not paper_source.matching(store):
-        notes = "\n".join([notes, *cases.advice(full)])
-        if full["note"].any():
-            files.append(_text(cases.markdown(full), stem, "cases.md"))
-        return Report(text.plain(cases.worst(full)), notes, files)
-    study = paper_source.read(store)
-    page = stem.with_name(f"{stem.name}_paper.html")
-    paper.write(study, page)
-    files = [page, text.csv(paper.entries(study), stem, "tables"), *files]
-    return Report(paper.summary(study), notes, files)
+    notes = "\n".join([f"{counts.done} of {counts.total} joints, {counts.shortfall}", *cases.advice(full)])
+    if full["note"].any():
+        files.append(_text(cases.markdown(full), stem, "cases.md"))
+    return Report(text.plain(cases.worst(full)), notes, files)
 
 
 def _text(content: str, stem: Path, ending: str) -> Path:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from studies.cirelli2021 import tables as paper
 from tolstat.analysis import accuracy
+from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.campaign.remedy import remedy
 from tolstat.common import selected_results as kept
 from tolstat.common.tables import BUSHINGS, Motion, Status
@@ -51,7 +51,7 @@ def table(store: ResultStore) -> pd.DataFrame:
         "cost": results["newton_iterations"] / max(1, int(results["newton_iterations"][0])),
         "remedy": [remedy(row, store.options | _own(v, "solver")) for row, v in zip(results, variants, strict=True)],
     }
-    gamma = paper.gamma(results, design["group"])
+    gamma = relative_errors(results, design["group"])
     for b, bushing in enumerate(BUSHINGS):
         for load, (letter, unit) in enumerate((("F", "N"), ("T", "N*m"))):
             if not kept.holds(store.columns, f"{bushing}.{letter}"):

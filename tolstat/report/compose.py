@@ -1,4 +1,4 @@
-"""The report as one page: what was found (`findings`), put into blocks (`compose`), written as HTML or PDF."""
+"""The report as one page: what was found (`findings`), put into blocks (`compose`), written as HTML."""
 
 from __future__ import annotations
 

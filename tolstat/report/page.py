@@ -29,7 +29,7 @@ from tolstat.questions.causes.query import Causes
 from tolstat.questions.fatigue import query as fatigue
 from tolstat.questions.fatigue.query import Loading
 from tolstat.report import compose as pages
-from tolstat.report import html, pdf
+from tolstat.report import html
 from tolstat.report.findings import Findings, Lost, Worst
 from tolstat.solver import fidelity
 from tolstat.store import ResultStore, revolutions
@@ -50,21 +50,15 @@ NAMED = 12
 """Joints without a valid result that are named."""
 
 
-def write(
-    path: str | Path,
-    out: str | Path | None,
-    pdf_out: str | Path | None = None,
-    accepted: float = np.nan,
-    again: int = angles.JOINTS,
-) -> list[Path]:
+def write(path: str | Path, out: str | Path, accepted: float = np.nan, again: int = angles.JOINTS) -> Path:
     """Write the report of a result file as one page, in whatever state the campaign is.
 
     Parameters
     ----------
     path : str or Path
         The result file of a study that draws its joints, or sweeps.
-    out, pdf_out : str or Path, optional
-        HTML and PDF file to write.
+    out : str or Path
+        HTML file to write.
     accepted : float
         Share of the joints that may be above a limit; NaN where nothing is asked.
     again : int
@@ -73,8 +67,8 @@ def write(
 
     Returns
     -------
-    list of Path
-        The files written; the same file gives the same bytes.
+    Path
+        The file written; the same result file gives the same bytes.
 
     Raises
     ------
@@ -84,19 +78,15 @@ def write(
     Examples
     --------
     >>> tolstat.write_page("iso2768_f.h5", "iso2768_f.html", accepted=0.01)  # doctest: +SKIP
-    [PosixPath('iso2768_f.html')]
+    PosixPath('iso2768_f.html')
     """
     with ResultStore.open(path) as store:
         if store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table, and the paper's page"
             raise StoreError(str(Fault(str(path), "lists its joints one by one", remedy)))
         made = pages.compose(gather(store, accepted, again))
-    written = []
-    for form, target in ((html, out), (pdf, pdf_out)):
-        if target is not None:
-            form.write(made, Path(target))
-            written.append(Path(target))
-    return written
+    html.write(made, Path(out))
+    return Path(out)
 
 
 def simulates(store: ResultStore) -> bool:

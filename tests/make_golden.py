@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from tests import fakes
+from tests.support import fakes
 from tolstat.store import ResultStore, integrity, result_file
 
 FOLDER = Path(__file__).parent / "golden"

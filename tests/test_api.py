@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 import tolstat
-from tests.test_allocate import TWO
-from tests.test_causes import TEXT, made
-from tests.test_reweight import campaign
+from tests.questions.test_allocate import TWO
+from tests.questions.test_causes import TEXT, made
+from tests.questions.test_reweight import campaign
 
 ROOT = Path(__file__).parent.parent
 ON_ARRAYS = (

@@ -5,7 +5,7 @@ again. Here a kernel that kernels call stays intermediate code. The one that Pyt
 once, and is optimised, emitted and cached with them as a whole.
 
 This is the one place that leans on Numba's internals. Where they have moved, importing it fails and `_jit` compiles as
-Numba does; where they mean something else, ``tests/test_compilation.py`` fails.
+Numba does; where they mean something else, ``tests/kernel/test_compilation.py`` fails.
 """
 
 from llvmlite.binding import Linkage

@@ -1,0 +1,190 @@
+"""Pick-freeze designs: indices with known answers, scipy's on the same joints, and a campaign from study to table."""
+
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.stats import sobol_indices
+from typer.testing import CliRunner
+
+from tests.analysis.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
+from tests.support import fakes, synthetic
+from tolstat import cli, joint, sampling, study
+from tolstat.analysis import pick_freeze
+from tolstat.campaign import extend as combine
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
+from tolstat.common.errors import InputError
+from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.questions.causes import query as causes
+from tolstat.store import ResultStore
+from tolstat.study.rewriting import with_keys
+
+SEEDS = 500
+LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+
+
+def ishigami(x):
+    return np.sin(x[..., 0]) + 7.0 * np.sin(x[..., 1]) ** 2 + 0.1 * x[..., 2] ** 4 * np.sin(x[..., 0])
+
+
+def design(n, rng):
+    a, b = rng.uniform(-np.pi, np.pi, (2, n, 3))
+    ab = np.stack([np.where(np.arange(3) == i, b, a) for i in range(3)], axis=1)
+    return ishigami(a), ishigami(b), ishigami(ab)
+
+
+def test_indices_of_ishigamis_function_cover_and_frozen_for_picked_does_not():
+    rng, covered, wrong = np.random.default_rng(11), [], []
+    for _ in range(SEEDS):
+        a, b, ab = design(1000, rng)
+        found = pick_freeze.indices(a, b, ab)
+        for index, truth in ((found.first, ISHIGAMI_FIRST), (found.total, ISHIGAMI_TOTAL)):
+            covered.append((index.lower <= truth) & (truth <= index.upper))
+        swapped = pick_freeze.indices(b, a, ab).first  # A in B's place: everything but the group
+        wrong.append((swapped.lower <= ISHIGAMI_FIRST) & (swapped.upper >= ISHIGAMI_FIRST))
+    first, total = np.mean(covered[::2], axis=0), np.mean(covered[1::2], axis=0)
+    assert min(*first, *total) >= LEAST
+    assert max(*first, *total) < 0.975
+    assert np.mean(wrong, axis=0).max() < LEAST
+
+
+def test_estimates_are_scipys():
+    a, b, ab = design(512, np.random.default_rng(3))
+    theirs = sobol_indices(func={"f_A": a[None], "f_B": b[None], "f_AB": ab.T[:, None]}, n=512)
+    found = pick_freeze.indices(a, b, ab)
+    np.testing.assert_allclose(found.first.estimate, theirs.first_order, rtol=1e-9)
+    np.testing.assert_allclose(found.total.estimate, theirs.total_order, rtol=1e-9)
+
+
+def test_a_joint_without_a_load_costs_only_its_own_index():
+    a, b, ab = design(200, np.random.default_rng(4))
+    lost = ab.copy()
+    lost[:20, 1] = np.nan
+    found, whole = pick_freeze.indices(a, b, lost), pick_freeze.indices(a, b, ab)
+    np.testing.assert_array_equal(found.first.estimate[[0, 2]], whole.first.estimate[[0, 2]])
+    assert found.first.estimate[1] != whole.first.estimate[1]
+    for loads, text in (
+        ((a[:49], b[:49], ab[:49]), "too few"),
+        ((a[:1].repeat(60),) * 2 + (ab[:1].repeat(60, 0) * 0 + a[0],), "scatter"),
+        ((a, b[:9], ab), "one design"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            pick_freeze.indices(*loads)
+
+
+TEXT = synthetic.STUDY.replace(
+    '"pin*.offset_t"', '"hole1.offset_t" = { std = "0.02 mm", distribution = "normal" }\n"pin*.offset_t"'
+).replace("seed = 2021", 'seed = 2021\nmethod = "pick_freeze"')
+
+
+def load(folder, text=TEXT, name="design"):
+    path = folder / f"{name}.toml"
+    path.write_text(text, encoding="utf-8")
+    return study.load(path)
+
+
+def test_rows_are_a_b_and_a_with_one_group_of_b(tmp_path):
+    plan = load(tmp_path)
+    assert [group.label for group in plan.groups] == ["hole1.offset_t", "pin*.offset_t"]
+    assert plan.rows == 1 + 60 * 4
+    errors = sampling.draw(plan)
+    pins, hole = (
+        np.column_stack([errors[n][1:] for n in group.names]).reshape(60, 4, -1) for group in reversed(plan.groups)
+    )
+    a, b, hole_of_b, pins_of_b = range(4)
+    for part, from_b in ((hole_of_b, hole), (pins_of_b, pins)):
+        for values in (pins, hole):
+            np.testing.assert_array_equal(values[:, part], values[:, b if values is from_b else a])
+    assert not np.isin(pins[:, a], pins[:, b]).any()
+    assert abs(np.corrcoef(pins[:, a].ravel(), pins[:, b].ravel())[0, 1]) < 0.2
+    # the joints A are those of a random campaign, and any slice is as drawn with the others
+    alone = sampling.draw(load(tmp_path, TEXT.replace("pick_freeze", "random"), "random"))
+    np.testing.assert_array_equal(errors[1::4], alone[1:])
+    np.testing.assert_array_equal(sampling.draw(plan, range(7, 30)), errors[7:30])
+    assert "groups" in plan.sampling.model_dump()
+    assert "groups" not in study.load(tmp_path / "random.toml").sampling.model_dump()
+
+
+def test_correlated_errors_move_together_and_each_error_by_itself(tmp_path):
+    text = TEXT.replace("[limits]", 'groups = "error"\n\n[limits]')
+    linked = '\n[[correlation]]\nbetween = ["pin1.offset_t", "pin3.offset_t"]\nrho = 0.5\n'
+    assert [len(group.names) for group in load(tmp_path, text).groups] == [1] * 5
+    found = load(tmp_path, text + linked, "linked").groups
+    assert [group.label for group in found] == [
+        "hole1.offset_t",
+        "pin1.offset_t and 1 more",
+        "pin2.offset_t",
+        "pin4.offset_t",
+    ]
+    with pytest.raises(InputError, match="groups is given with 'random'"):
+        load(tmp_path, text.replace("pick_freeze", "random"), "wrong")
+
+
+def simulate(params, options, histories="none", n_harmonics=16):
+    """Stand-in for the solver: a load of two tolerances, and of their product."""
+    results = np.zeros(len(params), RESULT)
+    results["status"], results["settled"] = Status.OK, 1
+    pin = params["pin_point"][:, :, 1].sum(axis=1) * 1e5
+    hole = params["hole_point"][:, 0, 1] * 1e5
+    results["F_max"][:, 0] = 600.0 + pin + 2.0 * hole + 0.3 * pin * hole
+    return Simulation(results, {})
+
+
+STAGES = campaign.Stages(
+    sampling.draw_blocks, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, fakes.warm_up
+)
+
+
+def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = partial(campaign.run, stages=STAGES)
+    monkeypatch.setattr(campaign, "run", lambda *a, **k: run(*a, **k | {"execution": Execution("serial", 1)}))
+    load(tmp_path, TEXT.replace('\nmethod = "pick_freeze"', ""))
+    command = ["causes", "design.toml", "--pick-freeze", "150", "--workers", "1"]
+    done = CliRunner().invoke(cli.app, command)
+    assert done.exit_code == 0, done.stderr
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert "601 joints" in done.stderr
+    assert "from a pick-freeze design" in done.stderr
+    assert "in all" in done.stdout
+    assert "rank" not in done.stdout
+    with ResultStore.open("design_causes.h5") as store:
+        table = causes.of_store(store, "cross1.F").table.set_index("error")
+    assert {row[0] for row in lines[1:]} == set(table.index)
+    # pin and hole are normal with these deviations: y = pin + 2 hole + 0.3 pin hole
+    pin = np.sqrt(4) * 1e-4 / 3 * 1e5
+    hole = 2e-5 * 1e5
+    parts = np.array([pin**2, 4 * hole**2, 0.09 * pin**2 * hole**2])
+    shares = parts / parts.sum()
+    for name, first, total in (
+        ("pin*.offset_t", shares[0], shares[0] + shares[2]),
+        ("hole1.offset_t", shares[1], shares[1] + shares[2]),
+    ):
+        row = table.loc[name]
+        for index, truth in (("first", first), ("total", total)):  # within four standard errors
+            assert abs(row[index] - truth) < row[f"{index}_upper"] - row[f"{index}_lower"]
+        assert row["first_upper"] - row["first_lower"] < 0.6
+    found = json.loads(CliRunner().invoke(cli.app, ["causes", "design_causes.h5", "--json"]).stdout)
+    assert found["r2"] is None
+    assert len(found["table"]) == 2
+    wider = combine.extend(tmp_path / "design_causes.h5", 160)
+    assert wider.rows == 1 + 160 * 4
+
+
+def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):
+    path = synthetic.store(tmp_path, TEXT.replace("n = 60", "n = 20"), "few")
+    for arguments, text in (
+        ((path,), "run 50 points or more"),
+        ((path, "--out", "x.h5"), "add --pick-freeze"),
+        ((path, "--pick-freeze", 100), "is not UTF-8"),
+    ):
+        done = CliRunner().invoke(cli.app, ["causes", *map(str, arguments)])
+        assert done.exit_code == 2, text
+        assert text in done.stderr
+    done = CliRunner().invoke(cli.app, ["allocate", str(path), "--limit", "P(cross1.F > 700 N) < 0.1"])
+    assert done.exit_code == 2
+    assert "share their errors" in done.stderr
+    with pytest.raises(InputError, match="cannot be changed in place"):
+        with_keys("sampling = { n = 3 }\n", "sampling", {"n": 4}, "study.toml")

@@ -1,0 +1,399 @@
+"""Campaigns: the same bytes however they are run, stopped or killed; clear words when they cannot go on."""
+
+from __future__ import annotations
+
+import io
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from functools import partial
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.support import fakes
+from tests.support.synthetic import HEAD
+from tolstat import joint
+from tolstat import study as studies
+from tolstat.campaign import blocks as execution
+from tolstat.campaign import progress, signals
+from tolstat.campaign import run as campaign
+from tolstat.common import tables
+from tolstat.common.errors import InputError, StoreError
+from tolstat.solver import simulation
+from tolstat.store import Counts, ResultStore
+
+
+def datasets(path: Path) -> dict[str, bytes]:
+    """Bytes of every dataset of a result file."""
+    found: dict[str, bytes] = {}
+
+    def take(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset):
+            found[name] = item[...].tobytes()
+
+    with h5py.File(path, "r") as file:
+        file.visititems(take)
+    return found
+
+
+@pytest.fixture(scope="module", params=["none", "full"])
+def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
+    """Run a study in one go with one worker; gives it and the datasets of its campaign."""
+    study = fakes.Study(output=fakes.Output(request.param))
+    path = tmp_path_factory.mktemp("reference") / "a.h5"
+    counts = campaign.run(study, path, workers=1, stages=fakes.stages())
+    assert counts == Counts(total=40, done=40, not_settled=4, failed=4)
+    expected = datasets(path)
+    assert ("histories/loads" in expected) == (request.param == "full")
+    return study, expected
+
+
+@pytest.mark.parametrize(("workers", "block"), [(1, 1), (1, 7), (1, 40), (1, 1000), (2, None), (2, 3), (3, 1)])
+def test_workers_and_blocks_change_no_byte(tmp_path: Path, reference, workers: int, block: int | None) -> None:
+    study, expected = reference
+    campaign.run(study, tmp_path / "a.h5", workers, block, stages=fakes.stages())
+    assert datasets(tmp_path / "a.h5") == expected
+    assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
+
+
+def test_order_of_blocks_changes_no_byte(tmp_path: Path, reference, monkeypatch: pytest.MonkeyPatch) -> None:
+    study, expected = reference
+    blocks = execution._blocks
+    monkeypatch.setattr(execution, "_blocks", lambda *args: reversed(list(blocks(*args))))
+    campaign.run(study, tmp_path / "a.h5", 1, 3, stages=fakes.stages())
+    assert datasets(tmp_path / "a.h5") == expected
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_interrupted_in_progress_and_resumed(tmp_path: Path, reference, workers: int) -> None:
+    study, expected = reference
+    path = tmp_path / "a.h5"
+
+    def interrupt(counts: Counts) -> None:
+        if counts.done >= 12:
+            raise KeyboardInterrupt
+
+    with pytest.raises(campaign.Interrupted, match="run the same command to go on") as caught:
+        campaign.run(study, path, workers, 4, progress=interrupt, stages=fakes.stages())
+    assert caught.value.counts.done == 12
+    assert caught.value.path == path
+    with ResultStore.open(path) as store:
+        assert store.pending().size == 28
+    campaign.run(study, path, 3 - workers, 5, stages=fakes.stages())
+    assert datasets(path) == expected
+
+
+def test_resume_simulates_pending_rows_only(tmp_path: Path) -> None:
+    study, path = fakes.Study(), tmp_path / "a.h5"
+    simulated: list[int] = []
+
+    def count(params: np.ndarray, options: object, **rest: object) -> object:
+        simulated.append(len(params))
+        return fakes.simulate(params, fakes.Options(), "none", 0)
+
+    def interrupt(counts: Counts) -> None:
+        if counts.done >= 15:
+            raise KeyboardInterrupt
+
+    with pytest.raises(campaign.Interrupted):
+        campaign.run(study, path, 1, 5, progress=interrupt, stages=fakes.stages(count))
+    campaign.run(study, path, 1, 5, stages=fakes.stages(count), check=False)
+    assert sum(simulated) == 40
+    before = path.read_bytes()
+    assert campaign.run(study, path, 1, stages=fakes.stages(count), check=False).done == 40
+    assert sum(simulated) == 40
+    assert path.read_bytes() == before
+    for _ in range(2):  # the checks at the end are made once
+        campaign.run(study, path, 1, stages=fakes.stages(count))
+        assert simulated[-3:] == [1, 1, 1]
+        assert sum(simulated) == 43
+
+
+def test_progress_hears_the_start_and_every_block(tmp_path: Path) -> None:
+    heard: list[Counts] = []
+    campaign.run(fakes.Study(), tmp_path / "a.h5", 2, 8, progress=heard.append, stages=fakes.stages())
+    assert [counts.done for counts in heard] == [0, 8, 16, 24, 32, 40]
+    assert heard[-1] == Counts(40, 40, 4, 4)
+
+
+def test_the_kernel_is_compiled_before_there_are_workers(tmp_path: Path) -> None:
+    calls: list[str] = []
+    stages = fakes.stages()._replace(warm_up=partial(calls.append, "warm"))
+    campaign.run(fakes.Study(), tmp_path / "a.h5", 2, progress=lambda c: calls.append("block"), stages=stages)
+    assert calls[:2] == ["block", "warm"]
+    assert calls.count("warm") == 1
+
+
+def start(
+    path: Path, workers: int, block: int, seconds: float, histories: str = "none", n: int = 40
+) -> subprocess.Popen[str]:
+    """Start a slow campaign in another process; returns when its first block is in the file."""
+    arguments = (str(path), workers, block, seconds, histories, n)
+    python = [
+        sys.executable,
+        "-c",
+        f"from tests.support import fakes\nif __name__ == '__main__': fakes.main{arguments!r}",
+    ]
+    # A session of its own, as a job of a shell is: an interrupt goes to the workers, too.
+    process = subprocess.Popen(
+        python, env=fakes.environment(), stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "go\n"
+    return process
+
+
+@pytest.mark.parametrize(("workers", "number"), [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGTERM)])
+def test_a_request_to_stop_keeps_finished_blocks(tmp_path: Path, workers: int, number: signal.Signals) -> None:
+    path = tmp_path / "a.h5"
+    process = start(path, workers, block=2, seconds=0.05)
+    signal_group(process, number)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    with ResultStore.open(path) as store:
+        counts = store.counts()
+    assert said == f"stopped: {counts.done} of 40 joints are kept in {path}\n  hint: run the same command to go on\n"
+    assert 2 <= counts.done < 40
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    campaign.run(fakes.Study(), tmp_path / "b.h5", 1, stages=fakes.stages())
+    assert datasets(path) == datasets(tmp_path / "b.h5")
+
+
+def test_second_ctrl_c_waits_for_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    process = start(path, workers=2, block=1, seconds=0.4)
+    deadline = time.monotonic() + 60
+    while process.poll() is None:
+        assert time.monotonic() < deadline
+        signal_group(process, signal.SIGINT)
+        time.sleep(0.1)
+    assert process.returncode in (130, -signal.SIGINT)  # the last one may hit Python's own end
+    with ResultStore.open(path, "r+") as store:
+        assert 1 <= store.counts().done < 40
+
+
+def signal_group(process: subprocess.Popen[str], number: signal.Signals) -> None:
+    os.killpg(process.pid, number)
+
+
+@pytest.fixture(scope="module", params=["none", "full"])
+def long_reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
+    """Run a study of many joints; gives it and its datasets."""
+    study = fakes.Study(n=300, output=fakes.Output(request.param))
+    path = tmp_path_factory.mktemp("reference") / "a.h5"
+    campaign.run(study, path, 1, stages=fakes.stages())
+    return study, datasets(path)
+
+
+@pytest.mark.parametrize("moment", range(4))
+def test_kill_loses_at_most_the_blocks_in_work(tmp_path: Path, long_reference, moment: int) -> None:
+    study, expected = long_reference
+    path, workers, block = tmp_path / "a.h5", 1 + moment % 2, 2 + moment
+    process = start(path, workers, block, seconds=0.005, histories=study.output.histories, n=study.n)
+    time.sleep(random.Random(moment).uniform(0, 0.3))
+    process.kill()
+    process.communicate()
+    with ResultStore.open(path, "r+") as store:
+        done = np.flatnonzero(store.status())
+        results = store.results()
+    assert block <= done.size < study.n
+    kept = {name: np.frombuffer(expected[f"results/{name}"]) for name in ("cross1.F_max", "psi_max")}
+    np.testing.assert_array_equal(results["F_max"][done, 0], kept["cross1.F_max"][done])
+    np.testing.assert_array_equal(results["psi_max"][done], kept["psi_max"][done])
+    # Blocks are begun in the order of the rows: what is missing below the last one done was in work.
+    assert np.setdiff1d(np.arange(done.max()), done).size <= 2 * workers * block
+    campaign.run(study, path, 1, stages=fakes.stages())
+    assert datasets(path) == expected
+
+
+@pytest.mark.parametrize("step", ["gather_into", "remove"])
+def test_stopped_while_histories_are_taken_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
+    study, path = fakes.Study(output=fakes.Output("full")), tmp_path / "a.h5"
+    campaign.run(study, tmp_path / "b.h5", 1, stages=fakes.stages())
+
+    def interrupt(*args: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"tolstat.store.histories.HistoryParts.{step}", interrupt)
+        with pytest.raises(campaign.Interrupted, match="40 of 40"):
+            campaign.run(study, path, 1, stages=fakes.stages())
+    campaign.run(study, path, 1, stages=fakes.stages())
+    assert datasets(path) == datasets(tmp_path / "b.h5")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "b.h5"]
+
+
+def test_another_study_is_refused_with_the_keys(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    before = path.read_bytes()
+    other = fakes.Study(seed=8, solver=fakes.Solver(60), limits={}, text="# another comment")
+    with pytest.raises(StoreError) as caught:
+        campaign.run(other, path, 1, stages=fakes.stages())
+    assert str(caught.value) == (
+        f"{path}: is the result file of another study\n"
+        "    sampling.seed: 7 in the file, 8 in the study\n"
+        "    solver.steps_per_rev: 30 in the file, 60 in the study\n"
+        "  hint: use another --out, or delete the file"
+    )
+    assert path.read_bytes() == before
+
+
+def test_edited_limits_are_taken_over_and_nothing_is_simulated_again(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    before, stages = datasets(path), fakes.stages(fakes.simulate_and_raise)
+    same = fakes.Study(limits={"fork1.T": 40.0}, text="# another comment", name="moved")
+    assert campaign.run(same, path, 1, stages=stages).done == 40
+    with ResultStore.open(path) as store:
+        assert (store.limits, store.study_text, store.study_name) == ({"fork1.T": 40.0}, "# another comment", "moved")
+    assert datasets(path) == before
+
+
+def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+    monkeypatch.setattr("tolstat.__version__", "99.0")
+    with pytest.raises(StoreError, match=r"tolstat: version .* in the file, 99.0 now"):
+        campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+
+
+def test_differing_keys_names_missing_ones() -> None:
+    lines = campaign.differing_keys({"a": 1, "b": [1, 2], "c": 3}, {"b": [1, 2], "c": 4, "d": None})
+    assert lines == [
+        "a: 1 in the file, nothing in the study",
+        "c: 3 in the file, 4 in the study",
+        "d: nothing in the file, None in the study",
+    ]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_bug_in_every_joint_comes_through(tmp_path: Path, workers: int) -> None:
+    with pytest.raises(ZeroDivisionError):
+        campaign.run(fakes.Study(), tmp_path / "a.h5", workers, 2, stages=fakes.stages(fakes.simulate_and_raise))
+    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+
+
+def test_runs_outside_the_main_thread(tmp_path: Path) -> None:
+    done: list[Counts] = []
+
+    def run() -> None:
+        done.append(campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages()))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert done[0].done == 40
+
+
+def test_signals_mean_the_same_as_before_afterwards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = [signal.getsignal(number) for number in signals.CAUGHT]
+    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+    assert [signal.getsignal(number) for number in signals.CAUGHT] == before
+    with pytest.raises(KeyboardInterrupt), signals.caught():
+        signal.raise_signal(signal.SIGTERM)
+    assert [signal.getsignal(number) for number in signals.CAUGHT] == before
+
+
+def test_an_ignored_hang_up_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with signals.caught() as stop, stop.patiently():
+            signal.raise_signal(signal.SIGHUP)
+            assert not stop()
+            signal.raise_signal(signal.SIGTERM)
+            assert stop()
+            assert stop.number == signal.SIGTERM
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_workers_and_block_must_be_positive(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        campaign.run(fakes.Study(), tmp_path / "a.h5", workers=0, block=-1, stages=fakes.stages())
+    assert [fault.place for fault in caught.value.faults] == ["workers", "block"]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("n", "workers"), [(1, 1), (1, 2), (513, 2), (100_000, 64), (9, 3)])
+def test_default_block(n: int, workers: int) -> None:
+    size = execution.default_block(n, workers)
+    assert 1 <= size <= execution.MAX_BLOCK
+    assert size == 1 or n // size >= execution.BLOCKS_PER_WORKER * workers
+
+
+REAL_STUDY = (
+    HEAD
+    + """[solver]
+steps_per_rev = 60
+[tolerances]
+"pin*.offset_t" = { plus_minus = "0.05 mm", distribution = "normal", cpk = 1.0 }
+"hole*.tilt_z" = { plus_minus = "0.3 deg", distribution = "uniform" }
+[sampling]
+n = 6
+seed = 3
+[output]
+histories = "KIND"
+"""
+)
+
+
+@pytest.mark.parametrize("kind", ["full", "harmonics", "harmonics+cycles"])
+def test_real_joints_give_the_same_bytes(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "real.toml").write_text(REAL_STUDY.replace("KIND", kind))
+    plan = studies.load(tmp_path / "real.toml")
+    for name, workers, block in (("a", 1, 7), ("b", 2, 2)):
+        counts = campaign.run(plan, tmp_path / f"{name}.h5", workers, block)
+        assert counts.done == 7
+    assert datasets(tmp_path / "a.h5") == datasets(tmp_path / "b.h5")
+    with ResultStore.open(tmp_path / "a.h5") as store:
+        # A row can be run again from the file alone, in any company.
+        again = simulation.simulate_rows(
+            joint.perturb(plan.joint, store.errors()[[4, 2]]),
+            plan.solver.options(),
+            kind,
+            plan.output.harmonics,
+        )
+        results = store.results()[[4, 2]]
+        for name in tables.RESULT.names or ():
+            np.testing.assert_array_equal(results[name], again.results[name])
+        for name in store.history_specs:
+            np.testing.assert_array_equal(store.histories(name, np.array([4, 2])), again.histories[name])
+
+
+def test_progress_lines_once_a_minute() -> None:
+    now, out = [0.0], io.StringIO()
+    with progress.Lines(out, clock=lambda: now[0]) as lines:
+        for second, done in ((0, 12), (20, 32), (61, 73), (90, 80), (122, 90)):
+            now[0] = second
+            lines(Counts(100, done, 1, 2))
+        now[0] = 125
+        lines(Counts(100, 100, 1, 3))
+    assert out.getvalue().splitlines() == [
+        "tolstat: 73 of 100 joints, 1 joints/s, 0:27 to go, 2 failed, 1 not settled",
+        "tolstat: 90 of 100 joints, 0.639 joints/s, 0:16 to go, 2 failed, 1 not settled",
+        "tolstat: 100 of 100 joints, 0.704 joints/s, 0:00 to go, 3 failed, 1 not settled",
+    ]
+
+
+def test_progress_text_before_the_first_joint() -> None:
+    text = progress.text(Counts(513, 100, 0, 0), begun=100, seconds=0.0)
+    assert text == "100 of 513 joints, 0 failed, 0 not settled"
+    assert progress.text(Counts(513, 100, 4, 0, 3), 100, 0.0).endswith(", 0 failed, 4 not settled, 3 not resolved")
+    assert "2:00:00 to go" in progress.text(Counts(7201, 1, 0, 0), begun=0, seconds=1.0)
+
+
+def test_progress_bar_goes_to_stderr(capfd: pytest.CaptureFixture[str]) -> None:
+    with progress.Bar() as bar:
+        bar(Counts(10, 0, 0, 0))
+        bar(Counts(10, 10, 1, 0))
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert "10 of 10 joints" in err
+    assert isinstance(progress.reporter(), progress.Lines)

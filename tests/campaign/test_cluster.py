@@ -1,0 +1,116 @@
+"""Campaigns on a Dask cluster: real scheduler and workers on this machine, one of which is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from tests.campaign.test_campaign import datasets
+from tests.support import fakes
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
+from tolstat.campaign.executors import Work
+from tolstat.common.errors import InputError
+from tolstat.common.tables import Status
+from tolstat.store import Counts, ResultStore
+
+pytest.importorskip("distributed")
+
+from tolstat.campaign.executors.cluster import check, map_on_cluster
+
+
+class Cluster(NamedTuple):
+    """A scheduler and two workers."""
+
+    address: str
+    workers: list[subprocess.Popen[bytes]]
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    """Start ``dask scheduler`` and two ``dask worker``."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    dask = [sys.executable, "-m", "dask"]
+    place = {"env": fakes.environment(), "cwd": tmp_path, "stderr": subprocess.DEVNULL}
+    options = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    scheduler = subprocess.Popen([*dask, "scheduler", *options], **place)
+    options = ["--nthreads", "1", "--no-dashboard", "--no-nanny"]
+    workers = [subprocess.Popen([*dask, "worker", address, *options], **place) for _ in range(2)]
+    yield Cluster(address, workers)
+    for process in (*workers, scheduler):
+        process.kill()
+        process.wait()
+
+
+def reference(path: Path) -> dict[str, bytes]:
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    return datasets(path)
+
+
+def test_a_killed_dask_worker_changes_no_byte(tmp_path: Path, cluster: Cluster) -> None:
+    path = tmp_path / "a.h5"
+
+    def kill(counts: Counts) -> None:
+        if counts.done == 10:
+            cluster.workers[0].kill()
+
+    stages = fakes.stages(partial(fakes.simulate, seconds=0.02))
+    execution = Execution("dask", block=2, scheduler=cluster.address)
+    counts = campaign.run(fakes.Study(), path, stages=stages, execution=execution, progress=kill)
+    assert counts.done == 40
+    assert cluster.workers[0].poll() == -signal.SIGKILL
+    assert datasets(path) == reference(tmp_path / "b.h5")
+
+
+def test_a_cluster_of_this_machine_finds_bad_joints(tmp_path: Path) -> None:
+    study, path = fakes.Study(), tmp_path / "a.h5"
+    values = fakes.draw(study)["pin1.offset_t"]
+    bad = fakes.stages(partial(fakes.simulate_badly, kills=values[17], hangs=values[30]))
+    execution = Execution("dask", workers=2, block=5, joint_timeout=1.0)
+    assert campaign.run(study, path, stages=bad, execution=execution).done == 40
+    with ResultStore.open(path) as store:
+        assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
+
+
+def test_other_versions_are_refused() -> None:
+    with pytest.raises(InputError, match=r"a worker has other versions\n    numba: 1 here, 2 there\n  hint: install"):
+        check({"numpy": "1", "numba": "1"}, {"numpy": "1", "numba": "2"}, "a worker")
+    check({"numpy": "1"}, {"numpy": "1", "scipy": "3"}, "a worker")
+
+
+def test_a_worker_with_other_versions_is_refused(cluster: Cluster) -> None:
+    with pytest.raises(InputError, match=r"the worker tcp.* has other versions\n    process: \d+ here, \d+ there"):
+        list(map_on_cluster(Work(abs), range(9), cluster.address, 2, process_number))
+
+
+def process_number() -> dict[str, str]:
+    return {"process": str(os.getpid())}
+
+
+def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tolstat.campaign.executors.cluster.CONNECT_S", 0.5)
+    with pytest.raises(InputError, match=r"--scheduler: tcp://127.0.0.1:1 does not answer"):
+        list(map_on_cluster(Work(abs), range(9), "tcp://127.0.0.1:1", 2, process_number))
+
+
+def test_stop_finishes_what_is_begun(cluster: Cluster) -> None:
+    seen: list[int] = []
+    begin = time.monotonic()
+    for block, result in map_on_cluster(Work(abs), iter(range(10**6)), cluster.address, 2, dict, lambda: len(seen) > 9):
+        seen.append(block)
+        assert result == block
+    assert 10 <= len(seen) < 40
+    assert time.monotonic() - begin < 60

@@ -1,0 +1,238 @@
+"""Campaigns that grow and campaigns put together: the same bytes as one run from the start, or a refusal that helps."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.campaign.test_campaign import datasets
+from tests.support import fakes, synthetic
+from tolstat import cli, joint, sampling
+from tolstat import study as studies
+from tolstat.campaign import extend as combine
+from tolstat.campaign import run as campaign
+from tolstat.common import tables
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Options, Simulation, Status
+from tolstat.store import ResultStore
+from tolstat.study import Study
+
+KINDS = ("none", "full")
+BODY = synthetic.STUDY.replace("[limits]", '[output]\nhistories = "KIND"\n[limits]')
+Make = Callable[..., Study]
+
+
+def simulate(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+    """Stand-in for the solver: numbers that depend on the joint's own errors."""
+    params = params.copy()
+    params["R"] = params["pin_point"].sum(axis=(1, 2)) * 1e4
+    return fakes.simulate(params, options, histories, n_harmonics)
+
+
+STAGES = campaign.Stages(
+    *(sampling.draw_blocks, sampling.dimensions, joint.perturb, fakes.history_specs, simulate, fakes.warm_up)
+)
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Make:
+    def made(n: int, method: str = "random", kind: str = "none", seed: int = 2021) -> Study:
+        path = tmp_path / "small.toml"
+        body = BODY.replace("n = 60", f'n = {n}\nmethod = "{method}"').replace("KIND", kind)
+        path.write_text(body.replace("seed = 2021", f"seed = {seed}"), encoding="utf-8")
+        return studies.load(path)
+
+    return made
+
+
+def run(study: Study, path: Path, check: bool = False, **choices: object) -> Path:
+    """Without checks of the numerical error, which slices and what is put together of them do not have."""
+    campaign.run(study, path, 1, stages=STAGES, check=check, **choices)
+    return path
+
+
+def slices(study: Study, folder: Path, *edges: int) -> list[Path]:
+    """Result files of the rows between neighbouring edges."""
+    return [run(study, folder / f"{a}-{b}.h5", rows=range(a, b)) for a, b in pairwise(edges)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("method", ["random", "sobol"])
+def test_an_extended_campaign_is_one_of_that_size(tmp_path: Path, make: Make, method: str, kind: str) -> None:
+    whole = run(make(101, method, kind), tmp_path / "whole.h5")
+    grown = run(make(40, method, kind), tmp_path / "grown.h5")
+    before = datasets(grown)
+    for n in (41, 101):  # more than once, too
+        study = combine.extend(grown, n)
+        run(study, grown)
+    assert datasets(grown) == datasets(whole)
+    assert ("histories/loads" in before) == (kind == "full")
+    with h5py.File(grown) as a, h5py.File(whole) as b:
+        for name in set(b.attrs) - {"study", "created", "digest"}:
+            assert a.attrs[name] == b.attrs[name], name
+    assert not list(tmp_path.glob("*.parts"))
+
+
+def test_a_kill_while_extending_leaves_the_old_file(
+    tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = run(make(40, kind="full"), tmp_path / "a.h5")
+    before = path.read_bytes()
+
+    def killed(*args: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("os.replace", killed)
+        with pytest.raises(KeyboardInterrupt):
+            combine.extend(path, 60)
+    assert path.read_bytes() == before
+    run(combine.extend(path, 60), path)
+    assert datasets(path) == datasets(run(make(60, kind="full"), tmp_path / "b.h5"))
+
+
+@pytest.mark.parametrize(
+    ("method", "n", "message"),
+    [
+        ("lhs", 80, "cannot be extended: a Latin hypercube has as many strata as joints"),
+        ("random", 40, "has 40 joints already\n  hint: give --n more than 40"),
+    ],
+)
+def test_what_cannot_grow_is_refused(tmp_path: Path, make: Make, method: str, n: int, message: str) -> None:
+    path = run(make(40, method), tmp_path / "a.h5")
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=message):
+        combine.extend(path, n)
+    assert path.read_bytes() == before
+
+
+def test_slices_and_changed_studies_do_not_grow(tmp_path: Path, make: Make) -> None:
+    (part,) = slices(make(40), tmp_path, 5, 20)
+    with pytest.raises(InputError, match="holds rows 5:20 of a campaign only\n  hint: merge"):
+        combine.extend(part, 80)
+    whole = run(make(40), tmp_path / "a.h5")
+    make(40, seed=3)
+    changed = "its study is not as it was when the file was made\n    sampling.seed: 2021 in the file, 3 in the study"
+    with pytest.raises(StoreError, match=changed):
+        combine.extend(whole, 80, tmp_path / "small.toml")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("method", ["random", "sobol", "lhs"])
+def test_merged_slices_are_one_run(tmp_path: Path, make: Make, method: str, kind: str) -> None:
+    study = make(60, method, kind)
+    parts = slices(study, tmp_path, 0, 1, 20, 44, 61)
+    assert len(datasets(parts[2])["row"]) == 24 * 8
+    merged = combine.merge(parts[::-1], tmp_path / "c.h5")
+    whole = run(study, tmp_path / "whole.h5")
+    assert datasets(tmp_path / "c.h5") == datasets(whole)
+    assert (merged.counts.done, merged.twice) == (61, 0)
+    with h5py.File(tmp_path / "c.h5") as a, h5py.File(whole) as b:
+        assert {k: v for k, v in a.attrs.items() if k not in ("created", "digest")} == {
+            k: v for k, v in b.attrs.items() if k not in ("created", "digest")
+        }
+    assert run(study, tmp_path / "c.h5").read_bytes() == (tmp_path / "c.h5").read_bytes()
+
+
+def test_equal_overlaps_are_merged_and_different_ones_refused(tmp_path: Path, make: Make) -> None:
+    study = make(60)
+    parts = slices(study, tmp_path, 0, 30, 61) + slices(study, tmp_path, 10, 40)
+    assert combine.merge(parts, tmp_path / "c.h5").twice == 30
+    assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
+    with ResultStore.open(parts[2], "r+") as store:
+        results = store.results(slice(7, 8))
+        results["T_max"][0, 1] += 1e-13
+        store.write(np.array([7]), Simulation(results, {}))
+    with pytest.raises(InputError, match=r"0-30.h5 and .*10-40.h5: hold different results of row 17: cross2.T_max"):
+        combine.merge(parts, tmp_path / "d.h5")
+    assert not (tmp_path / "d.h5").exists()
+
+
+def test_gaps_and_strangers_are_told_together(tmp_path: Path, make: Make) -> None:
+    other = slices(make(60, seed=4), tmp_path, 20, 22)
+    parts = slices(make(60), tmp_path, 0, 5) + slices(make(60), tmp_path, 30, 50) + other
+    with pytest.raises(InputError) as caught:
+        combine.merge(parts, tmp_path / "c.h5")
+    text = str(caught.value)
+    assert "20-22.h5: is not of the campaign of" in text
+    assert "sampling.seed: 4 in the file, 2021 there" in text
+    assert (
+        "no file holds rows 5:20, 22:30, 50:61 of 61\n  hint: compute each, with: tolstat run STUDY --rows 5:20" in text
+    )
+    assert not (tmp_path / "c.h5").exists()
+    (tmp_path / "c.h5").touch()
+    with pytest.raises(StoreError, match="exists already"):
+        combine.merge(parts, tmp_path / "c.h5")
+
+
+def test_pending_rows_stay_pending_and_can_be_done_later(tmp_path: Path, make: Make) -> None:
+    study = make(60)
+    parts = slices(study, tmp_path, 0, 30, 61)
+    with h5py.File(parts[1], "r+") as file:
+        file["results/status"][3:9] = Status.PENDING
+    assert combine.merge(parts, tmp_path / "c.h5").counts.done == 55
+    run(study, tmp_path / "c.h5")
+    assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
+
+
+def test_slices_are_refused_where_they_do_not_fit(tmp_path: Path, make: Make) -> None:
+    study = make(60)
+    for rows in (range(0), range(-1, 4), range(50, 62), range(0, 10, 2)):
+        with pytest.raises(InputError, match="are no rows of the 61 that the study has"):
+            run(study, tmp_path / "a.h5", rows=rows)
+    (part,) = slices(study, tmp_path, 5, 20)
+    with pytest.raises(StoreError, match="holds rows 5:20, not 0:61\n  hint: give --rows 5:20"):
+        run(study, part)
+
+
+def test_rows_of_a_slice_are_those_of_the_campaign(tmp_path: Path, make: Make) -> None:
+
+    study = make(60)
+    (part,) = slices(study, tmp_path, 5, 20)
+    with ResultStore.open(part) as store:
+        assert (store.rows, store.n, store.campaign_rows, store.whole) == (range(5, 20), 15, 61, False)
+        assert store.to_pandas().index.tolist() == list(range(5, 20))
+        assert store.errors().tobytes() == sampling.draw(study)[5:20].tobytes()
+
+
+def test_commands(tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    study, own = make(60), campaign.run
+    monkeypatch.setattr(campaign, "run", lambda *args, **rest: own(*args, **rest | {"stages": STAGES}))
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: str, code: int = 0) -> str:
+        done = CliRunner().invoke(cli.app, words)
+        assert done.exit_code == code, done.output
+        assert done.stdout == ""
+        return done.stderr
+
+    for rows in ("0:20", "20:61"):
+        call("run", "small.toml", "--rows", rows, "--out", f"{rows[:2]}.h5", "--workers", "1", "--no-report")
+    assert "61 joints" in call("merge", "0:.h5", "20.h5", "--out", "c.h5")
+    assert "extended to 80 joints" in call("extend", "c.h5", "--n", "80", "--no-report", "--workers", "1")
+    whole = run(studies.load(study.path, n=80), tmp_path / "whole.h5", check=True)
+    assert datasets(tmp_path / "c.h5") == datasets(whole)
+    assert "hint: write --rows 5000:10000" in call("run", "small.toml", "--rows", "7:5", code=2)
+    assert "is not there" in call("merge", "x.h5", "--out", "d.h5", code=2)
+
+
+def test_large_campaigns_need_no_more_memory(tmp_path: Path) -> None:
+    """A smaller count of ``python -m tests.measure.scale 10000000 FOLDER``: tables are nowhere held whole."""
+    measured = []
+    for n in (70_000, 150_000):
+        python = [sys.executable, "-m", "tests.measure.scale", str(n), str(tmp_path)]
+        told = subprocess.run(python, capture_output=True, text=True, check=True, env=fakes.environment()).stdout
+        measured.append(json.loads(told))
+    growth = 1e6 * (measured[1]["parent_MB_at_most"] - measured[0]["parent_MB_at_most"])
+    whole = 80_000 * (tables.ERROR.itemsize + tables.RESULT.itemsize)
+    assert growth < 0.3 * whole
+    assert measured[1]["file_bytes_a_row"] < 1250

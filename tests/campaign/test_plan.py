@@ -1,0 +1,264 @@
+"""Planning a campaign, and stopping it when an exceedance is known well enough: coverage by simulation."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.campaign.test_campaign import datasets
+from tests.support import fakes, synthetic
+from tests.support.synthetic import HEAD
+from tolstat import cli, report, study
+from tolstat.analysis import exceedance, quantile
+from tolstat.campaign import plan
+from tolstat.campaign import run as campaign
+from tolstat.campaign import stop_rule as precision
+from tolstat.common.errors import InputError
+from tolstat.common.tables import Status
+from tolstat.store import ResultStore, view
+
+RULE = "P(cross1.F > 0.5 N) width < 0.4"
+"""Nearly one in five of the fake joints is unresolved, and counts at both ends of the interval."""
+
+
+def test_a_rule_is_read() -> None:
+    assert precision.parse("P(cross1.F > 0.7 kN) width < 0.002")[1:] == ("cross1.F", 700.0, 0.002)
+    assert precision.parse(" P( psi>1e-3 )width<0.5 ")[1:] == ("psi", 1e-3, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("often", ["'often' is no rule", 'write --until "P(cross1.F > 700 N) width < 0.01"']),
+        ("P(cros1.F > 700 N) width < 2", ["did you mean 'cross1.F'?", "width 2 does not lie between 0 and 1"]),
+        ("P(cross1.F > 700 mm) width < few", ["'700 mm' cannot be a value in N", "width few does not"]),
+        ("P(fork1.T > 40) width < 0.1", ["'40' has no unit"]),
+    ],
+)
+def test_faults_of_a_rule_are_told_together(text: str, words: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        precision.parse(text)
+    assert all(word in str(caught.value) for word in words), caught.value
+
+
+def test_looks_begin_where_one_can_suffice() -> None:
+    assert precision.looks(0.002, 100_000) == [1843, 3686, 7372, 14744, 29488, 58976, 100_000]
+    _, upper = exceedance.clopper_pearson([0, 0], [1842, 1843])
+    assert upper[0] > 0.002 > upper[1]
+    assert precision.looks(0.1, 20) == [20]
+    assert precision.looks(0.1, 10**6) == [36, 72, 144, 288, 576, 1152, 2304, 4608, 10**6]
+    assert precision.each(5) == pytest.approx(0.99)
+
+
+def missed(p: float, width: float, planned: list[int], confidence: float, runs: int = 20_000) -> float:
+    """Share of campaigns that stop with an interval which does not hold `p`, the true exceedance."""
+    rng = np.random.default_rng(5)
+    above = np.cumsum(rng.binomial(np.diff([0, *planned]), p, (runs, len(planned))), axis=1)
+    lower, upper = exceedance.clopper_pearson(above, planned, confidence)
+    narrow = upper - lower < width
+    at = np.where(narrow.any(axis=1), narrow.argmax(axis=1), len(planned) - 1)
+    every = np.arange(runs)
+    return float(np.mean((lower[every, at] > p) | (upper[every, at] < p)))
+
+
+@pytest.mark.parametrize("p", [0.001, 0.01, 0.1, 0.5])
+@pytest.mark.parametrize("width", [0.1, 0.01])
+def test_the_interval_of_a_stopped_campaign_covers(p: float, width: float) -> None:
+    """Misses stay below 5 %, here with three standard errors to spare."""
+    planned = precision.looks(width, 100_000)
+    assert missed(p, width, planned, precision.each(len(planned))) < 0.05 - 3 * np.sqrt(0.05 / 20_000)
+
+
+def test_an_interval_that_is_not_corrected_misses_too_often() -> None:
+    planned = precision.looks(0.01, 100_000)
+    assert missed(0.01, 0.01, planned, precision.CONFIDENCE) > 0.07
+
+
+def test_unresolved_joints_count_both_ways() -> None:
+    lower, upper = precision.interval(10, 5, 100, 1)
+    assert lower == exceedance.clopper_pearson(10, 100)[0]
+    assert upper == exceedance.clopper_pearson(15, 100)[1]
+
+
+def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400) -> precision.Outcome:
+    made = fakes.Study(n=n)
+
+    def run(row: int) -> None:
+        campaign.run(made, path, workers, block, stages=fakes.stages(), until_row=row)
+
+    return precision.run_until(made, path, precision.parse(RULE), run)
+
+
+def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    outcome = stopped(path)
+    looks = precision.looks(0.4, 399)
+    look = outcome.look
+    assert outcome.reached
+    assert outcome.looks == looks
+    assert look.joints in looks[:-1]
+    with ResultStore.open(path) as store:
+        status, loads = store.status(), store.results()["F_max"][:, 0]
+        assert (status[: look.joints + 1] != Status.PENDING).all()
+        assert (status[look.joints + 1 :] == Status.PENDING).all()
+        assert store.stop["rule"] == RULE
+        assert store.stop["joints"] == look.joints
+        assert store.stop["confidence_of_a_look"] == pytest.approx(1 - 0.05 / len(looks))
+    assert look.n_unresolved == (status[1 : look.joints + 1] != Status.OK).sum()
+    shares = [exceedance.at(loads[1 : n + 1], status[1 : n + 1], 0.5, precision.each(len(looks))) for n in looks[:-1]]
+    widths = [share.outer_upper - share.outer_lower for share in shares]
+    first = next(n for n, width in zip(looks, widths, strict=False) if width < 0.4)
+    assert first == look.joints
+    before = path.read_bytes()
+    assert stopped(path) == outcome  # asked again, it does nothing
+    assert path.read_bytes() == before
+
+
+def test_workers_and_blocks_do_not_move_the_stop(tmp_path: Path) -> None:
+    outcomes = [stopped(tmp_path / "a.h5", 1, 7), stopped(tmp_path / "b.h5", 2, 50), stopped(tmp_path / "c.h5", 1, 999)]
+    assert outcomes[0] == outcomes[1] == outcomes[2]
+    assert datasets(tmp_path / "a.h5") == datasets(tmp_path / "b.h5") == datasets(tmp_path / "c.h5")
+
+
+def test_too_few_joints_are_all_simulated(tmp_path: Path) -> None:
+    outcome = stopped(tmp_path / "a.h5", n=30)
+    assert not outcome.reached
+    assert outcome.look.joints == 29
+    with ResultStore.open(tmp_path / "a.h5") as store:
+        assert store.complete
+        assert store.stop == {}
+
+
+def test_until_is_for_independent_samples(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(synthetic.STUDY.replace("n = 60", 'n = 64\nmethod = "sobol"'), encoding="utf-8")
+    loaded = study.load(tmp_path / "s.toml")
+    with pytest.raises(InputError, match=r"sampling\.method is 'sobol': only independent samples, alike in weight"):
+        precision.run_until(loaded, tmp_path / "a.h5", precision.parse(RULE), lambda row: None)
+
+
+def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
+    path = synthetic.store(tmp_path, simulated=40)
+    look = precision.Look(39, 0, 4, 0.02, 0.25)
+    with ResultStore.open(path, "r+") as store:
+        store.note_stop(precision.Outcome(True, look, [39, 60]).record(precision.parse(RULE)))
+    notes = report.build(path).notes
+    assert f"stopped by {RULE} at 39 joints; 95% interval corrected for 2 looks: 0.02000 to 0.25000" in notes
+
+
+def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.campaign.test_extend import STAGES
+
+    own = campaign.run
+    monkeypatch.setattr(campaign, "run", lambda *args, **rest: own(*args, **rest | {"stages": STAGES}))
+    monkeypatch.chdir(tmp_path)
+    Path("s.toml").write_text(synthetic.STUDY.replace("n = 60", "n = 400"), encoding="utf-8")
+    words = ["run", "s.toml", "--until", RULE, "--workers", "1", "--no-report"]
+    done = CliRunner().invoke(cli.app, words)
+    assert done.exit_code == 0, done.output
+    assert f"{RULE}: reached with" in done.stderr
+    assert "corrected for 7 planned looks" in done.stderr
+    with h5py.File("s.h5") as file:
+        assert json.loads(file.attrs["stop"])["looks"] == precision.looks(0.4, 400)
+    done = CliRunner().invoke(cli.app, [*words, "--rows", "0:9"])
+    assert done.exit_code == 2
+
+
+@pytest.mark.parametrize(("share", "n"), [(0.95, 59), (0.99, 299), (0.999, 2995)])
+def test_wilks(share: float, n: int) -> None:
+    assert quantile.wilks(share) == n
+    assert 1 - share**n >= 0.95 > 1 - share ** (n - 1)
+    for bad in (0.0, 1.0):
+        with pytest.raises(ValueError, match="must lie between 0 and 1"):
+            quantile.wilks(bad)
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> study.Study:
+    path = tmp_path / "small.toml"
+    text = synthetic.STUDY.replace("[limits]", '[solver]\nsteps_per_rev = 45\n[output]\nhistories = "full"\n[limits]')
+    path.write_text(text, encoding="utf-8")
+    return study.load(path)
+
+
+def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -> None:
+    made = plan.plan(small, workers=2, pilot=20)
+    assert (made.rows, made.dimensions, made.pilot, made.workers) == (61, 4, 20, 2)
+    assert made.seconds == pytest.approx(made.seconds_per_joint * 61 / 2)
+    assert made.process_bytes > 1e7
+    assert made.wilks == {0.95: 59, 0.99: 299, 0.999: 2995}
+    lower, upper = exceedance.clopper_pearson(6, 60)
+    assert made.widths[0.1] == upper - lower
+    campaign.run(small, tmp_path / "a.h5", 1, check=False)
+    assert made.file_bytes == pytest.approx((tmp_path / "a.h5").stat().st_size, rel=0.05)
+    with ResultStore.open(tmp_path / "a.h5") as store:
+        results = store.results()[1:]
+    for limit in made.limits:
+        found = exceedance.at(view.load(results, limit.load)[0], results["status"], limit.level)
+        assert found.upper - found.lower <= limit.width + 1e-12
+    large = plan.plan(dataclasses.replace(small, sampling=small.sampling.model_copy(update={"n": 10**6})), pilot=2)
+    assert large.rows == 10**6 + 1
+    assert large.widths[0.1] == pytest.approx(2 * 1.96 * np.sqrt(0.09 / 1e6), rel=0.01)
+
+
+VARIANTS = (
+    HEAD
+    + """[solver]
+steps_per_rev = 45
+[sampling]
+method = "cases"
+[[case]]
+name = "tilt"
+errors.pin1.tilt_z = "0.2 deg"
+[[variant]]
+name = "as in the study"
+[[variant]]
+name = "finer"
+solver = { steps_per_rev = 90 }
+[[variant]]
+name = "larger clearance"
+joint.contact.D_P = "75.9 mm"
+"""
+)
+
+
+def test_a_plan_simulates_variants_as_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "v.toml").write_text(VARIANTS, encoding="utf-8")
+    loaded, own, made = study.load(tmp_path / "v.toml"), plan._file_bytes, []
+
+    def keep(*args: object) -> int:
+        made.append(args[2])
+        return own(*args)
+
+    monkeypatch.setattr(plan, "_file_bytes", keep)
+    found = plan.plan(loaded, workers=1)
+    assert (found.rows, found.pilot, found.failed, found.unsettled) == (6, 6, 0, 0)
+    campaign.run(loaded, tmp_path / "v.h5", 1, check=False)
+    with ResultStore.open(tmp_path / "v.h5") as store:
+        np.testing.assert_array_equal(made[0].results["F_max"], store.results()["F_max"])
+
+
+def test_a_plan_chooses_the_fidelity_that_the_campaign_chooses(tmp_path: Path) -> None:
+    text = synthetic.STUDY.replace("n = 60", "n = 6").replace("[limits]", '[solver]\nfidelity = "auto"\n[limits]')
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    loaded, told = study.load(tmp_path / "a.toml"), []
+    made = plan.plan(loaded, workers=1)
+    assert made.fidelity.startswith("auto: ")
+    campaign.run(loaded, tmp_path / "a.h5", 1, tell=told.append)
+    with ResultStore.open(tmp_path / "a.h5") as store:
+        assert store.fidelity["reason"] == made.fidelity
+    assert told[0].startswith(made.fidelity)
+
+
+def test_plan_command(small: study.Study) -> None:
+    done = CliRunner().invoke(cli.app, ["plan", str(small.path), "--n", "2000", "--pilot", "4"])
+    assert done.exit_code == 0
+    assert "joints: 2001\ndimensions: 4\npilot: 4 joints, 0 failed" in done.stdout
+    assert "joints for a 95 % bound of the 99.9 % quantile: 2995" in done.stdout
+    done = CliRunner().invoke(cli.app, ["plan", str(small.path), "--json", "--pilot", "4"])
+    assert json.loads(done.stdout)["limits"][0]["load"] == "cross1.F"

@@ -1,0 +1,227 @@
+"""One joint again, bit for bit, from its file alone; and the joints behind a tail with their errors in sigma."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+from typer.testing import CliRunner
+
+from tests.support import synthetic
+from tolstat import cli, sampling, study
+from tolstat.campaign import replay
+from tolstat.campaign import run as campaign
+from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.errors import InputError
+from tolstat.common.files import data_dir
+from tolstat.common.tables import RESULT, Status
+from tolstat.questions.causes import tail
+from tolstat.store import ResultStore, integrity, recorded
+from tolstat.study.tolerances import distributions as tolerance
+
+HEAD = """
+[joint]
+base = "own.toml"
+bushing.stiffness = "beam"
+
+[operation]
+alpha = "15 deg"
+speed = "500 rpm"
+torque = "100 N*m"
+
+[solver]
+steps_per_rev = 60
+"""
+DRAWN = """
+[tolerances]
+"pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }
+[sampling]
+n = 5
+[output]
+histories = "harmonics"
+harmonics = 6
+"""
+LISTED = """
+[sampling]
+method = "cases"
+[output]
+histories = "full"
+[[case]]
+name = "tilted"
+errors = { "pin1.tilt_z" = "0.3 deg" }
+[[variant]]
+name = "as drawn"
+[[variant]]
+name = "tighter"
+points = 2
+joint.contact.law = "sliced"
+vary."contact.D_H" = { from = "76.2 mm", to = "76.1 mm" }
+[[variant]]
+name = "measured"
+joint.pin.mass = "0.31 kg"
+"""
+
+
+@pytest.fixture(scope="module", params=[DRAWN, LISTED], ids=["drawn", "listed"])
+def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Result file of a small campaign whose study and joint file are gone."""
+    folder = tmp_path_factory.mktemp("replay")
+    shutil.copy(data_dir() / "joints" / "cirelli2021.toml", folder / "own.toml")
+    (folder / "small.toml").write_text(HEAD + request.param, encoding="utf-8")
+    campaign.run(study.load(folder / "small.toml"), folder / "small.h5", 1)
+    (folder / "own.toml").unlink()
+    (folder / "small.toml").unlink()
+    return folder / "small.h5"
+
+
+def test_every_row_comes_out_as_it_is_stored(file: Path) -> None:
+    with ResultStore.open(file) as store:
+        for row in range(store.n):
+            again = replay.replay(store, row)
+            assert (again.differences, again.code, again.stored) == ([], [], Status.OK)
+        assert len({recorded.joint_of(store, row).contact.D_H for row in range(store.n)}) == 1 + bool(store.case_names)
+
+
+def check_anew(file: h5py.File, row: int) -> None:
+    """Write the checksums of a row that was changed on purpose."""
+    results = np.zeros(1, RESULT)
+    for c in RESULT_COLUMNS:
+        c.of(results)[:] = file["results"][c.name][row : row + 1]
+    errors, attempt = (file["ledger"][name][row : row + 1] for name in ("errors_check", "attempt"))
+    file["ledger/results_check"][row] = integrity.results_hash(errors, attempt, results, RESULT_COLUMNS)[0]
+    for name in json.loads(file.attrs["histories"]):
+        values = file["histories"][name][row : row + 1]
+        file["ledger"][f"{name}_check"][row] = integrity.history_checks(values, np.array([row]))[0]
+
+
+def test_differences_are_found_and_named(file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "changed.h5"
+    shutil.copy(file, path)
+    with h5py.File(path, "r+") as changed:
+        changed["results/fork2.T_mean"][3] *= 1 + 1e-12
+        name = next(name for name in ("coefficients_imag", "loads") if name in changed["histories"])
+        changed[f"histories/{name}"][3, 1, 1, 1] += 0.25
+        check_anew(changed, 3)
+    with ResultStore.open(path) as store:
+        again = replay.replay(store, 3)
+        assert [d.name for d in again.differences] == ["fork2.T_mean", f"histories/{name}"]
+        assert again.differences[0].relative == pytest.approx(1e-12, rel=1e-3)
+        assert again.differences[1].stored - again.differences[1].now == pytest.approx(0.25)
+        assert replay.replay(store, 2).differences == []
+
+
+def test_command(file: Path, tmp_path: Path) -> None:
+    def call(*words: object) -> object:
+        return CliRunner().invoke(cli.app, [str(word) for word in words])
+
+    done = call("replay", file, "--row", 1, "--out", tmp_path / "trace.csv", "--json")
+    assert done.exit_code == 0
+    assert done.stderr.endswith("row 1: equal to what is stored, bit for bit\n")
+    summary = json.loads(done.stdout)
+    assert summary["equal"]
+    trace = pd.read_csv(tmp_path / "trace.csv")
+    load = np.sqrt((trace[["fork1.F_e", "fork1.F_t", "fork1.F_z"]] ** 2).sum(axis=1)).max()
+    assert load == pytest.approx(summary["max"]["fork1"]["F"], rel=1e-6)
+    path = tmp_path / "changed.h5"
+    shutil.copy(file, path)
+    with h5py.File(path, "r+") as changed:
+        changed["results/steps"][1] += 1
+        check_anew(changed, 1)
+    done = call("replay", path, "--row", 1)
+    assert done.exit_code == 1
+    assert "row 1: 1 stored values differ, by a relative 0.0" in done.stderr
+    assert "the versions are those that made the file" in done.stderr
+    done = call("replay", path, "--row", 99)
+    assert done.exit_code == 2
+    assert "hint: give one of these with --row" in done.stderr
+
+
+def test_pending_rows_and_unknown_options_are_refused(file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    shutil.copy(file, path)
+    with h5py.File(path, "r+") as changed:
+        changed["results/status"][2] = Status.PENDING
+        options = json.loads(changed.attrs["options"]) | {"warp": 9}
+        changed.attrs["options"] = json.dumps(options)
+        integrity.seal(changed)
+    with ResultStore.open(path) as store:
+        with pytest.raises(InputError, match="row 2 is pending"):
+            replay.replay(store, 2)
+        with pytest.raises(InputError, match="options of the solver that this tolstat does not know: warp"):
+            replay.replay(store, 1)
+
+
+DISTRIBUTIONS = [
+    (tolerance.Normal(0.1, 0.02), stats.norm(0.1, 0.02)),
+    (tolerance.TruncatedNormal(0.0, 1.0, -2.0, 3.0), stats.truncnorm(-2.0, 3.0)),
+    (tolerance.Uniform(-1.0, 2.0), stats.uniform(-1.0, 3.0)),
+    (tolerance.Triangular(0.0, 2.0, 0.5), stats.triang(0.25, 0.0, 2.0)),
+    (tolerance.LogNormal(0.0, tolerance.Normal(0.0, 0.5)), stats.lognorm(0.5)),
+    (tolerance.Beta(2.0, 5.0, 0.0, 1.0), stats.beta(2.0, 5.0)),
+    (tolerance.Rayleigh(1.5), stats.rayleigh(scale=1.5)),
+]
+
+
+@pytest.mark.parametrize(("ours", "theirs"), DISTRIBUTIONS)
+def test_scores_have_the_probability_of_the_error(ours: tolerance.Distribution, theirs: object) -> None:
+    z = np.array([-5.0, -3.0, -1.0, -0.1, 0.0, 0.4, 2.0, 3.5, 5.0])
+    values = theirs.ppf(stats.norm.cdf(z))
+    np.testing.assert_allclose(tolerance.score(ours, values), z, atol=2e-9)
+
+
+def test_score_of_a_measured_value_is_the_middle_of_its_step() -> None:
+    measured = tolerance.Measured.of([1.0, 2.0, 2.0, 7.0])
+    expected = stats.norm.ppf([1 / 8, 1 / 2, 7 / 8])
+    np.testing.assert_allclose(tolerance.score(measured, np.array([1.0, 2.0, 7.0])), expected, atol=1e-9)
+
+
+def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
+    text = synthetic.STUDY.replace(
+        "[sampling]", '"hole2.offset_radial" = { sigma = "0.1 mm", distribution = "rayleigh" }\n[sampling]'
+    )
+    path = synthetic.store(tmp_path, text, failed=2, unsettled=3)
+    with ResultStore.open(path) as store:
+        found = tail.worst(store, "cross1.F", 4)
+        errors, results = store.errors(), store.results()
+        contact = tail.worst(store, "pin1.contact", 100)
+        assert tail.worst(store, "steps", 1).unit == "1"
+        with pytest.raises(InputError, match="did you mean 'cross1\\.F'"):
+            tail.worst(store, "cros1.F")
+    largest = results["F_max"][1:, 0]
+    order = np.argsort(-np.nan_to_num(largest, nan=0.0))[:4] + 1
+    assert [joint.row for joint in found.joints] == order.tolist()
+    assert found.unit == "N"
+    assert len(contact.joints) == 58  # sixty joints less two failed; the nominal one is not counted
+    assert {joint.status for joint in contact.joints} == {Status.OK, Status.NOT_SETTLED}
+    for joint in found.joints:
+        z = errors["pin3.offset_t"][joint.row] / (1e-4 / 3)
+        assert joint.scores["pin3.offset_t"] == pytest.approx(z, abs=1e-9)
+        radius = np.hypot(errors["hole2.offset_t"][joint.row], errors["hole2.offset_z"][joint.row])
+        share = stats.rayleigh(scale=1e-4).cdf(radius)
+        assert joint.scores["hole2.offset_radial"] == pytest.approx(stats.norm.ppf(share), abs=1e-8)
+        sizes = [abs(score) for score in joint.scores.values()]
+        assert sizes == sorted(sizes, reverse=True)
+
+
+def test_worst_command(tmp_path: Path) -> None:
+    path = synthetic.store(tmp_path)
+    done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--n", "3"])
+    assert done.exit_code == 0
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("row")
+    assert "fork1.T [N*m]" in lines[0]
+    assert len(lines) == 4
+    done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--json"])
+    found = json.loads(done.stdout)
+    assert len(found["joints"]) == 10
+    assert set(found["joints"][0]["scores"]) == {f"pin{i}.offset_t" for i in (1, 2, 3, 4)}
+    plan = study.load(tmp_path / "small.toml")
+    row = found["joints"][0]["row"]
+    drawn = sampling.draw(plan, range(row, row + 1))["pin2.offset_t"][0]
+    assert found["joints"][0]["scores"]["pin2.offset_t"] == pytest.approx(drawn / (1e-4 / 3), abs=1e-9)

@@ -1,0 +1,449 @@
+"""Campaigns that are broken on purpose: nothing is lost, nothing wrong is kept, and the rest goes on.
+
+``TOLSTAT_LONG=1 pytest tests/campaign/test_survival.py`` does the random ones as often as a release asks for.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.campaign.test_campaign import datasets, start
+from tests.support import fakes
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import MAX_BLOCK, Execution, Pace, without_simulation
+from tolstat.campaign.retry import Retry, parse
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status
+from tolstat.store import Counts, ResultStore
+from tolstat.study.model import Solver
+
+LONG = bool(os.environ.get("TOLSTAT_LONG"))
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """Make the datasets of the fake study, run in one go."""
+    path = tmp_path_factory.mktemp("reference") / "a.h5"
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    return datasets(path)
+
+
+def assert_same_but(path: Path, expected: dict[str, bytes], rows: list[int]) -> None:
+    """Check that a campaign differs from another one in the results of `rows` only."""
+    for name, found in datasets(path).items():
+        if name.startswith(("results/", "errors/")):
+            kept = np.delete(np.frombuffer(found, np.uint8).reshape(40, -1), rows, axis=0)
+            wanted = np.delete(np.frombuffer(expected[name], np.uint8).reshape(40, -1), rows, axis=0)
+            np.testing.assert_array_equal(kept, wanted)
+
+
+@pytest.mark.parametrize(("workers", "block"), [(2, 4), (1, 40)] if LONG else [(2, 4)])
+def test_a_joint_that_kills_and_one_that_hangs_are_marked(
+    tmp_path: Path, expected: dict[str, bytes], workers: int, block: int
+) -> None:
+    study, path, told = fakes.Study(), tmp_path / "a.h5", []
+    values = fakes.draw(study)["pin1.offset_t"]
+    bad = partial(fakes.simulate_badly, kills=values[17], hangs=values[30])
+    execution = Execution("processes", workers, block, joint_timeout=0.5)
+    counts = campaign.run(study, path, stages=fakes.stages(bad), execution=execution, tell=told.append)
+    assert counts.done == 40
+    with ResultStore.open(path) as store:
+        assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
+        assert np.isnan(store.results()["F_max"][[17, 30]]).all()
+    assert sorted(told) == ["row 17: crashed: killed by SIGKILL", "row 30: timeout: took more than 0.5 s"]
+    assert_same_but(path, expected, [17, 30])
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_parameters_that_are_no_numbers_are_not_simulated(
+    tmp_path: Path, expected: dict[str, bytes], workers: int
+) -> None:
+    path = tmp_path / "a.h5"
+    stages = fakes.stages()._replace(perturb=perturb_badly)
+    campaign.run(fakes.Study(), path, workers, 4, stages=stages)
+    with ResultStore.open(path) as store:
+        bad = np.flatnonzero(store.errors()["operation.alpha"] > 1.5)
+        assert bad.size
+        assert (store.status()[bad] == Status.INVALID_INPUT).all()
+    assert_same_but(path, expected, bad.tolist())
+
+
+def perturb_badly(joint: object, errors: np.ndarray) -> np.ndarray:
+    params = fakes.perturb(joint, errors)
+    params["pin_axis"][errors["operation.alpha"] > 1.5, 2, 1] = np.inf
+    return params
+
+
+def test_four_workers_change_no_byte(tmp_path: Path, expected: dict[str, bytes]) -> None:
+    campaign.run(fakes.Study(), tmp_path / "a.h5", workers=4, block=3, stages=fakes.stages())
+    assert datasets(tmp_path / "a.h5") == expected
+
+
+@pytest.mark.parametrize("moment", range(20 if LONG else 1))
+def test_all_processes_killed_again_and_again(tmp_path: Path, expected: dict[str, bytes], moment: int) -> None:
+    chance, path, kills = random.Random(moment), tmp_path / "a.h5", 0
+    while True:
+        process = start(path, chance.choice((1, 2)), chance.choice((1, 2, 3)), seconds=0.05)
+        time.sleep(chance.uniform(0, 0.4))
+        if process.poll() is not None:
+            break
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        kills += 1
+        with ResultStore.open(path) as store:
+            if not store.pending().size:
+                break
+    assert kills
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    assert datasets(path) == expected
+
+
+@pytest.mark.parametrize("moment", range(5 if LONG else 1))
+def test_workers_killed_at_random_change_no_byte(tmp_path: Path, expected: dict[str, bytes], moment: int) -> None:
+    chance, path = random.Random(moment), tmp_path / "a.h5"
+    process = start(path, 2, 2, seconds=0.05)
+    for _ in range(3):
+        time.sleep(chance.uniform(0, 0.3))
+        workers = children(process.pid)
+        if workers:
+            os.kill(chance.choice(workers), signal.SIGKILL)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert datasets(path) == expected
+
+
+def children(parent: int) -> list[int]:
+    """Worker processes of a campaign."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            is_child = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1]) == parent
+            if is_child and b"spawn_main" in (path / "cmdline").read_bytes():
+                found.append(int(path.name))
+        except OSError:
+            continue
+    return found
+
+
+def test_states_without_results_have_none(tmp_path: Path) -> None:
+    for status in Status:
+        if status not in SIMULATED and status != Status.PENDING:
+            blank = without_simulation(2, status, fakes.SPECS)
+            assert (blank.results["status"] == status).all()
+            assert np.isnan(blank.results["T_mean"]).all()
+            assert np.isnan(blank.histories["loads"]).all()
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_file_that_is_deleted_meanwhile_is_put_back(
+    tmp_path: Path, expected: dict[str, bytes], replaced: bool
+) -> None:
+    path = tmp_path / "a.h5"
+
+    def remove(counts: Counts) -> None:
+        if counts.done == 10:
+            path.unlink()
+            if replaced:
+                path.write_text("of somebody else")
+
+    with pytest.raises(StoreError, match=f"while the campaign went on\n  hint: {tmp_path}.* holds all finished joints"):
+        campaign.run(fakes.Study(), path, 1, 5, progress=remove, stages=fakes.stages())
+    kept = tmp_path / "a.saved.h5" if replaced else path
+    with ResultStore.open(kept) as store:
+        assert store.counts().done == 15
+    campaign.run(fakes.Study(), kept, 1, stages=fakes.stages())
+    assert datasets(kept) == expected
+    assert not replaced or path.read_text() == "of somebody else"
+
+
+def test_a_torn_block_is_simulated_again(tmp_path: Path, expected: dict[str, bytes]) -> None:
+    """Status and checksum are on the disk and some of the values are not, as after a power cut."""
+    path = tmp_path / "a.h5"
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    with h5py.File(path, "r+") as file:
+        file["results/fork2.F_mean"][5:9] = np.nan
+        file["results/status"][20] = Status.OUTSIDE_MODEL
+    with ResultStore.open(path) as store:
+        assert store.damaged().tolist() == [5, 6, 7, 8, 20]
+        assert store.pending().tolist() == [5, 6, 7, 8, 20]
+        assert store.to_pandas()["status"].iloc[[4, 5, 20]].tolist() == ["ok", "pending", "pending"]
+        assert np.isnan(store.results()["F_max"][5:9]).all()
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    assert datasets(path) == expected
+
+
+def test_what_cannot_be_simulated_again_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    campaign.run(fakes.Study(output=fakes.Output("full")), path, 1, stages=fakes.stages())
+    with h5py.File(path, "r+") as file:
+        file["errors/pin1.offset_t"][7] += 1e-9
+        file["histories/mode"][3, 4, 1] += 1
+    with ResultStore.open(path) as store:
+        with pytest.raises(StoreError, match="is damaged: the errors of row 7 are not as they were written"):
+            store.errors()
+        with pytest.raises(StoreError, match="is damaged: the history mode of row 3 is not as written"):
+            store.histories("mode")
+        assert store.histories("mode", np.arange(4, 9)).any()
+    with h5py.File(path, "r+") as file:
+        file.attrs["created"] = "yesterday"
+    with pytest.raises(StoreError, match="is damaged: its attributes are not as they were written"):
+        ResultStore.open(path)
+
+
+def everything(path: Path) -> list[tuple[str, bytes]]:
+    """All that a result file says of its joints, row by row, and of itself."""
+    with ResultStore.open(path) as store:
+        errors, results = store.errors(), store.results()
+        histories = [store.histories(name) for name in store.history_specs]
+        about = (store.study_name, store.study_text, store.identity, store.joint, store.options, store.sampling)
+        about += (store.limits, store.versions, store.created, store.git_commit, store.retries, store.rows)
+    rows = []
+    for i, result in enumerate(results):
+        row = b"".join([errors[i].tobytes(), result.tobytes(), *(h[i].tobytes() for h in histories)])
+        rows.append((Status(result["status"]).label, row))
+    return [("about", repr(about).encode()), *rows]
+
+
+@pytest.mark.parametrize("histories", ["none", "full"])
+def test_a_corrupted_file_gives_an_error_or_the_right_data(tmp_path: Path, histories: str) -> None:
+    chance, path = random.Random(5), tmp_path / "a.h5"
+    campaign.run(fakes.Study(n=12, output=fakes.Output(histories)), path, 1, stages=fakes.stages())
+    right, whole = everything(path), path.read_bytes()
+    with h5py.File(path) as file:
+        columns = [(column.id.get_offset(), column.nbytes) for column in file["results"].values()]
+    outcomes = {"error": 0, "same": 0, "pending": 0}
+    for trial in range(200 if LONG else 25):
+        hurt = bytearray(whole)
+        if trial % 5 == 0:
+            del hurt[chance.randrange(len(whole)) :]
+        else:
+            first, size = chance.choice(columns) if trial % 5 == 1 else (0, len(whole))
+            hurt[first + chance.randrange(size)] ^= 1 << chance.randrange(8)
+        path.write_bytes(hurt)
+        try:
+            found = everything(path)
+        except StoreError:
+            outcomes["error"] += 1
+            continue
+        wrong = [now[0] for now, then in zip(found, right, strict=True) if now != then]
+        assert set(wrong) <= {"pending"}, f"trial {trial}"
+        outcomes["pending" if wrong else "same"] += 1
+    assert all(outcomes.values()), outcomes
+
+
+def test_a_campaign_under_way_can_be_looked_at(tmp_path: Path, expected: dict[str, bytes]) -> None:
+    path = tmp_path / "a.h5"
+    process = start(path, 2, 2, seconds=0.05)
+    with ResultStore.open(path) as store:
+        session, begun = store.session(), store.counts().done
+        assert session is not None
+        assert (session.done, store.damaged().size) == (0, 0)
+        assert abs(time.time() - session.started) < 60
+        time.sleep(0.5)
+        assert store.counts().done > begun
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+    with ResultStore.open(path) as store:
+        assert store.session() is None
+    assert datasets(path) == expected
+
+
+SETTINGS = {"solver.steps_per_rev": 60}
+AGAIN = Retry((Status.NEWTON_FAILED,), SETTINGS, Options(steps_per_rev=60))
+
+
+def simulate_finely(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+    """Simulate; with 60 steps nothing fails."""
+    found = fakes.simulate(params, options, histories, n_harmonics)
+    if options.steps_per_rev == 60:
+        found.results["status"] = Status.OK
+        found.results["F_max"] = 7.0
+    return found
+
+
+@pytest.mark.parametrize("histories", ["none", "full"])
+def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, histories: str) -> None:
+    study, path, told = fakes.Study(output=fakes.Output(histories)), tmp_path / "a.h5", []
+    stages = fakes.stages(simulate_finely)
+    campaign.run(study, path, 1, stages=stages)
+    before = datasets(path)
+    with ResultStore.open(path) as store:
+        failed = np.flatnonzero(store.status() == Status.NEWTON_FAILED)
+
+    def interrupt(counts: Counts) -> None:
+        if counts.done == 38:
+            raise KeyboardInterrupt
+
+    with pytest.raises(campaign.Interrupted):
+        campaign.run(study, path, 1, 1, interrupt, stages, retry=AGAIN, tell=told.append)
+    campaign.run(study, path, 2, 1, stages=stages)  # the rows to come know their settings
+    assert campaign.run(study, path, 1, stages=stages, retry=AGAIN, tell=told.append).failed == 0
+    assert told == [f"{failed.size} joints once more", "0 joints once more"]
+    with ResultStore.open(path) as store:
+        assert store.retries == [json.loads(json.dumps(AGAIN.entry()))]
+        assert np.flatnonzero(store.attempt() == 1).tolist() == failed.tolist()
+        assert (store.results()["steps"][failed] == 60).all()
+        assert store.to_pandas()["attempt"].sum() == failed.size
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5"]
+        for name in store.history_specs:
+            assert np.isfinite(store.histories(name)).all()
+    assert_same_but(path, before, failed.tolist())
+
+
+def test_a_retry_that_changes_the_shape_of_histories_is_refused(tmp_path: Path) -> None:
+    study, path = fakes.Study(output=fakes.Output("full")), tmp_path / "a.h5"
+    campaign.run(study, path, 1, stages=fakes.stages())
+    before = path.read_bytes()
+    stages = fakes.stages()._replace(history_specs=lambda *args: {})
+    with pytest.raises(InputError, match="another number of samples than those in the file"):
+        campaign.run(study, path, 1, stages=stages, retry=AGAIN)
+    assert path.read_bytes() == before
+
+
+def test_what_is_asked_for_again_is_read_with_all_faults() -> None:
+    study = SimpleNamespace(solver=Solver())
+    again = parse("newton_failed, timeout", ["solver.steps_per_rev=360", "solver.method=tr_bdf2"], study)
+    assert again.status == (Status.NEWTON_FAILED, Status.TIMEOUT)
+    assert again.settings == {"solver.steps_per_rev": 360, "solver.method": "tr_bdf2"}
+    assert again.options == Solver(steps_per_rev=360, method="tr_bdf2").options()
+    with pytest.raises(InputError) as caught:
+        parse("newton_faild,pending", ["limits.F=3", "solver.steps_per_rev=2.5", "solver.steps_per_re=1"], study)
+    text = str(caught.value)
+    assert len(caught.value.faults) == 5
+    assert "did you mean 'newton_failed'?" in text
+    assert "--set: solver.steps_per_rev" in text
+    assert "did you mean 'steps_per_rev'?" in text
+
+
+def test_what_auto_chose_holds_for_joints_that_are_simulated_again() -> None:
+    study = SimpleNamespace(solver=Solver(fidelity="auto"))
+    chosen = {"fidelity": "quasistatic", "steps_per_rev": 60}
+    again = parse("timeout", ["solver.newton_max_iter=40"], study).chosen(chosen).options
+    assert (again.fidelity, again.steps_per_rev, again.newton_max_iter) == (Fidelity.QUASISTATIC, 60, 40)
+    again = parse("timeout", ["solver.fidelity=dynamic"], study).chosen(chosen).options
+    assert again == Options()
+
+
+def paced(pace: Pace, each_s: float, write_s: float, blocks: int, available: int = 10**9) -> list[int]:
+    """Sizes of blocks whose joints take `each_s` and which take `write_s` to write."""
+    sizes = []
+    for _ in range(blocks):
+        sizes.append(pace.take(available))
+        pace.note(sizes[-1], sizes[-1] * each_s, write_s)
+    return sizes
+
+
+def test_blocks_grow_until_writing_them_costs_little() -> None:
+    assert paced(Pace(10**6, 2, None), 1e-3, 0.043, 9)[-1] == 1000  # a second, of which writing is 4 %
+    assert paced(Pace(10**6, 2, None), 2e-3, 0.1, 9)[-1] == 1000  # two seconds, for 5 %
+    assert paced(Pace(10**6, 32, None), 5e-3, 0.04, 9)[-1] == 1024  # writing takes a quarter of the parent's time
+    assert paced(Pace(10**6, 2, None), 1e-5, 0.043, 9)[-1] == MAX_BLOCK
+    assert paced(Pace(10**6, 2, None), 0.5, 0.043, 9)[-1] == 2  # slow joints: a kill costs no more
+    assert paced(Pace(10**6, 2, None), 1e-3, 5.0, 9)[-1] == MAX_BLOCK  # eight seconds at most
+    assert paced(Pace(10**6, 2, 7), 1e-3, 0.043, 9) == [7] * 9
+    assert paced(Pace(10**6, 2, None), 1e-3, 0.043, 9, available=50) == [50] * 9
+
+
+def test_the_last_blocks_are_smaller_and_none_is_left_out() -> None:
+    pace, left, sizes = Pace(9000, 2, None), 9000, []
+    while left:
+        sizes.append(pace.take(left))
+        left -= sizes[-1]
+        pace.note(sizes[-1], 1e-3 * sizes[-1], 0.04)
+    assert sum(sizes) == 9000
+    assert max(sizes) == 1000
+    assert max(sizes[-4:]) == 250
+    assert len(sizes) < 25
+
+
+def limited(path: Path, size: int) -> str:
+    """Run a campaign in a process whose files cannot grow beyond `size` bytes; gives what it says."""
+    code = (
+        "import resource, sys; from pathlib import Path; from tests.support import fakes\n"
+        "from tolstat.campaign import run as campaign\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
+        "study = fakes.Study(output=fakes.Output('full'))\n"
+        f"campaign.run(study, Path({str(path)!r}), 1, 4, stages=fakes.stages())"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], env=fakes.environment(), capture_output=True, text=True)
+    assert ended.returncode
+    return ended.stderr.rpartition("StoreError: ")[2]
+
+
+def test_files_that_cannot_grow(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    assert limited(path, 20_000).startswith(f"{path}: cannot be written: ")
+    assert list(tmp_path.iterdir()) == []
+    assert f"{path}: cannot be " in limited(path, 400_000)
+    assert path.exists()
+    study = fakes.Study(output=fakes.Output("full"))
+    campaign.run(study, path, 1, stages=fakes.stages())
+    campaign.run(study, tmp_path / "b.h5", 1, stages=fakes.stages())
+    assert datasets(path) == datasets(tmp_path / "b.h5")
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Mount a file system of 700 kB; needs the right to."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=700k", "tmpfs", folder], capture_output=True)
+    if mounted.returncode:
+        pytest.skip("no right to mount a file system")
+    yield folder
+    subprocess.run(["umount", folder], check=True)
+
+
+@pytest.fixture
+def read_only(small_disk: Path) -> Iterator[Path]:
+    """Make a folder that holds half a campaign, and then can only be read, even by the superuser."""
+    campaign.run(fakes.Study(), small_disk / "a.h5", 1, 4, stages=fakes.stages(), until_row=20)
+    subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
+    yield small_disk
+    subprocess.run(["mount", "-o", "remount,rw", small_disk], check=True)
+
+
+def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expected: dict[str, bytes]) -> None:
+    with pytest.raises(
+        StoreError, match=r"new\.h5: cannot be written: Read-only file system\n  hint: check the folder"
+    ):
+        campaign.run(fakes.Study(), read_only / "new.h5", 1, stages=fakes.stages())
+    with pytest.raises(StoreError, match=r"a\.h5: cannot be opened: no permission\n  hint: change its permissions"):
+        campaign.run(fakes.Study(), read_only / "a.h5", 1, stages=fakes.stages())
+    assert [path.name for path in read_only.iterdir()] == ["a.h5"]
+    with ResultStore.open(read_only / "a.h5") as store:  # looking at it goes on
+        assert store.counts().done == 20
+        assert store.session() is None
+    moved = tmp_path / "a.h5"
+    shutil.copy(read_only / "a.h5", moved)
+    campaign.run(fakes.Study(), moved, 1, stages=fakes.stages())
+    assert datasets(moved) == expected
+
+
+def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
+    study, path = fakes.Study(output=fakes.Output("full")), small_disk / "a.h5"
+    with pytest.raises(StoreError, match=r"No space left on device\n  hint: make room"):
+        campaign.run(study, path, 1, 2, stages=fakes.stages())
+    moved = tmp_path / "a.h5"
+    shutil.copy(path, moved)
+    shutil.copytree(f"{path}.parts", f"{moved}.parts")
+    with ResultStore.open(moved) as store:
+        assert 0 < store.counts().done <= 40
+    campaign.run(study, moved, 1, stages=fakes.stages())
+    campaign.run(study, tmp_path / "b.h5", 1, stages=fakes.stages())
+    assert datasets(moved) == datasets(tmp_path / "b.h5")

@@ -1,0 +1,314 @@
+"""Numerical error of campaigns: of the size that it is, kept in the file, and in the report's bounds."""
+
+from __future__ import annotations
+
+import json
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from tests.support import fakes, synthetic
+from tolstat import cli, joint, sampling, study
+from tolstat.analysis import accuracy
+from tolstat.campaign import run as campaign
+from tolstat.campaign import verify
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Method, Options, Start, Status
+from tolstat.questions.exceedance import accuracy as tables
+from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.store import ResultStore, recorded, verification
+from tolstat.store import view as source
+from tolstat.store.verification import Check, Verification
+
+REAL = """
+[joint]
+base = "cirelli2021"
+[operation]
+alpha = "25 deg"
+speed = "500 rpm"
+torque = "100 N*m"
+[solver]
+steps_per_rev = 12
+[tolerances]
+"pin*.offset_t" = { plus_minus = "0.02 mm", distribution = "normal", cpk = 1.0 }
+"hole*.tilt_z" = { plus_minus = "0.1 deg", distribution = "uniform" }
+[sampling]
+n = 8
+seed = 3
+[limits]
+"cross*.F" = "640 N"
+"""
+
+
+def written(folder, text=REAL):
+    path = folder / "real.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def call(*args):
+    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    return study.load(written(tmp_path_factory.mktemp("coarse")))
+
+
+@pytest.fixture(scope="module")
+def told():
+    """Progress of the checks of `coarse`."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def coarse(plan, told):
+    """Joints at 12 steps a revolution, where the steps' error is large; two processes share the references."""
+    return verify.check_study(plan, joints=6, workers=2, progress=told.append)
+
+
+def force_and_torque(base, other):
+    """Error of the largest |F| and |T| of each joint, (m, 2)."""
+    return accuracy.by_kind(accuracy.differences(base, other))[:, :2]
+
+
+def test_estimate_is_of_the_size_of_the_error(coarse):
+    """What the solver's own checks give is within a factor of two of the distance to the reference, in each joint.
+
+    Where the error passes through zero at these steps, the estimate cannot know it and is above.
+    """
+    own = {name: check.results for name, check in coarse.checks.items() if name != "reference"}
+    true = force_and_torque(coarse.base, coarse.checks["reference"].results)
+    ratio = accuracy.by_kind(accuracy.numerical(coarse.base, own))[:, :2] / true
+    crossing = true < 0.1 * np.median(true, axis=0)
+    assert crossing.sum() <= 3
+    assert (ratio > 1 / 2).all()
+    assert (ratio[~crossing] < 2).all()
+
+
+def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
+    params = joint.perturb(plan.joint, sampling.draw(plan)[coarse.rows[-1:]])
+    here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
+    for name in ("F_max", "T_max"):  # with other threads LAPACK rounds otherwise, and Radau takes other steps
+        np.testing.assert_allclose(coarse.checks["reference"].results[name][-1], here[name][0], rtol=1e-6)
+    assert [(counts.done, counts.total) for counts in told] == [(k, 6) for k in range(7)]
+
+
+def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):
+    reference = coarse.checks["reference"].results
+    true = force_and_torque(coarse.base, reference)
+    assert np.median(true) > 1e-3
+    for name in ("newton", "settling"):
+        assert force_and_torque(coarse.base, coarse.checks[name].results).max() < 1e-3 * np.median(true)
+    params = joint.perturb(plan.joint, sampling.draw(plan)[coarse.rows])
+    fine = verify.run_checks(params, [Options(steps_per_rev=90)] * len(params), ("half_step",))["half_step"]
+    assert fine.options["steps_per_rev"] == 180
+    assert np.median(force_and_torque(fine.results, reference)) < 0.05 * np.median(true)
+
+
+def test_each_check_changes_what_it_says():
+    options = Options()
+    assert verify.changed(options, "half_step") == options._replace(steps_per_rev=360)
+    assert verify.changed(options, "newton").newton_tol == pytest.approx(1e-8)
+    settling = verify.changed(options, "settling")
+    assert (settling.settle_tol, settling.start) == (pytest.approx(1e-6), Start.RAMP)
+    for method in Method:
+        assert verify.changed(options._replace(method=int(method)), "method").method != method
+    # types of the fields decide which compiled code runs
+    for name in verify.FULL:
+        assert [type(x) for x in verify.changed(options, name)] == [type(x) for x in options]
+
+
+def test_the_seed_chooses_the_joints():
+    rows = np.arange(100, 200)
+    first = verify.choose(rows, 24, 1)
+    assert np.isin(first, rows).all()
+    assert (np.diff(first) > 0).all()
+    assert np.array_equal(first, verify.choose(rows, 24, 1))
+    assert not np.array_equal(first, verify.choose(rows, 24, 2))
+    assert np.array_equal(verify.choose(rows[:5], 24, 1), rows[:5])
+    assert np.array_equal(verify.choose(rows, None, 1), rows)
+
+
+def test_all_joints_are_those_that_settled_and_the_one_without_errors(tmp_path):
+    campaign.run(study.load(written(tmp_path), n=4), tmp_path / "a.h5", workers=1, check=False)
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        file["results/status"][2] = Status.NOT_SETTLED
+    assert verify.check_file(tmp_path / "a.h5", "all", names=("newton",)).rows.tolist() == [0, 1, 3, 4]
+    assert verify.check_file(tmp_path / "a.h5", 9, names=("newton",)).rows.tolist() == [1, 3, 4]
+
+
+def test_errors_are_relative_to_the_largest_of_the_kind():
+    base = synthetic.results(3)
+    other = base.copy()
+    other["F_max"][0, 2] += 0.02 * base["F_max"][0].max()
+    other["T_max"][1] *= 1.25
+    other["status"][2] = Status.NEWTON_FAILED
+    found = accuracy.differences(base, other)
+    assert found[0, 2] == pytest.approx(-0.02, rel=0.03)
+    assert np.count_nonzero(found[0]) == 1
+    assert accuracy.by_kind(found)[1] == pytest.approx([0, 0.2, 0, 0])
+    assert np.isnan(found[2]).all()
+    assert accuracy.spread(accuracy.by_kind(found)[:, 1]) == pytest.approx((2, 0.1, 0.2, 0.2))
+    assert accuracy.spread(found[2])[0] == 0
+
+
+def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
+    path = tmp_path / "a.h5"
+    campaign.run(fakes.Study(n=900), path, 1, stages=fakes.stages())
+    with ResultStore.open(path) as store:
+        found = verification.read(store)
+        assert found is not None
+        assert found.rows.tolist() == verify.choose(np.flatnonzero(store.status()[1:] == Status.OK) + 1, 2, 7).tolist()
+        assert np.array_equal(found.base, store.results()[found.rows])
+    assert tuple(found.checks) == verify.SMALL
+    for name, check in found.checks.items():
+        # the invented solver knows no settings but the number of steps
+        expected = found.base.copy()
+        expected["steps"] *= 2 if name == "half_step" else 1
+        assert np.array_equal(check.results, expected)
+        assert Options(**check.options) == verify.changed(Options(steps_per_rev=30), name)
+    with ResultStore.open(path, "r+") as store:
+        verification.write(store, found._replace(rows=found.rows[:1], checks={}))
+        again = verification.read(store)
+    assert again is not None
+    assert (again.rows.tolist(), again.checks) == ([found.rows[0]], {})
+
+
+def test_a_run_can_do_without(tmp_path):
+    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages(), check=False)
+    with ResultStore.open(tmp_path / "a.h5") as store:
+        assert verification.read(store) is None
+
+
+def off_by(path, factor, rows=(5, 9)):
+    """Keep a reference in a file that has every load `factor` times as large."""
+    with ResultStore.open(path, "r+") as store:
+        base = store.results()[list(rows)]
+        true = base.copy()
+        for name in ("F_max", "T_max", "contact_max", "psi_max"):
+            true[name] *= factor
+        checks = {name: Check("", {}, base) for name in verify.SMALL} | {"reference": Check("", {}, true)}
+        verification.write(store, Verification(1, np.array(rows), base, checks))
+
+
+def test_report_moves_every_load_by_the_numerical_error(tmp_path):
+    path = synthetic.store(tmp_path)
+    with ResultStore.open(path) as store:
+        assert exceedance.limits(source.read(store))["numerical_lower"].isna().all()
+    off_by(path, 1.25)
+    with ResultStore.open(path) as store:
+        limits = exceedance.limits(source.read(store)).set_index("load").loc["cross1.F"]
+        results = store.results()[1:]
+    assert limits["numerical_error"] == pytest.approx(0.2)
+    moved = 0.2 * results["F_max"].max(axis=1)
+    for end, sign in (("lower", -1), ("upper", 1)):
+        count = np.sum(results["F_max"][:, 0] + sign * moved > 700.0)
+        assert limits[f"numerical_{end}"] == pytest.approx(count / 60)
+        assert limits[f"total_{end}"] == pytest.approx(accuracy_end(int(count), 60)[0 if end == "lower" else 1])
+    assert limits["numerical_lower"] < limits["estimate"] < limits["numerical_upper"]
+    done = call("report", path)
+    assert done.stdout.splitlines()[0].split()[-2:] == ["all", "together"]
+    assert "measured on 2 of 2 joints against a tight reference: F 2.0e-01" in done.stderr
+
+
+def accuracy_end(count, n):
+    from scipy.stats import binomtest
+
+    return binomtest(count, n).proportion_ci(0.95, "exact")
+
+
+def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
+    path = synthetic.store(tmp_path)
+    off_by(path, 1.25)
+    with ResultStore.open(path) as store:
+        found = verification.read(store)
+    assert found is not None
+    found.checks["reference"].results["status"][0] = Status.NOT_SETTLED
+    assert "1 not settled in reference" in tables.note(found)
+    # the estimate stands in: invented checks that change nothing
+    assert accuracy.by_kind(tables.errors(found)[tables.TOTAL])[:, 0] == pytest.approx([0.0, 0.2])
+
+
+def test_command_checks_the_joints_of_a_file(tmp_path):
+    plan_path, path, out = written(tmp_path), tmp_path / "real.h5", tmp_path / "out.csv"
+    campaign.run(study.load(plan_path, n=4), path, workers=1)
+    done = call("verify", path, "--joints", 2, "--seed", 5, "--json", "--out", out)
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert len(found["rows"]) == 2
+    assert list(found["checks"]) == list(verify.FULL)
+    assert found["kinds"]["reference"]["F"]["joints"] == 2
+    assert found["loads"]["half_step"]["cross1.T"]["worst"] > 0
+    table = pd.read_csv(out)
+    assert len(table) == 2 * len(verify.FULL) * len(accuracy.OBSERVABLES)
+    with ResultStore.open(path) as store:
+        kept = verification.read(store)
+        assert kept is not None
+        assert (kept.seed, kept.rows.tolist()) == (5, found["rows"])
+        part = table[(table["check"] == "reference") & (table["load"] == "fork2.T")]
+        assert part["campaign"].tolist() == store.results()["T_max"][kept.rows, 5].tolist()
+        assert part["value"].tolist() == kept.checks["reference"].results["T_max"][:, 5].tolist()
+    lines = call("verify", plan_path, "--joints", 1).stdout.splitlines()
+    assert lines[0].split() == ["load", "error", "joints", "median", "95", "%", "below", "worst"]
+    assert len(lines) == 1 + len(accuracy.KINDS) * (len(verify.FULL) + 1)
+
+
+def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
+    text = REAL.partition("[tolerances]")[0] + (
+        '[sampling]\nmethod = "cases"\n[[case]]\nname = "a"\nerrors.hole4.offset_t = "0.1 mm"\n'
+        '[[variant]]\nname = "plain"\n[[variant]]\nname = "tight"\njoint.contact.D_P = "76.1 mm"\n'
+        '[variant.solver]\nmethod = "generalized_alpha"\nsteps_per_rev = 48\n[variant.operation]\nspeed = "300 rpm"\n'
+    )
+    listed = study.load(written(tmp_path, text))
+    errors = sampling.draw(listed)
+    with ResultStore.create(tmp_path / "a.h5", listed, errors) as store:
+        found = recorded.parameters(store, np.array([0, 3]))
+        settings = [recorded.options_of(store, row) for row in (0, 3)]
+    for k, row in enumerate((0, 3)):
+        own = joint.perturb(listed.joints[listed.design["variant"][row]], errors[row : row + 1])
+        assert found[k] == own[0]
+    assert (found["clearance"][0] != found["clearance"][1]).all()
+    assert settings == [solver.options() for solver in listed.solvers]
+    assert settings[1] == settings[0]._replace(method=int(Method.GENERALIZED_ALPHA), steps_per_rev=48)
+
+
+def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
+    text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
+        "500 rpm", "2000 rpm"
+    )
+    found = verify.check_study(study.load(written(tmp_path, text)), joints=1, names=(*verify.SMALL, "reference"))
+    true = force_and_torque(found.base, found.checks["reference"].results)
+    seen = force_and_torque(found.base, found.checks["fidelity"].results)
+    assert true.min() > 1e-3  # the inertia of bodies that deviate from the ideal motion
+    np.testing.assert_allclose(seen, true, rtol=0.3)
+    assert force_and_torque(found.base, found.checks["half_step"].results).max() < 0.1 * true.min()
+    assert "error of numerics and fidelity, measured" in tables.note(found)
+    auto = study.load(written(tmp_path, REAL.replace("steps_per_rev = 12", 'fidelity = "auto"')))
+    with pytest.raises(InputError, match="auto"):
+        verify.check_study(auto)
+
+
+def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
+    pending = synthetic.store(tmp_path, simulated=0)
+    bad = written(tmp_path, REAL.replace("[solver]", "[solver]\nstep = 3"))
+    for arguments, words in (
+        ((tmp_path / "none.h5",), ["is not there"]),
+        ((pending,), ["has no settled joint", "tolstat run"]),
+        ((pending, "--joints", 0), ["0 is less than one"]),
+        ((pending, "--joints", "most"), ["joints: 'most' is no whole number", '"all"']),
+        ((bad, "--joints", 0), ["0 is less than one", "solver.step"]),
+        ((pending, "--out", tmp_path / "none" / "a.csv"), ["no such folder"]),
+    ):
+        done = call("verify", *arguments)
+        assert (done.exit_code, done.stdout) == (2, "")
+        for word in [*words, "hint: "]:
+            assert word in done.stderr
+    with pytest.raises(InputError, match="less than one"):
+        verify.check_study(study.load(written(tmp_path)), joints=-1)
+    monkeypatch.setattr(verify, "versions", lambda: {"tolstat": "9.9", "sources": "0"})
+    with pytest.raises(StoreError, match="was made by other code"):
+        verify.check_file(synthetic.store(tmp_path, name="other"))

@@ -1,0 +1,392 @@
+"""The command line: help, streams, exit codes, and files of every state."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+import tolstat
+from tests.support import fakes, synthetic
+from tolstat import cli
+from tolstat.campaign import run as campaign
+from tolstat.campaign.executors import WorkerDied
+from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
+from tolstat.common.tables import BUSHINGS, Simulation, Status
+from tolstat.store import ResultStore
+
+COMMANDS = (
+    *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
+    *("worst", "replay", "export", "fatigue", "time-above", "report"),
+    *("capability", "causes", "reweight", "compare", "allocate"),
+    *("rare", "multifidelity"),
+    *("work-precision", "bench"),
+)
+HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
+
+
+def call(*args):
+    """Run the command in this process."""
+    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
+
+
+def shell(*args, **env):
+    """Run the command as a user does."""
+    command = [sys.executable, "-m", "tolstat", *map(str, args)]
+    return subprocess.run(command, capture_output=True, text=True, env=os.environ | env, check=False)
+
+
+def simulate(params, options, histories="none", n_harmonics=16):
+    return Simulation(synthetic.results(len(params)), {})
+
+
+def invented_campaign():
+    """`campaign.run` with a stand-in for the solver."""
+    from tolstat import joint, sampling
+
+    own = sampling.draw_blocks, sampling.dimensions, joint.perturb
+    stages = campaign.Stages(*own, lambda *_: {}, simulate, fakes.warm_up, sampling.origin_blocks)
+    return partial(campaign.run, stages=stages)
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """Write a study into the current folder and put a solver in place that invents its results."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(campaign, "run", invented_campaign())
+    path = tmp_path / "small.toml"
+    path.write_text(synthetic.STUDY, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_every_option_explained(command):
+    done = call(command, "--help")
+    assert done.exit_code == 0
+    options = [line for line in done.stdout.splitlines() if line.startswith("  --")]
+    assert options or command == "status"
+    for line in options:
+        assert re.search(r"--[\w-]+( \S+)?( / --[\w-]+)?\s{2,}\S", line + "  ." * line.endswith("report")), line
+    assert len(done.stdout.split("Options:")[0].strip().splitlines()) >= 3
+
+
+def test_help_lists_the_commands_and_the_readme_order():
+    listed = re.findall(r"^  ([\w-]+)  ", call("--help").stdout.split("Commands:")[1], flags=re.MULTILINE)
+    assert tuple(listed) == COMMANDS
+
+
+def test_help_is_light():
+    code = (
+        "import sys\nfrom tolstat.cli import app\n"
+        "try:\n    app(['--help'])\nexcept SystemExit:\n    pass\n"
+        f"print(sorted({HEAVY!r} & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+    assert "Monte Carlo" in done.stdout
+
+
+def test_version_and_module_entry():
+    done = shell("--version")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"tolstat {tolstat.__version__}\n", "")
+
+
+@pytest.mark.parametrize("args", [["--help"], ["run", "--help"], ["bogus"]])
+def test_no_color_is_respected(args):
+    done = shell(*args, NO_COLOR="1", FORCE_COLOR="", TERM="xterm-256color")
+    assert "\x1b" not in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("args", [["bogus"], ["status"], ["run", "x.toml", "--n", "few"], ["export", "x.h5"]])
+def test_wrong_usage_is_exit_code_2_on_stderr(args):
+    done = call(*args)
+    assert done.exit_code == 2
+    assert done.stdout == ""
+    assert "Error" in done.stderr
+
+
+@pytest.mark.parametrize("args", [["status"], ["report"], ["export", "--csv", "-"]])
+@pytest.mark.parametrize("content", [None, "not HDF5"])
+def test_unusable_file_is_exit_code_2_with_a_remedy(tmp_path, args, content):
+    path = tmp_path / "file.h5"
+    if content is not None:
+        path.write_text(content)
+    done = call(args[0], path, *args[1:])
+    assert done.exit_code == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith(f"error: {path}")
+    assert "hint: " in done.stderr
+
+
+@pytest.mark.parametrize("command", ["run", "simulate"])
+def test_malformed_input_is_exit_code_2_and_leaves_no_file(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    text = synthetic.STUDY.replace('"15 deg"', '"15 kg"').replace("speed", "sped")
+    if command == "simulate":
+        text = text.split("[tolerances]")[0]
+    Path("bad.toml").write_text(text, encoding="utf-8")
+    done = call(command, "bad.toml")
+    assert done.exit_code == 2
+    assert "operation.alpha" in done.stderr
+    assert done.stderr.count("hint: ") >= 2
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
+
+
+@pytest.mark.parametrize(("simulated", "pending"), [(0, 61), (21, 40), (None, 0)])
+def test_status_of_a_file_in_any_state(tmp_path, simulated, pending):
+    path = synthetic.store(tmp_path, simulated=simulated, failed=2, unsettled=1)
+    done = call("status", path, "--json")
+    assert done.exit_code == 0
+    found = json.loads(done.stdout)
+    assert (found["study"], found["joints"], found["pending"]) == ("small", 61, pending)
+    assert sum(found[state.label] for state in Status) == 61
+    if simulated is None:
+        assert (found["newton_failed"], found["not_settled"]) == (2, 1)
+    lines = call("status", path).stdout.splitlines()
+    shares = found.pop("exceedance")
+    assert lines[: len(found)] == [f"{name}: {value}" for name, value in found.items()]
+    assert found["running"] is False
+    assert "damaged" not in found
+    assert len(lines) == len(found) + len(shares)
+    for share, line in zip(shares, lines[len(found) :], strict=True):
+        assert line.startswith(f"P({share['load']} > {share['limit']:g} {share['unit']}): {share['estimate']} (")
+        assert share["lower"] <= share["estimate"] <= share["upper"]
+    assert bool(shares) == (simulated != 0)
+
+
+def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path):
+    path, out = synthetic.store(tmp_path, simulated=50, failed=3), tmp_path / "all.csv"
+    done = call("export", path, "--csv", out)
+    assert (done.exit_code, done.stdout) == (0, "")
+    table = pd.read_csv(out, header=[0, 1], index_col=0)
+    assert list(table.columns) == [(c.name, c.unit) for c in ERROR_COLUMNS + RESULT_COLUMNS]
+    assert list(table.index) == list(range(61))
+    with ResultStore.open(path) as store:
+        errors, results = store.errors(), store.results()
+    assert np.array_equal(table["pin1.offset_t", "m"], errors["pin1.offset_t"])
+    assert np.array_equal(table["cross1.F_max", "N"][:50], results["F_max"][:50, 0], equal_nan=True)
+    assert (table["status", "1"][50:] == "pending").all()
+    assert table["cross1.F_max", "N"][50:].isna().all()
+    assert call("export", path, "--csv", "-").stdout == out.read_text(encoding="utf-8")
+
+
+CASES = (
+    synthetic.STUDY.partition("[tolerances]")[0]
+    + """
+[sampling]
+method = "cases"
+[[case]]
+name = "a"
+errors.hole4.offset_t = "0.1 mm"
+[[variant]]
+name = "plain"
+[[variant]]
+name = "clearance"
+points = 2
+vary.contact.D_P = { from = "76.0 mm", to = "75.6 mm" }
+"""
+)
+
+
+def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
+    out = tmp_path / "all.csv"
+    call("export", synthetic.store(tmp_path, CASES), "--csv", out)
+    table = pd.read_csv(out, header=[0, 1], index_col=0)
+    names = ["case", "variant", "family", "group"]
+    assert list(table.columns[:5]) == [*((name, "1") for name in names), (ERROR_COLUMNS[0].name, "m")]
+    assert table.columns[-1] == (RESULT_COLUMNS[-1].name, "1")
+    with ResultStore.open(tmp_path / "small.h5") as store:
+        assert list(store.to_pandas().columns[:4]) == names
+        assert table[names].to_numpy().tolist() == [
+            [store.case_names[joint["case"]], joint["variant"], store.variants[joint["variant"]].family, joint["group"]]
+            for joint in store.design()
+        ]
+    assert set(table["family", "1"]) == {"plain", "clearance"}
+    assert (table["case", "1"] == "a").equals(table["hole4.offset_t", "m"] == 1e-4)
+
+
+def test_export_to_a_folder_that_is_not_there(tmp_path):
+    done = call("export", synthetic.store(tmp_path), "--csv", tmp_path / "no" / "all.csv")
+    assert done.exit_code == 2
+    assert "hint: " in done.stderr
+
+
+def test_export_into_a_pipe_that_closes_early(tmp_path):
+    path = synthetic.store(tmp_path)
+    command = f"{sys.executable} -m tolstat export {path} --csv - | head -n 1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.stdout.startswith("row,pin1.offset_e")
+    assert "Traceback" not in done.stderr
+
+
+def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
+    path = synthetic.store(tmp_path)
+    done = call("report", path)
+    assert done.exit_code == 0
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("load")
+    assert [line.split()[0] for line in lines[1:]] == [
+        "cross1.F", "fork1.T", "fork2.T", "fork3.T", "fork4.T", "pin1.contact", "psi"
+    ]  # fmt: skip
+    assert f"wrote {tmp_path / 'small_exceedance.png'}" in done.stderr
+
+
+def test_report_makes_the_folder_it_is_to_write_to(tmp_path):
+    folder = tmp_path / "new" / "folder"
+    done = call("report", synthetic.store(tmp_path), "--out", folder)
+    assert done.exit_code == 0, done.stderr
+    assert (folder / "small_exceedance.csv").is_file()
+    for file, target, word in (("none.h5", "other", "is not there"), ("small.h5", "small.toml", "cannot be made")):
+        done = call("report", tmp_path / file, "--out", tmp_path / target)
+        assert done.exit_code == 2
+        assert word in done.stderr
+    assert not (tmp_path / "other").exists()
+
+
+def test_run_ends_with_the_report_and_goes_on_where_it_was(study):
+    done = call("run", study, "--executor", "serial")
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.startswith("load")
+    assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
+    with ResultStore.open("small.h5") as store:
+        assert store.complete
+    again = call("run", study, "--executor", "serial")
+    assert (again.exit_code, again.stdout) == (0, done.stdout)
+
+
+def test_run_with_fewer_joints_into_another_file_without_report(study, tmp_path):
+    done = call("run", study, "--n", 5, "--out", "five.h5", "--executor", "serial", "--no-report")
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["five.h5", "small.toml"]
+
+
+@pytest.mark.parametrize(("option", "checks"), [("--verify", True), ("--no-verify", False)])
+def test_run_checks_its_numbers_unless_told_not_to(study, monkeypatch, option, checks):
+    told, run = [], campaign.run
+    monkeypatch.setattr(campaign, "run", lambda *a, check=True, **k: told.append(check) or run(*a, **k))
+    assert call("run", study, "--executor", "serial", "--no-report", option).exit_code == 0
+    assert told == [checks]
+
+
+def test_run_refuses_the_file_of_another_study(study):
+    call("run", study, "--n", 5, "--executor", "serial", "--no-report")
+    done = call("run", study, "--executor", "serial")
+    assert done.exit_code == 2
+    assert "sampling.n: 5 in the file, 60 in the study" in done.stderr
+
+
+def test_interrupted_run_says_how_to_go_on(study, monkeypatch):
+    path = synthetic.store(study.parent, simulated=20)
+    with ResultStore.open(path) as store:
+        counts = store.counts()
+
+    def stopped(*_, **__):
+        raise campaign.Interrupted(path, counts)
+
+    monkeypatch.setattr(campaign, "run", stopped)
+    done = call("run", study)
+    assert (done.exit_code, done.stdout) == (130, "")
+    assert "20 of 61 joints are kept" in done.stderr
+
+
+def test_ctrl_c_anywhere_else_is_130(study, monkeypatch):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(campaign, "run", stopped)
+    assert call("run", study).exit_code == 130
+
+
+def test_dead_worker_is_no_fault_of_the_input(study, monkeypatch):
+    def died(*_, **__):
+        raise WorkerDied("a worker was killed")
+
+    monkeypatch.setattr(campaign, "run", died)
+    done = call("run", study)
+    assert done.exit_code == 1
+    assert "a worker was killed" in done.stderr
+
+
+def simulated(status, load):
+    """Make a stand-in for a simulated case."""
+    loads = {name: {"F": load, "T": load} for name in BUSHINGS}
+    facts = {"status": status, "settled": status == "ok", "closure": load, "max": loads}
+    trace = pd.DataFrame({"theta": [0.0, 180.0], "tau": [1.0, 0.1 + 0.2]})
+    return SimpleNamespace(summary=lambda: facts, to_pandas=lambda: trace, remedy=lambda: "try more")
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(synthetic.STUDY.partition("[tolerances]")[0], encoding="utf-8")
+    return path
+
+
+def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monkeypatch):
+    made = simulated("ok", 1.5)
+    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: made)
+    done = call("simulate", case, "--json", "--out", tmp_path / "trace.csv")
+    assert done.exit_code == 0, done.stderr
+    assert json.loads(done.stdout) == made.summary()
+    assert (tmp_path / "trace.csv").read_text() == "theta,tau\n0.0,1.0\n180.0,0.30000000000000004\n"
+    lines = call("simulate", case).stdout.splitlines()
+    assert lines[0] == "status: ok"
+    assert lines[-1].split() == ["fork4", "1.5", "1.5"]
+
+
+def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch):
+    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("newton_failed", None))
+    done = call("simulate", case)
+    assert done.exit_code == 0
+    assert done.stdout.splitlines()[-1].split() == ["fork4", "-", "-"]
+    assert "warning: newton_failed: a step failed" in done.stderr
+    assert "hint: try more" in done.stderr
+
+
+UNDAMPED = """
+contact.law = "stations"
+contact.stations = [
+  { s_over_z = 0.5, k1 = "1.6e6 N/mm^2", k2 = "1.8e5 N/mm", weight = 1.0 },
+  { s_over_z = -0.5, k1 = "1.6e6 N/mm^2", k2 = "1.8e5 N/mm", weight = 0.0 },
+]
+"""
+
+
+@pytest.mark.parametrize("command", ["simulate", "plan", "run"])
+def test_what_is_hardly_meant_is_a_warning(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("ok", 1.5))
+    text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", f"{UNDAMPED}[operation]")
+    if command == "simulate":
+        text = text.partition("[tolerances]")[0]
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    done = call(command, "own.toml", *(["--no-verify", "--no-report", "--workers", 1] if command == "run" else []))
+    assert done.exit_code == 0, done.stderr
+    assert done.stderr.count("warning: own.toml: joint.contact.stations[1]: can touch alone with weight 0") == 1
+    assert "hint: give it a weight" in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [("simulate", "--out"), ("export", "--csv")])
+def test_no_output_replaces_its_input(tmp_path, arguments):
+    command, option = arguments
+    path = tmp_path / "given"
+    path.write_text("precious")
+    ended = call(command, path, option, path)
+    assert ended.exit_code == 2
+    assert "it is the input" in ended.stderr
+    assert path.read_text() == "precious"
+
+
+def test_a_folder_as_output_is_refused_before_the_work(tmp_path):
+    for target, word in ((tmp_path, "is a folder"), (tmp_path / "none" / "t.csv", "no such folder")):
+        ended = call("simulate", tmp_path / "case.toml", "--out", target)
+        assert ended.exit_code == 2
+        assert word in ended.stderr

@@ -1,0 +1,149 @@
+"""Equations of motion against their naive twin in world coordinates, and the linear algebra against LAPACK."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.conftest import LAWS, with_law
+from tests.support import naive
+from tolstat.benchmarks.dense import dense
+from tolstat.common.tables import RESULTANT, Mode, Options
+from tolstat.kernel.mechanics import dynamics, linsolve, tangent
+from tolstat.kernel.mechanics.motion import ideal_motion
+from tolstat.kernel.mechanics.topology import N_DOF, PSI
+from tolstat.kernel.mechanics.work import make_work
+
+OPTIONS = Options()
+
+
+def loaded(params, random_errors, law, seed=1, alpha=0.4):
+    """A joint with errors in the midst of contact: pins pressed some 10 um into their holes, all moving."""
+    par = params(alpha=alpha, speed=80.0, **random_errors(seed))[0]
+    with_law(par, law)
+    par.clearance[:] = 1e-5
+    rng = np.random.default_rng(seed)
+    q = rng.normal(0, 2e-5, N_DOF)
+    q[:PSI].reshape(9, 6)[:, 3:] = rng.normal(0, 5e-3, (9, 3))
+    v = rng.normal(0, 1e-2, N_DOF)
+    return par, 0.017, q, v
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.26, 1.2])
+@pytest.mark.parametrize("theta", [0.0, 0.7, 2.0, 4.0, 5.9])
+def test_frames_are_those_of_the_output_shaft(theta, alpha):
+    """C Ry(gamma) = Ry(alpha) Rz(theta_o), and angular velocities are the derivatives of the attitudes."""
+    work = make_work()
+    omega, h = 3.0, 1e-5
+    ideal_motion(theta, alpha, omega, work)
+    here, ahead, behind = (naive.frames(theta + s * omega * h, alpha) for s in (0, 1, -1))
+    shaft = here[2] @ naive.Z
+    np.testing.assert_allclose(shaft, [np.sin(alpha), 0, np.cos(alpha)], atol=1e-15)
+    for k in range(3):
+        rate = here[k].T @ (ahead[k] - behind[k]) / (2 * h)
+        w = np.array([rate[2, 1], rate[0, 2], rate[1, 0]])
+        np.testing.assert_allclose(work.frame_w[k], w, atol=2e-7)
+    speed = {}
+    for s in (1, -1):
+        ideal_motion(theta + s * omega * h, alpha, omega, work)
+        speed[s] = work.frame_w.copy()
+    ideal_motion(theta, alpha, omega, work)
+    np.testing.assert_allclose(work.frame_dw, (speed[1] - speed[-1]) / (2 * h), atol=1e-6 * (1 + np.tan(alpha) ** 4))
+    np.testing.assert_allclose(work.relative[0], here[0].T @ here[1], atol=1e-15)
+    np.testing.assert_allclose(work.relative[2], here[2].T @ here[1], atol=1e-14)
+    for k in (0, 2):
+        against = here[k].T @ here[1] @ work.frame_w[1] - work.frame_w[k]
+        np.testing.assert_allclose(work.relative_w[k], against, atol=1e-13 * (1 + np.tan(alpha) ** 2))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_loads_are_those_of_the_naive_twin(params, random_errors, law):
+    par, t, q, v = loaded(params, random_errors, law)
+    work = make_work()
+    dynamics.forces(t, q, v, par, work)
+    assert (work.contact[:, RESULTANT] > 100).all(), "the test wants every pin in contact"
+    _, loads, _ = naive.forces(t, q, v, par)
+    np.testing.assert_allclose(work.load, loads, rtol=1e-6, atol=1e-4 * np.abs(loads).max())
+
+
+@pytest.mark.parametrize("law", ["mode", "sliced"])
+def test_contact_modes_are_those_of_the_naive_twin(params, random_errors, law):
+    seen = set()
+    for seed in range(12):
+        par, t, q, v = loaded(params, random_errors, law, seed)
+        par.clearance[:] = 1e-5 * 2.0 ** (seed % 5)
+        work = make_work()
+        dynamics.forces(t, q, v, par, work)
+        modes = [Mode(m).name for m in work.mode]
+        assert modes == naive.forces(t, q, v, par)[2]
+        seen |= set(modes)
+    assert seen == set(Mode.__members__), "the test wants to see every mode"
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_accelerations_balance_the_naive_twin(params, random_errors, law, seed):
+    """Momentum and angular momentum of every body change by the forces on it, in world coordinates."""
+    par, t, q, v = loaded(params, random_errors, law, seed)
+    work, a = make_work(), np.full(N_DOF, np.nan)
+    dynamics.acceleration(t, q, v, par, OPTIONS, work, a)
+    force = work.force.copy()
+    off = naive.imbalance(t, q, v, a, par, par.torque)
+    for name, difference in off.items():
+        scale = np.abs(force).max() if name != "out" else np.abs(force[10, 5])
+        assert np.abs(difference).max() < 2e-4 * scale, name
+
+
+def test_residual_of_the_acceleration_is_zero(params, random_errors):
+    par, t, q, v = loaded(params, random_errors, "mode")
+    work, a, out = make_work(), np.full(N_DOF, np.nan), np.full(N_DOF, np.nan)
+    dynamics.acceleration(t, q, v, par, OPTIONS, work, a)
+    dynamics.residual(t, q, v, a, par, OPTIONS, work, out)
+    assert np.abs(out).max() < 1e-11 * np.abs(work.force).max()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_tangent_is_the_derivative_of_the_residual(params, random_errors, law):
+    """Up to what the tangent leaves out on purpose, which must cost Newton less than a tenth a step."""
+    par, t, q, v = loaded(params, random_errors, law)
+    work, cv = make_work(), 2000.0
+    ca = cv * cv
+    a = np.zeros(N_DOF)
+    out = np.full((2, N_DOF), np.nan)
+    derivative = np.empty((N_DOF, N_DOF))
+    for j in range(N_DOF):
+        step = np.zeros(N_DOF)
+        step[j] = 1e-9
+        for k, sign in enumerate((1, -1)):
+            d = sign * step
+            dynamics.residual(t, q + d, v + cv * d, a + ca * d, par, OPTIONS, work, out[k])
+        derivative[:, j] = (out[0] - out[1]) / 2e-9
+    dynamics.residual(t, q, v, a, par, OPTIONS, work, out[0])
+    tangent.assemble(cv, ca, par, work)
+    contraction = np.eye(N_DOF) - np.linalg.solve(dense(work), derivative)
+    assert np.abs(np.linalg.eigvals(contraction)).max() < 0.1
+
+
+@pytest.mark.parametrize("law", ["mode", "sliced"])
+def test_block_elimination_is_lapack(params, random_errors, law):
+    par, t, q, v = loaded(params, random_errors, law)
+    work = make_work()
+    dynamics.forces(t, q, v, par, work)
+    tangent.assemble(2000.0, 4e6, par, work)
+    full = dense(work)
+    rhs = np.random.default_rng(0).normal(size=N_DOF)
+    expected = np.linalg.solve(full, rhs)
+    assert linsolve.factorise(work)
+    work.solution[:] = rhs
+    linsolve.solve(np.zeros(N_DOF), work)
+    np.testing.assert_allclose(work.solution, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+
+
+def test_a_singular_block_is_reported(params):
+    work = make_work()
+    dynamics.forces(0.0, np.zeros(N_DOF), np.zeros(N_DOF), params()[0], work)
+    tangent.assemble(2000.0, 4e6, params()[0], work)
+    work.lump_block[5, 0, 0] = 0.0
+    assert not linsolve.factorise(work)
+    work.lump_block[5, 0, 0] = np.nan
+    assert not linsolve.factorise(work)

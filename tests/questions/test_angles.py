@@ -1,0 +1,107 @@
+"""Loads over the shaft angle: read or simulated again, and the errors that make them scatter at each angle."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from tests.support import synthetic
+from tolstat import study
+from tolstat.campaign import run as campaign
+from tolstat.campaign.recall import recall
+from tolstat.cli import app
+from tolstat.common.errors import InputError, StoreError
+from tolstat.questions.causes import angles
+from tolstat.store import ResultStore, revolutions
+from tolstat.store.revolutions import Revolutions
+
+TEXT = synthetic.STUDY.replace("n = 60", "n = 900").replace("offset_t", "offset_[tz]")
+SIGMA = 1e-4 / 3
+
+
+@pytest.fixture(scope="module")
+def stores(tmp_path_factory):
+    """The same few joints with whole histories, with harmonics, and with none."""
+    folder = tmp_path_factory.mktemp("revolutions")
+    found = {}
+    for kind in ("full", "harmonics", "none"):
+        source = folder / f"{kind}.toml"
+        text = synthetic.STUDY.replace("n = 60", "n = 4") + f'\n[output]\nhistories = "{kind}"\nharmonics = 60\n'
+        source.write_text(text, encoding="utf-8")
+        campaign.run(study.load(source), folder / f"{kind}.h5", workers=1)
+        found[kind] = folder / f"{kind}.h5"
+    return found
+
+
+def test_loads_are_the_same_wherever_they_are_from(stores):
+    rows = np.array([0, 2, 4])
+    found = {}
+    for kind, path in stores.items():
+        with ResultStore.open(path) as store:
+            found[kind] = revolutions.read(store, rows, 180)
+            largest = store.results()["F_max"][rows]
+    assert [found[kind].origin for kind in stores] == ["stored", "harmonics", "simulated again"]
+    assert found["none"].apart == 0.0
+    assert found["full"].F.max(axis=1) == pytest.approx(largest, rel=1e-4)  # between the samples
+    assert np.array_equal(found["full"].F, found["none"].F)
+    assert np.array_equal(found["full"].T, found["none"].T)
+    np.testing.assert_allclose(found["harmonics"].F, found["full"].F, rtol=0.02)
+    assert found["full"].angles[1] == pytest.approx(np.radians(2.0))
+    with ResultStore.open(stores["none"]) as store:
+        coarse = revolutions.read(store, rows, 60)
+    assert np.array_equal(coarse.T, found["none"].T[:, ::3])
+
+
+@pytest.fixture
+def known(tmp_path, monkeypatch):
+    """Campaign whose load cross2.F is made by one error at 0 and by another one at 90 degrees."""
+
+    def invented(store, rows):
+        theta = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+        errors = store.errors()[rows]
+        one, other = (errors[name][:, None] / SIGMA for name in ("pin1.offset_t", "pin3.offset_z"))
+        load = 600.0 + 20.0 * one * np.cos(theta) + 10.0 * other * np.sin(theta)
+        moduli = np.repeat(load[:, :, None], 8, axis=2)
+        return Revolutions(rows, theta, moduli, 0.1 * moduli, "stored", 0.0)
+
+    monkeypatch.setattr(angles, "read", invented)
+    return synthetic.store(tmp_path, TEXT, "known", failed=5)
+
+
+def test_each_error_has_its_share_where_it_acts(known):
+    with ResultStore.open(known) as store:
+        found = angles.of_store(store, recall(store), ["cross2.F"], 800)[0]
+    assert (found.joints, found.names[:2]) == (800, ("pin1.offset_t", "pin3.offset_z"))
+    assert found.nominal == pytest.approx(np.full(12, 600.0))
+    square = np.stack([400.0 * np.cos(found.angles) ** 2, 100.0 * np.sin(found.angles) ** 2])
+    assert found.first.estimate[:2] == pytest.approx(square / square.sum(axis=0), abs=0.1)
+    assert found.overall.estimate[:2] == pytest.approx([0.8, 0.2], abs=0.05)
+    assert np.abs(found.first.estimate[2:]).max() < 0.06
+    assert found.overall.lower[0] < 0.8 < found.overall.upper[0]
+    low, middle, high = found.spread
+    assert middle == pytest.approx(600.0, abs=4.0)
+    assert (high - low)[0] == pytest.approx(2 * 1.645 * 20.0, rel=0.15)
+
+
+def test_command_writes_shares_and_picture(known, tmp_path):
+    arguments = ["causes", str(known), "--by", "cross2.F", "--against-angle", str(tmp_path / "out.csv"), "--n", "2"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["error", "pin1.offset_t", "pin3.offset_z"]
+    assert lines[2].split()[-1] in ("90", "270")
+    table = pd.read_csv(tmp_path / "out.csv")
+    assert len(table) == 12 * 8
+    assert table.groupby("theta")["share"].sum().to_numpy() == pytest.approx(1.0, abs=0.15)
+    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_has_no_shares_is_refused(known, tmp_path):
+    few, sweep = synthetic.store(tmp_path), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
+    with ResultStore.open(known) as store:
+        plan = recall(store)
+        with pytest.raises(InputError, match="no load over the shaft angle"):
+            angles.of_store(store, plan, ["pin1.contact"])
+    for path, text in ((few, "100 are needed"), (sweep, "not drawn from tolerances")):
+        with ResultStore.open(path) as store, pytest.raises(StoreError, match=text):
+            angles.of_store(store, recall(store), ["cross1.F"])

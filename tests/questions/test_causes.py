@@ -1,0 +1,165 @@
+"""Commands `causes` and `capability` on a campaign whose causes are known."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from tests.support import synthetic
+from tolstat.analysis import exceedance, sensitivity
+from tolstat.cli import app
+from tolstat.common.tables import Simulation, Status
+from tolstat.questions.capability import rendering as capability
+from tolstat.questions.causes import query as causes
+from tolstat.questions.causes import rendering as report
+from tolstat.store import ResultStore
+from tolstat.store import view as source
+
+N = 3000
+TEXT = synthetic.STUDY.replace("n = 60", f"n = {N}").replace('"pin*.offset_t"', '"pin*.offset_[tz]"')
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("causes"), TEXT)
+
+
+def made(folder, text, name="known"):
+    """Campaign in which cross1.F rises with one error, and with the size of another."""
+    file = synthetic.store(folder, text, name, simulated=0)
+    with ResultStore.open(file, "r+") as store:
+        results, errors = synthetic.results(store.n, failed=3, unsettled=2), store.errors()
+        sigma = 1e-4 / 3
+        load = 640.0 + 20.0 * errors["pin1.offset_t"] / sigma + 10.0 * (errors["pin2.offset_z"] / sigma) ** 2
+        results["F_max"][:-5, 0] = load[:-5]
+        store.write(np.arange(store.n), Simulation(results, None))
+    return file
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_known_causes_are_found_with_their_shares(path):
+    with ResultStore.open(path) as store:
+        found = causes.of_store(store, "cross1.F")
+    assert (found.joints, found.lost, found.level) == (N - 5, 5, 700.0)
+    table = found.table.set_index("error")
+    assert set(found.table["error"][:2]) == {"pin1.offset_t", "pin2.offset_z"}
+    # variances 20² and 2 · 10²
+    assert table.loc["pin1.offset_t", "first"] == pytest.approx(2 / 3, abs=0.05)
+    assert table.loc["pin2.offset_z", "first"] == pytest.approx(1 / 3, abs=0.05)
+    assert table.loc["pin1.offset_t", "total_lower"] < 2 / 3 < table.loc["pin1.offset_t", "total_upper"]
+    assert table.loc["pin1.offset_t", "srrc"] > 0.7
+    assert abs(table.loc["pin2.offset_z", "srrc"]) < 0.1
+    assert table.loc["pin1.offset_t", "direction_p"] < 1e-6 < 0.05 < table.loc["pin2.offset_z", "direction_p"]
+    assert table.loc["pin2.offset_z", "size_p"] < 1e-6
+    with ResultStore.open(path) as store:
+        relative = causes.of_store(store, "cross1.F", log=True)
+    assert relative.std == pytest.approx(found.std / 650, rel=0.05)
+    others = table.drop(["pin1.offset_t", "pin2.offset_z"])
+    assert others[["direction_p", "size_p"]].min(axis=None) > 0.05
+    assert others["first"].max() < 0.02
+
+
+def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):
+    monkeypatch.setattr(causes, "MOST", 1000)
+    monkeypatch.setattr(source, "BLOCK", 700)
+    with ResultStore.open(path) as store:
+        found = causes.of_store(store, "cross1.F")
+        errors, loads = store.errors()[1:1001], store.results()["F_max"][1:-5, 0]
+    assert (found.joints, found.used) == (N - 5, 1000)
+    row = found.table.set_index("error").loc["pin1.offset_t"]
+    x = np.column_stack([errors[name] for name in found.table["error"]])
+    here = list(found.table["error"]).index("pin1.offset_t")
+    assert row["first"] == pytest.approx(sensitivity.first_order(x, loads[:1000]).estimate[here])
+    assert found.above == np.sum(found.level < loads)
+    assert row["direction_p"] < 1e-6
+    assert "first 1000 joints" in report.note(found)
+
+
+def test_command_prints_the_first_errors_and_json_has_all(path):
+    done = run("causes", path, "--n", 2)
+    assert done.exit_code == 0
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["error", "pin1.offset_t", "pin2.offset_z"]
+    assert "*" in lines[1]
+    assert "2995 joints, 5 without a valid load" in done.stderr
+    assert "of the logarithm" in run("causes", path, "--log").stderr
+    found = json.loads(run("causes", path, "--by", "psi", "--json").stdout)
+    assert len(found["table"]) == 8
+    assert found["unit"] == "1"
+
+
+def test_correlated_errors_have_no_total_and_dependent_samples_no_interval(tmp_path):
+    text = TEXT.replace('"random"', '"lhs"').replace("[limits]", 'method = "lhs"\n\n[limits]').replace("3000", "400")
+    text += '\n[[correlation]]\nbetween = ["pin1.offset_t", "pin3.offset_t"]\nrho = 0.5\n'
+    done = run("causes", made(tmp_path, text))
+    assert done.exit_code == 0
+    assert "correlated" in done.stderr
+    assert "independent samples only" in done.stderr
+    assert ".." not in done.stdout
+
+
+def test_what_has_no_causes_is_refused(tmp_path, path):
+    few = synthetic.store(tmp_path)
+    sweep = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
+    for arguments, text in (
+        ((few,), "60 joints with a valid load"),
+        ((sweep,), "not drawn from tolerances"),
+        ((path, "--by", "cross9.F"), "is not a load"),
+    ):
+        done = run("causes", *arguments)
+        assert done.exit_code == 2
+        assert text in done.stderr
+        assert "hint:" in done.stderr
+
+
+def test_capability_of_each_limit_and_of_all_together(path):
+    with ResultStore.open(path) as store:
+        campaign = source.read(store)
+    table = capability.limits(campaign).set_index("load")
+    assert list(table.index) == [*campaign.limits, capability.TOGETHER]
+    status = campaign.results["status"]
+    shares = {
+        name: exceedance.at(source.load(campaign.results, name)[0], status, x) for name, x in campaign.limits.items()
+    }
+    assert table.loc["cross1.F", "ppm"] == pytest.approx(1e6 * shares["cross1.F"].estimate)
+    above = pd.DataFrame({n: source.load(campaign.results, n)[0] > x for n, x in campaign.limits.items()})
+    assert table.loc[capability.TOGETHER, "count"] == above[status == Status.OK].any(axis=1).sum()
+    assert table.loc[capability.TOGETHER, "good"] <= table["good"].min()
+    assert (table["ppm_lower"] <= table["ppm"]).all()
+    assert (table["ppm"] < table["ppm_upper"]).all()
+
+
+def test_capability_command_prints_indices_and_return_loads(path):
+    done = run("capability", path, "--one-in", 1000, "--one-in", 1e6)
+    assert done.exit_code == 0
+    assert "all limits" in done.stdout
+    assert "one in N" in done.stdout
+    for text in ("there is no Cp", "5 joints without a valid load", "lower ends of Cpk need 3244", "not normal"):
+        assert text in done.stderr
+    found = json.loads(run("capability", path, "--one-in", 1000, "--json").stdout)
+    row = found["one_in"][0]
+    assert row["lower"] < row["estimate"] < row["upper"]
+    assert row["bound_upper"] is None  # five lost joints of 3000 alone may be one in 1000
+
+
+def test_capability_without_limits_and_thin_tails_are_refused(tmp_path):
+    sweep, few = synthetic.store(tmp_path, synthetic.SWEEP, "sweep"), synthetic.store(tmp_path)
+    for arguments, text in (
+        ((sweep,), "no joints judged by limits"),
+        ((few, "--one-in", 100), "simulate some 500 joints"),
+    ):
+        done = run("capability", *arguments)
+        assert done.exit_code == 2
+        assert text in done.stderr
+
+
+def test_a_load_that_many_joints_exceed_is_no_extrapolation(path):
+    done = run("capability", path, "--one-in", 4)
+    assert done.exit_code == 2
+    assert "is not in the tail" in done.stderr
+    assert "hint: ask for its quantile" in done.stderr

@@ -1,0 +1,184 @@
+"""Two campaigns side by side: coverage of the differences, and a known difference found joint by joint."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import binomtest, norm, ttest_ind, ttest_rel
+from typer.testing import CliRunner
+
+from tests.support import synthetic
+from tolstat.analysis import difference
+from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.cli import app
+from tolstat.common.errors import InputError
+from tolstat.common.tables import Simulation, Status
+from tolstat.questions.compare import query as compare
+from tolstat.store import ResultStore
+
+SEEDS = 500
+LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+
+
+def pairs(n, seeds=SEEDS):
+    """Lognormal loads of A, and those of B, correlated with them and a tenth larger."""
+    z = np.random.default_rng(3).standard_normal((seeds, 2, n))
+    return zip(np.exp(z[:, 0]), 1.1 * np.exp(0.8 * z[:, 0] + 0.6 * z[:, 1]), strict=True)
+
+
+def truth(share=None, level=None):
+    if share is not None:
+        return 0.1 * np.exp(norm.ppf(share))
+    return norm.sf(np.log(level / 1.1)) - norm.sf(np.log(level))
+
+
+def test_paired_differences_cover_over_seeds_and_a_walds_interval_of_rare_shares_does_not(monkeypatch):
+    monkeypatch.setattr(difference, "RESAMPLES", 200)
+    level, covered, wald = 16.0, [], []  # one in some 300 joints
+    for a, b in pairs(200):
+        share, q = difference.shares(a, b, [level], True), difference.quantiles(a, b, 0.7, True)
+        mean = difference.means(a, b, True)
+        covered.append(
+            [
+                share.lower[0] <= truth(level=level) <= share.upper[0],
+                q.lower <= truth(share=0.7) <= q.upper,
+                mean.lower <= 0.1 * np.exp(0.5) <= mean.upper,
+            ]
+        )
+        d = (b > level) * 1.0 - (a > level)
+        wald.append(abs(d.mean() - truth(level=level)) <= 1.96 * d.std() / np.sqrt(d.size))
+    found = np.mean(covered, axis=0)
+    assert (found[:2] >= LEAST).all()
+    assert found[2] >= 0.90  # Student's interval of a skew mean
+    assert np.mean(wald) < LEAST
+
+
+def test_unpaired_differences_cover_and_neglecting_one_side_does_not():
+    level, covered, half = 3.0, [], []
+    for (a, _), (_, b) in zip(pairs(200), [*pairs(200)][1:], strict=False):
+        share, q = difference.shares(a, b, [level], False), difference.quantiles(a, b, 0.8, False)
+        covered.append([share.lower[0] <= truth(level=level) <= share.upper[0], q.lower <= truth(share=0.8) <= q.upper])
+        low, high = clopper_pearson(np.sum(b > level), b.size)
+        half.append(low - np.mean(a > level) <= truth(level=level) <= high - np.mean(a > level))
+    assert (np.mean(covered, axis=0) >= LEAST).all()
+    assert np.mean(half) < LEAST
+
+
+def test_tests_and_means_are_scipys():
+    a, b = next(pairs(400))
+    share = difference.shares(a, b, [2.0, 5.0], True)
+    for i, level in enumerate((2.0, 5.0)):
+        only = (int(np.sum((b > level) & (a <= level))), int(np.sum((a > level) & (b <= level))))
+        assert (share.only_b[i], share.only_a[i]) == only
+        assert share.p[i] == pytest.approx(binomtest(only[0], sum(only)).pvalue)
+        assert share.estimate[i] == pytest.approx(np.mean(b > level) - np.mean(a > level))
+    for paired, test in ((True, ttest_rel(b, a)), (False, ttest_ind(b, a, equal_var=False))):
+        found, theirs = difference.means(a, b, paired), test.confidence_interval()
+        assert (found.lower, found.upper) == pytest.approx((theirs.low, theirs.high))
+
+
+def test_joints_without_a_load_are_bounds_and_dependent_samples_have_no_interval():
+    a, b = np.array([1.0, 2.0, np.nan, 4.0]), np.array([1.0, 3.0, 3.0, np.nan])
+    found = difference.shares(a, b, [2.5], True)
+    assert (found.n, found.estimate[0]) == (2, 0.5)
+    assert (found.bound_lower[0], found.bound_upper[0]) == (0.5 - 0.5, 0.75 - 0.25)
+    assert found.outer_lower[0] < 0.0 < found.bound_upper[0] < found.outer_upper[0]
+    assert np.isnan(difference.shares(a, b, [2.5], True, iid=False).outer_upper[0])
+    assert np.isnan(difference.quantiles(a, b, 0.5, True, iid=False).lower)
+    with pytest.raises(ValueError, match="not those of pairs"):
+        difference.shares(a, b[:2], [2.5], True)
+    with pytest.raises(ValueError, match="no joint with a valid load"):
+        difference.means(a[2:3], b, False)
+
+
+def campaign(folder, name, text=synthetic.STUDY, n=400, factor=1.0):
+    """Campaign whose load cross1.F follows one error; its last joint has failed."""
+    path = synthetic.store(folder, text.replace("n = 60", f"n = {n}"), name, simulated=0)
+    with ResultStore.open(path, "r+") as store:
+        results = synthetic.results(store.n, failed=1)
+        results["F_max"][:-1, 0] = 640.0 + factor * 1e6 * np.abs(store.errors()["pin1.offset_t"][:-1])
+        store.write(np.arange(store.n), Simulation(results, None))
+    return path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_joints_of_one_seed_are_paired_by_sample_and_changes_are_put_together(tmp_path):
+    wide = synthetic.STUDY.replace("0.1 mm", "0.12 mm").replace("n = 60", "n = 60\nnominal_first = false")
+    a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", wide, n=300)
+    with ResultStore.open(a) as one, ResultStore.open(b) as other:
+        found = compare.of_stores(one, other, ["cross1.F"])
+        loads = [source_of(store)[k : k + 299] for store, k in ((one, 1), (other, 0))]
+    assert found.sides.paired
+    assert found.sides.rows[[0, -1]].tolist() == [1, 300]
+    row = found.shares.set_index("load").loc["cross1.F"]
+    above = [load > 700.0 for load in loads]
+    assert (row["only_a"], row["only_b"]) == (0, np.sum(above[1] & ~above[0]))
+    assert row["lower"] > 0
+    assert (
+        found.switched.query("load == 'cross1.F'")["row"].tolist()
+        == (1 + np.flatnonzero(above[0] != above[1])).tolist()
+    )
+    sigmas = [f"tolerances.pin{i}.offset_t.sigma" for i in (1, 2, 3, 4)]
+    assert [change.keys for change in found.changes if "tolerances" in change.keys[0]] == [sigmas]
+    assert found.loads["statistic"].tolist() == ["mean", "50 %", "90 %", "99 %"]
+
+
+def source_of(store):
+    return store.results()["F_max"][:, 0]
+
+
+def test_other_seeds_are_not_paired(tmp_path):
+    a, b = (
+        campaign(tmp_path, "a"),
+        campaign(tmp_path, "b", synthetic.STUDY.replace("seed = 2021", "seed = 5"), factor=1.2),
+    )
+    with ResultStore.open(a) as one, ResultStore.open(b) as other:
+        found = compare.of_stores(one, other)
+    assert not found.sides.paired
+    assert found.switched.empty
+    row = found.shares.set_index("load").loc["cross1.F"]
+    assert row["lower"] < row["estimate"] < row["upper"]
+    assert np.isnan(row["p"])
+
+
+def test_command_prints_tables_and_writes_files(tmp_path):
+    a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", factor=1.1)
+    done = run("compare", a, b, "--by", "cross1.F", "--out", tmp_path / "out")
+    assert done.exit_code == 0
+    assert "cross1.F > 700 N" in done.stdout
+    assert "400 pairs of joints" in done.stderr
+    assert "the studies are the same" in done.stderr
+    assert "2 joints without a valid load" in done.stderr
+    names = [f"a_b_{what}" for what in ("compare.png", "compare.svg", "loads.csv", "shares.csv", "switched.csv")]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
+    switched = pd.read_csv(tmp_path / "out" / "a_b_switched.csv").query("load == 'cross1.F'")
+    found = json.loads(run("compare", a, b, "--json").stdout)
+    assert found["shares"][0]["only_b"] == len(switched) > 0
+    assert found["loads"][0]["estimate"] == pytest.approx(found["loads"][0]["b"] - found["loads"][0]["a"])
+
+
+def test_what_cannot_be_compared_is_refused(tmp_path):
+    a, sweep = campaign(tmp_path, "a"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
+    done = run("compare", a, sweep)
+    assert done.exit_code == 2
+    assert "not drawn from tolerances" in done.stderr
+    blocked = tmp_path / "a_a_compare.png"
+    blocked.mkdir()
+    done = run("compare", a, a)
+    assert done.exit_code == 2
+    assert "hint: name another folder" in done.stderr
+    with ResultStore.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:
+        compare.of_stores(one, one, ["cros1.F", "nothing"])
+    assert len(refused.value.faults) == 2
+
+
+def test_pending_joints_are_not_compared(tmp_path):
+    a, b = campaign(tmp_path, "a", n=60), synthetic.store(tmp_path, simulated=31, name="b")
+    with ResultStore.open(a) as one, ResultStore.open(b) as other:
+        found = compare.of_stores(one, other)
+    assert len(found.sides.rows) == 30
+    assert (found.sides.b.results["status"] == Status.OK).all()

@@ -1,0 +1,225 @@
+"""Cycles, spectra and damage: against ASTM E1049, other packages, a naive twin and closed forms."""
+
+from __future__ import annotations
+
+import doctest
+from collections import Counter
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.support import naive
+from tolstat.analysis import cycles, damage
+from tolstat.analysis.cycles import Cycles
+from tolstat.common.tables import CHANNELS
+from tolstat.solver import rainflow
+
+ASTM = [-2, 1, -3, 5, -1, 3, -4, 4]
+"""ASTM E1049-85, Figures 6 and 7."""
+SIGNALS = st.lists(st.integers(-9, 9), min_size=1, max_size=60)
+
+
+def needs(package):
+    return pytest.mark.skipif(find_spec(package) is None, reason=f"{package} is not installed: pip install .[fatigue]")
+
+
+def pairs(ranges, means):
+    """Multiset of cycles."""
+    return Counter(zip(np.round(ranges, 9).tolist(), np.round(means, 9).tolist(), strict=True))
+
+
+def closed(signal):
+    """One period from its largest value to the same again."""
+    first = int(np.argmax(signal))
+    return np.concatenate([signal[first:], signal[: first + 1]]).astype(float)
+
+
+def noise(seed=1, n=500):
+    return np.random.default_rng(seed).normal(size=n)
+
+
+def of_signals(*signals):
+    """Cycles of joints with one channel, as the store gives them."""
+    table = np.zeros((len(signals), 1, 300, 2))
+    number = np.zeros((len(signals), 1))
+    for i, signal in enumerate(signals):
+        ranges, means = rainflow.periodic(signal)
+        table[i, 0, : len(ranges), 0], table[i, 0, : len(ranges), 1] = ranges, means
+        number[i] = len(ranges)
+    return Cycles(("cross1.F_e",), table[..., 0], table[..., 1], number, np.ones(300))
+
+
+def test_the_standards_example():
+    ranges, means = rainflow.periodic(ASTM)
+    assert ranges.tolist() == [9, 7, 4, 3]
+    assert means.tolist() == [0.5, 0.5, 1.0, -0.5]
+    assert doctest.testmod(rainflow) == (0, 1)
+
+
+@settings(max_examples=300, deadline=None)
+@given(SIGNALS)
+def test_cycles_are_those_of_the_naive_twin_and_conserve_reversals(signal):
+    ranges, means = rainflow.periodic(signal)
+    assert pairs(ranges, means) == pairs(*naive.rainflow(signal))
+    assert 2 * len(ranges) == len(naive.turns(signal))
+    travel = np.abs(np.diff([*signal, signal[0]])).sum()
+    assert 2 * ranges.sum() == pytest.approx(travel)
+    assert np.all(np.diff(ranges) <= 0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(SIGNALS, st.integers(0, 59))
+def test_where_the_revolution_is_cut_does_not_matter(signal, shift):
+    assert pairs(*rainflow.periodic(signal)) == pairs(*rainflow.periodic(np.roll(signal, shift)))
+    ranges, means = rainflow.periodic(signal)
+    assert pairs(ranges, -means) == pairs(*rainflow.periodic(-np.array(signal)))
+
+
+@settings(max_examples=100, deadline=None)
+@given(SIGNALS, st.integers(0, 12))
+def test_gate_takes_out_the_small_cycles_only(signal, gate):
+    ranges, means = rainflow.periodic(signal)
+    large = ranges > gate
+    assert pairs(*rainflow.periodic(signal, gate)) == pairs(ranges[large], means[large])
+
+
+@pytest.mark.parametrize("bad", [[], [[1.0]], [1.0, np.nan]])
+def test_no_cycles_of_what_is_no_signal(bad):
+    with pytest.raises(ValueError, match="finite values of one period expected"):
+        rainflow.periodic(bad)
+
+
+@needs("rainflow")
+def test_cycles_of_the_package_rainflow():
+    import rainflow as package
+
+    for signal in (np.array(ASTM), noise()):
+        whole = Counter()
+        for size, mean, number, *_ in package.extract_cycles(closed(signal)):
+            whole[round(size, 9), round(mean, 9)] += number
+        assert pairs(*rainflow.periodic(signal)) == whole
+
+
+@needs("fatpack")
+def test_cycles_of_the_package_fatpack():
+    import fatpack
+
+    for signal in (np.array(ASTM), noise()):
+        whole, residue = fatpack.find_rainflow_cycles(closed(naive.turns(signal.tolist())))
+        again, _ = fatpack.find_rainflow_cycles(fatpack.concatenate_reversals(residue, residue))
+        ends = np.array([*whole.tolist(), *again.tolist()])
+        assert pairs(*rainflow.periodic(signal)) == pairs(np.ptp(ends, axis=1), ends.mean(axis=1))
+
+
+@needs("pylife")
+def test_cycles_of_pylife():
+    from pylife.stress import rainflow as package
+
+    for signal in (np.array(ASTM), noise()):
+        recorder = package.LoopValueRecorder()
+        detector = package.FourPointDetector(recorder=recorder).process(closed(signal))
+        ends = np.transpose([recorder.values_from, recorder.values_to])
+        rise, fall = np.abs(np.diff(detector.residuals))  # the largest cycle stays open
+        assert rise == fall
+        ends = np.vstack([ends, detector.residuals[1:]])
+        assert pairs(*rainflow.periodic(signal)) == pairs(np.ptp(ends, axis=1), ends.mean(axis=1))
+
+
+def test_a_joints_channels_are_its_components_and_moduli():
+    rng = np.random.default_rng(5)
+    loads = rng.normal(size=(40, 8, 6)) + np.arange(6)
+    loads[:, 7] *= 1e-6  # cycles below the gate, but not those of the modulus
+    counted = rainflow.count(loads)
+    assert list(CHANNELS)[5:9] == ["cross1.T_z", "cross1.F", "cross1.T", "cross2.F_e"]
+    for c, name in enumerate(CHANNELS):
+        b, i = divmod(c, 8)
+        signal = loads[:, b, i] if i < 6 else np.linalg.norm(loads[:, b, 3 * i - 18 : 3 * i - 15], axis=1)
+        kind = slice(0, 3) if "F" in name else slice(3, 6)
+        ranges, means = rainflow.periodic(signal, rainflow.GATE * np.linalg.norm(loads[..., kind], axis=-1).max())
+        assert counted["cycle_count"][c] == len(ranges), name
+        kept = min(len(ranges), rainflow.KEPT)
+        np.testing.assert_allclose(counted["cycles"][c, :kept, 0], ranges[:kept], rtol=1e-6)
+        np.testing.assert_allclose(counted["cycles"][c, :kept, 1], means[:kept], rtol=1e-5, atol=1e-6)
+        assert not counted["cycles"][c, kept:].any()
+    assert (counted["cycle_count"][:56] > 0).all()
+    assert not counted["cycle_count"][56:].any()
+    loads[3, 2, 1] = np.nan
+    assert np.isnan(rainflow.count(loads)["cycles"]).all()
+
+
+def test_equivalent_load_and_damage_of_constant_amplitude():
+    wave = 50.0 * np.cos(2 * np.pi * 3 * np.arange(60) / 60) + 7.0  # three cycles of range 100
+    here = of_signals(wave, np.full(60, 5.0))
+    assert here.number.tolist() == [[3], [0]]
+    load = damage.equivalent_load(here, 5.0, revolutions=1e6, reference_cycles=2e6)
+    assert load[:, 0] == pytest.approx([100.0 * 1.5**0.2, 0.0])
+    line = damage.Line(m=4.0, S0=200.0, N0=2e6)
+    assert damage.damage(here, line, revolutions=1e6)[:, 0] == pytest.approx([3e6 / (2e6 * 2.0**4), 0.0])
+
+
+def test_a_duty_cycle_adds_damage_not_loads():
+    parts = [of_signals(noise(seed), noise(seed + 10)) for seed in (1, 2)]
+    shares = [0.3, 0.7]
+    both = cycles.mix(parts, shares)
+    line = damage.Line(3.0, 4.0, 1e6)
+    separate = sum(s * damage.damage(p, line, 1e6) for s, p in zip(shares, parts, strict=True))
+    np.testing.assert_allclose(damage.damage(both, line, 1e6), separate)
+    power = sum(s * damage.equivalent_load(p, 3.0) ** 3 for s, p in zip(shares, parts, strict=True))
+    np.testing.assert_allclose(damage.equivalent_load(both, 3.0), power ** (1 / 3))
+    np.testing.assert_allclose(cycles.mix([parts[0]] * 2, [0.5, 0.5]).number, parts[0].number)
+    for wrong in ([1.0], [0.5, 0.6], [0.0, 1.0]):
+        with pytest.raises(ValueError, match="shares"):
+            cycles.mix(parts, wrong)
+    with pytest.raises(ValueError, match="same joints"):
+        cycles.mix([parts[0], of_signals(noise())], shares)
+
+
+def test_spectrum_reads_the_ordered_ranges():
+    signals = [noise(1), np.array([0.0, 4, 1, 2]), np.zeros(4)]
+    here = of_signals(*signals)
+    numbers = [0.5, 1, 2, 3, 100]
+    expected = np.zeros((3, 5))
+    for i, signal in enumerate(signals):
+        ranges = rainflow.periodic(signal)[0]
+        for q, number in enumerate(numbers):
+            expected[i, q] = next((r for k, r in enumerate(ranges, 1) if k >= number), 0.0)
+    np.testing.assert_allclose(cycles.spectrum(here, numbers)[:, 0], expected)
+    both = cycles.mix([here, here], [0.4, 0.6])
+    np.testing.assert_allclose(cycles.spectrum(both, numbers)[:, 0], expected)
+
+
+def test_shortfall_bounds_what_has_no_place():
+    ranges = rainflow.periodic(noise())[0]
+    kept = Cycles(
+        ("cross1.F_e",), ranges[None, None, :16], ranges[None, None, :16], np.array([[len(ranges)]]), np.ones(16)
+    )
+    lost = np.sum(ranges[16:] ** 3) / np.sum(ranges[:16] ** 3)
+    assert lost <= damage.shortfall(kept, 3.0)[0, 0] < 100 * lost
+    assert damage.shortfall(of_signals(noise()), 3.0)[0, 0] == 0.0
+
+
+def test_joints_without_results_have_no_values():
+    here = of_signals(noise(1), noise(2))
+    for table in (here.ranges, here.means, here.number):
+        table[1] = np.nan
+    values = [
+        damage.equivalent_load(here, 3.0),
+        damage.damage(here, damage.Line(3.0, 1.0, 1e6), 1e6),
+        cycles.spectrum(here, [1.0])[..., 0],
+        cycles.share_of_revolution_above([noise(1), [np.nan] * 500], 0.0)[:, None],
+    ]
+    for value in values:
+        assert np.isfinite(value[0]).all()
+        assert np.isnan(value[1]).all()
+
+
+def test_share_of_revolution_above_a_level_of_a_cosine():
+    wave = np.cos(2 * np.pi * np.arange(2000) / 2000)
+    for level in (-2.0, -0.5, 0.0, 0.9, 1.0, 2.0):
+        expected = np.arccos(np.clip(level, -1, 1)) / np.pi
+        assert cycles.share_of_revolution_above([wave], level)[0] == pytest.approx(expected, abs=2e-4)
+    assert cycles.share_of_revolution_above([[2.0, 2.0]], 1.0) == [1.0]
+    assert cycles.share_of_revolution_above([[2.0, 2.0]], 2.0) == [0.0]

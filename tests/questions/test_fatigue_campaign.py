@@ -1,0 +1,255 @@
+"""Cycles of whole campaigns: counted in the worker or from histories, as a duty cycle, for pyLife, in a report."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import tolstat
+from tests.questions.test_fatigue import needs
+from tests.support.environment import ROOT
+from tolstat.analysis import damage
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import CHANNELS
+from tolstat.questions.fatigue import pylife
+from tolstat.questions.fatigue import query as fatigue
+from tolstat.solver import rainflow
+from tolstat.store import ResultStore
+from tolstat.study.fatigue import Fatigue, read
+
+STUDY = """
+[joint]
+base = "cirelli2021"
+[operation]
+alpha = "{alpha} deg"
+speed = "500 rpm"
+torque = "100 N*m"
+[tolerances]
+"pin*.offset_t" = {{ plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }}
+"pin*.diameter" = {{ lower = "-0.1 mm", upper = "0.22 mm", distribution = "uniform" }}
+[sampling]
+n = 12
+seed = {seed}
+[output]
+histories = "{histories}"
+harmonics = 4
+[fatigue]
+exponents = [4]
+revolutions = 1e7
+line."cross*.F_[et]" = {{ m = 5, S0 = "1 kN", N0 = 2e6 }}
+"""
+LINE = damage.Line(5.0, 1000.0, 2e6)
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """Result file of the study with these histories, operating point and seed; run once."""
+    folder = tmp_path_factory.mktemp("fatigue")
+
+    def run(histories: str = "cycles", alpha: float = 15.0, seed: int = 1) -> Path:
+        source = folder / f"{histories}_{alpha:g}_{seed}.toml"
+        out = source.with_suffix(".h5")
+        if not out.exists():
+            source.write_text(STUDY.format(histories=histories, alpha=alpha, seed=seed), encoding="utf-8")
+            if histories == "none":
+                source.write_text(source.read_text(encoding="utf-8").split("[fatigue]")[0], encoding="utf-8")
+            tolstat.run(tolstat.load(source), out, workers=1)
+        return out
+
+    return run
+
+
+def cycles(path):
+    with ResultStore.open(path) as store:
+        return fatigue.cycles(store), store.status()
+
+
+def test_the_same_cycles_from_worker_and_histories(campaign):
+    counted, status = cycles(campaign("cycles"))
+    with ResultStore.open(campaign("cycles")) as store:
+        assert set(store.history_specs) == set(rainflow.SPECS)
+    assert (status != tolstat.Status.OK).any()
+    assert np.isnan(counted.number[status != tolstat.Status.OK]).all()
+    valid = status == tolstat.Status.OK
+    assert counted.number[valid].max() >= 2
+    both, _ = cycles(campaign("harmonics+cycles"))
+    np.testing.assert_array_equal(both.ranges, counted.ranges)
+    load = damage.equivalent_load(counted, 4.0)[valid]
+    torque = np.array([unit != "N" for unit in CHANNELS.values()])
+    scale = np.where(torque, load[:, torque].max(), load[:, ~torque].max())
+    for histories, tolerance in (("full", 1e-6), ("harmonics", 5e-3)):
+        other, _ = cycles(campaign(histories))
+        difference = np.abs(damage.equivalent_load(other, 4.0)[valid] - load) / scale
+        assert difference.max() < tolerance
+        if histories == "harmonics":
+            assert difference.max() > 1e-6  # truncation shows: the comparison sees a difference
+
+
+def test_a_duty_cycle_of_two_campaigns(campaign):
+    files = [campaign("cycles", alpha) for alpha in (15.0, 5.0)]
+    both = fatigue.read(files, [0.25, 0.75])
+    single = [cycles(file) for file in files]
+    power = sum(s * damage.equivalent_load(c, 4.0)[1:] ** 4 for s, (c, _) in zip((0.25, 0.75), single, strict=True))
+    np.testing.assert_allclose(damage.equivalent_load(both.cycles, 4.0), power**0.25)
+    assert both.status.tolist() == np.maximum(*(status[1:] for _, status in single)).tolist()
+    assert both.cycles.ranges.shape[0] == 12
+    assert both.nominal.ranges.shape[0] == 1
+    assert both.judged == Fatigue(
+        (4.0,), 1e7, 1e6, {f"cross{i}.F_{a}": tuple(LINE) for i in (1, 2, 3, 4) for a in "et"}
+    )
+    with pytest.raises(InputError, match=r"does not hold the joints of .*\n  hint: run both studies with the same"):
+        fatigue.read([files[0], campaign("cycles", seed=2)], [0.5, 0.5])
+    for shares in ([1.0], [0.5, 0.6], [-1.0, 2.0]):
+        with pytest.raises(InputError, match="their sum is 1"):
+            fatigue.read(files, shares)
+
+
+def test_a_file_without_histories_says_what_to_do(campaign):
+    with pytest.raises(StoreError, match='holds neither cycles nor load histories\n  hint: set histories = "cycles"'):
+        fatigue.read([campaign("none")])
+
+
+def test_the_section_may_be_edited_after_the_run(campaign, tmp_path):
+    source, out = tmp_path / "a.toml", tmp_path / "a.h5"
+    out.write_bytes(campaign().read_bytes())
+    text = campaign().with_suffix(".toml").read_text(encoding="utf-8")
+    source.write_text(text.replace("exponents = [4]", "exponents = [7]"), encoding="utf-8")
+    tolstat.run(tolstat.load(source), out, workers=1)
+    assert fatigue.read([out]).judged.exponents == (7.0,)
+    source.write_text(text.replace('"cycles"', '"none"'), encoding="utf-8")
+    with pytest.raises(InputError, match='fatigue: has no effect without cycles\n  hint: write histories = "cycles"'):
+        tolstat.load(source)
+
+
+def test_a_campaign_without_a_valid_joint(tmp_path):
+    from tests.cli.test_cli import call
+    from tolstat.questions.fatigue import rendering as report
+
+    source, out = tmp_path / "a.toml", tmp_path / "a.h5"
+    text = STUDY.format(histories="cycles", alpha=15, seed=1) + '[errors]\npin1.diameter = "0.5 mm"\n'
+    source.write_text(text.replace("pin*.diameter", "pin2.diameter"), encoding="utf-8")
+    tolstat.run(tolstat.load(source, n=3), out, workers=1)
+    done = call("fatigue", out)
+    assert done.exit_code == 0, done.output
+    assert len(done.stdout.splitlines()) == 1 + 64 + 3 + 8
+    page = report.figure(fatigue.read([out]))
+    assert all("no joint" in ax.texts[0].get_text() for ax in page.axes)
+
+
+def test_channels_are_selected_by_patterns():
+    assert fatigue.channels(["cross2.F", "cross[12].F_?"]) == (
+        *(f"cross1.F_{axis}" for axis in "etz"), *(f"cross2.F_{axis}" for axis in "etz"), "cross2.F",
+    )  # fmt: skip
+    with pytest.raises(InputError, match="pin1"):
+        fatigue.channels(["pin1.contact", "cross1.F"])
+
+
+def test_every_fault_of_the_section_is_told():
+    section = {
+        "exponents": [0, "a"],
+        "revolution": 1e8,
+        "line": {
+            "cross*.F_e": {"m": 5, "S0": "3 N*m", "N0": 1e6},
+            "cross1": {"F_e": {"m": 0.5, "S0": "3 N", "N0": 1e6}, "X": 3},
+            "fork1.T": {"m": 5, "S0": "-3 N*m", "N0": 1e6},
+        },
+    }
+    with pytest.raises(InputError) as error:
+        read(section, "a.toml")
+    places = [fault.place.removeprefix("a.toml: fatigue.") for fault in error.value.faults]
+    assert places == [
+        *("exponents[0]", "exponents[1]", "revolution", "line.cross*.F_e.S0", "line.cross1.F_e"),
+        *("line.cross1.X", "line.fork1.T.S0"),
+    ]
+    with pytest.raises(InputError, match="decided by"):
+        read({"line": {"*.F": {"m": 3, "S0": "1 N", "N0": 1}, "fork1.F": {"m": 3, "S0": "1 N", "N0": 1}}}, "a.toml")
+
+
+def test_pylife_series_holds_every_cycle_and_survives_a_file(campaign, tmp_path):
+    with ResultStore.open(campaign()) as store:
+        series = tolstat.pylife_series(store, revolutions=10.0)
+        counted = fatigue.cycles(store)
+    assert series.index.names == ["range", "mean", "joint", "channel"]
+    assert isinstance(series.index.levels[0], pd.IntervalIndex)
+    assert series.groupby("joint").sum().to_dict() == {
+        i: n for i, n in enumerate(10.0 * counted.number.sum(axis=1)) if n > 0
+    }
+    one = series.xs((3, "fork1.F_z"), level=["joint", "channel"])
+    here = counted.of("fork1.F_z")
+    for size, mean in zip(here.ranges[3, 0], here.means[3, 0], strict=True):
+        assert size == 0 or sum(size in r and mean in m for r, m in one.index) == 1
+    path = tmp_path / "cycles.csv"
+    pylife.table(series).to_csv(path, index=False)
+    pd.testing.assert_series_equal(pylife.from_table(pd.read_csv(path)), series)
+
+
+def test_the_lines_of_the_document_read_the_export(campaign, tmp_path, monkeypatch):
+    from tests.cli.test_cli import call
+
+    monkeypatch.chdir(tmp_path)
+    done = call("export", campaign(), "--pylife", "cycles.csv")
+    assert done.exit_code == 0, done.stderr
+    document = (ROOT / "docs" / "fatigue.md").read_text(encoding="utf-8")
+    code = re.findall(r"```python\n(.*?)```", document, flags=re.DOTALL)[0].split("# with pyLife")[0]
+    names: dict[str, object] = {}
+    exec(code, names)
+    with ResultStore.open(campaign()) as store:
+        pd.testing.assert_series_equal(names["series"], tolstat.pylife_series(store))
+
+
+@needs("pylife")
+def test_pylifes_own_damage(campaign):
+    import pylife.strength.fatigue
+    import pylife.stress.collective  # noqa: F401
+
+    with ResultStore.open(campaign()) as store:
+        series = tolstat.pylife_series(store, ["cross1.F_t"], bins=2000, revolutions=1e7)
+        sums = damage.damage(fatigue.cycles(store, ["cross1.F_t"]), LINE, 1e7)[:, 0]
+    curve = pd.Series({"k_1": LINE.m, "ND": LINE.N0, "SD": LINE.S0 / 2})  # amplitudes
+    theirs = curve.fatigue.miner_elementary().damage(series.load_collective).groupby("joint").sum()
+    valid = np.flatnonzero(np.isfinite(sums))
+    assert theirs.index.tolist() == valid.tolist()
+    large = sums[valid] > 1e-3 * sums[valid].max()  # classes are too wide for the others
+    np.testing.assert_allclose(theirs.to_numpy()[large], sums[valid][large], rtol=2e-2)
+
+
+def test_command_prints_loads_and_damage(campaign, tmp_path):
+    from tests.cli.test_cli import call
+
+    out = tmp_path / "loads.csv"
+    done = call("fatigue", campaign(), campaign("cycles", 5.0), "--share", 0.5, "--share", 0.5, "--csv", out)
+    assert done.exit_code == 0, done.stderr
+    assert len(done.stdout.splitlines()) == 1 + 16 + 3 + 8
+    assert "share of the joints whose damage exceeds 1" in done.stdout
+    frame = pd.read_csv(out)
+    assert len(frame) == 64 * 3
+    loading = fatigue.read([campaign(), campaign("cycles", 5.0)], [0.5, 0.5])
+    median = frame[(frame["channel"] == "fork1.F_z") & (frame["share"] == 0.5)].iloc[0]
+    values = damage.equivalent_load(loading.cycles.of("fork1.F_z"), 4.0, 1e7, 1e6)[:, 0]
+    ordered = np.sort(values[loading.status == tolstat.Status.OK])
+    assert median["estimate"] == pytest.approx(ordered[(len(ordered) + 1) // 2 - 1])
+    only = call("fatigue", campaign(), "--channel", "fork*.F_z")
+    assert len(only.stdout.splitlines()) == 1 + 4
+    failed = call("fatigue", campaign(), campaign("cycles", 5.0))
+    assert (failed.exit_code, failed.stdout) == (2, "")
+
+
+def test_spectra_fall_and_the_figure_shows_four_panels(campaign):
+    from tolstat.questions.fatigue import rendering as report
+
+    loading = fatigue.read([campaign()])
+    table = report.spectra(loading, ["fork1.F_z"])
+    for _, part in table.groupby("share"):
+        assert (np.diff(part["cycles"]) > 0).all()
+        assert (np.diff(part["estimate"]) <= 0).all()
+        assert (part["lower"] <= part["estimate"]).all()
+        assert (part["estimate"] <= part["upper"]).all()
+    thirds = fatigue.read([campaign()] * 3, [1 / 3, 1 / 3, 1 / 3])
+    assert set(table["cycles"]) <= set(report.spectra(thirds, ["fork1.F_z"])["cycles"].round())
+    page = report.figure(loading)
+    assert [ax.get_ylabel().split(" of ")[1][:4] for ax in page.axes] == ["cros", "cros", "fork", "fork"]
+    assert report.worst(report.equivalent_loads(loading))[-1].startswith("fork4.T_")

@@ -1,0 +1,269 @@
+"""Subset simulation against known probabilities; in a campaign: the same numbers stopped or not, in blocks or not."""
+
+import doctest
+import json
+import shutil
+from functools import partial
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from scipy.stats import norm
+from typer.testing import CliRunner
+
+import tolstat
+from tests.campaign.test_campaign import datasets
+from tests.support import fakes, synthetic
+from tolstat import sampling, study
+from tolstat.analysis import subset
+from tolstat.analysis.subset import Settings, Walk
+from tolstat.campaign import run as campaign
+from tolstat.campaign.recall import recall
+from tolstat.cli import app
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import PARAM, RESULT, Simulation, Status
+from tolstat.questions.rare import query as rare
+from tolstat.store import ResultStore
+
+SEEDS = 500
+RHO = 0.6
+PLAN = synthetic.STUDY.replace("[limits]", "[output]\nresults = ['cross*.F_max']\n[limits]").replace(
+    '"fork*.T" = "40 N*m"\n"pin1.contact" = "800 N"\n"psi" = 0.01\n', ""
+) + (f'\n[[correlation]]\nbetween = ["pin1.offset_t", "pin2.offset_t"]\nrho = {RHO}\n')
+FAILING = -2.0
+SIGMA = np.sqrt(4.0 + 2.0 * RHO)
+"""Standard deviation of the sum of the study's four errors, in sigma of one."""
+
+
+def walk_of(load, n, limit, seed, dimensions=6):
+    streams = {}
+
+    def noise(level, first, count):
+        stream = streams.setdefault(level, np.random.default_rng([seed, level]))
+        return stream.standard_normal((count, dimensions))
+
+    walk = Walk(Settings(n, 0.1, limit), noise)
+    while not walk.done:
+        walk.take(load(walk.next.scores))
+    return walk
+
+
+def linear(z):
+    return z.sum(axis=1) / np.sqrt(z.shape[1])
+
+
+def four_branches(z):
+    return np.maximum(np.abs(z[:, 0] + z[:, 1]), np.abs(z[:, 0] - z[:, 1])) / np.sqrt(2.0)
+
+
+@pytest.mark.parametrize(
+    ("load", "limit", "truth"),
+    [(linear, 4.75, norm.sf(4.75)), (four_branches, 4.0, 4 * norm.sf(4.0) - 4 * norm.sf(4.0) ** 2)],
+)
+def test_intervals_cover_over_seeds_and_those_of_independent_states_do_not(load, limit, truth):
+    covered, naive, estimates = [], [], []
+    for seed in range(SEEDS):
+        walk = walk_of(load, 1000, limit, seed)
+        found = walk.estimate()
+        covered.append(found.lower <= truth <= found.upper)
+        deviation = np.sqrt(sum((1 - level.share) / (1000 * level.share) for level in walk.levels))
+        naive.append(abs(np.log(found.probability / truth)) <= 1.96 * deviation)
+        estimates.append(found.probability)
+    least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+    assert np.mean(covered) >= least
+    assert np.mean(naive) < least
+    assert np.mean(estimates) == pytest.approx(truth, rel=0.08)
+
+
+def test_a_limit_within_level_0_is_a_count_and_one_beyond_reach_a_bound():
+    easy = walk_of(linear, 200, 0.5, 1)
+    found = easy.estimate()
+    assert len(easy.levels) == 1
+    assert found.probability == pytest.approx(easy.levels[0].share)
+    assert found.lower < norm.sf(0.5) < found.upper
+    bounded = walk_of(lambda z: np.minimum(linear(z), 2.0), 500, 3.0, 1)
+    assert bounded.done
+    assert not bounded.reached
+    found = bounded.estimate()
+    assert np.isnan(found.probability)
+    assert norm.sf(2.0) < found.upper < 0.2
+    assert walk_of(linear, 200, 9.0, 1).probability < subset.LEAST
+
+
+def load(folder, text=PLAN, name="plan"):
+    path = folder / f"{name}.toml"
+    path.write_text(text, encoding="utf-8")
+    return study.load(path)
+
+
+def asked(plan, beta=2.5, **more):
+    above = 700.0 + 100.0 * beta
+    question = {"load": "cross1.F", "above": above, "per_level": 100, "p0": 0.5}
+    return study.subset_of(plan, question | more)
+
+
+def perturb(joint, errors):
+    params = np.zeros(len(errors), PARAM)
+    params["R"] = sum(errors[f"pin{i}.offset_t"] for i in (1, 2, 3, 4)) * 3e4 / SIGMA
+    params["alpha"] = errors["pin1.offset_t"] * 3e4
+    return params
+
+
+def simulate(params, options, histories="none", n_harmonics=0):
+    """A load that is linear in the errors; joints far on the other side fail."""
+    results = np.zeros(len(params), RESULT)
+    results["status"] = np.where(params["R"] < FAILING, Status.NEWTON_FAILED, Status.OK)
+    results["F_max"][:, 0] = np.where(params["R"] < FAILING, np.nan, 700.0 + 100.0 * params["R"])
+    return Simulation(results, {})
+
+
+def stages(simulate=simulate):
+    return campaign.Stages(
+        sampling.draw_blocks,
+        sampling.dimensions,
+        perturb,
+        lambda *_: {},
+        simulate,
+        fakes.warm_up,
+        sampling.origin_blocks,
+    )
+
+
+RUN = campaign.run
+
+
+@pytest.fixture(autouse=True)
+def _invented(monkeypatch):
+    """Put a solver in place that knows a formula."""
+    monkeypatch.setattr(campaign, "run", partial(RUN, stages=stages()))
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rare")
+    plan, path = asked(load(folder)), folder / "whole.h5"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign, "run", partial(RUN, stages=stages()))
+        return plan, rare.run(plan, path, tell=lambda _: None), path
+
+
+@pytest.fixture
+def whole(once, tmp_path):
+    plan, found, path = once
+    return plan, found, Path(shutil.copy(path, tmp_path))
+
+
+def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
+    plan, found, path = whole
+    assert found.estimate.lower < norm.sf(2.5) < found.estimate.upper
+    assert found.reached
+    assert found.joints == sum(level.joints for level in found.levels)
+    with ResultStore.open(path) as store:
+        errors, origin, loads = store.errors(), store.origin(), store.results()["F_max"][:, 0]
+        assert recall(store).identity() == rare._sized(plan, store.n).identity()
+    assert origin["level"][:101].tolist() == [-1, *[0] * 100]
+    last = origin["level"] == len(found.levels) - 1
+    # chains start from joints beyond the threshold, and moves are neither nothing nor anything
+    assert (loads[origin["parent"][last]] > found.levels[-1].threshold).all()
+    moved = np.corrcoef(errors["pin3.offset_t"][last], errors["pin3.offset_t"][origin["parent"][last]])[0, 1]
+    assert 0.3 < moved < 0.95
+
+
+def test_the_example_of_the_function_is_right(tmp_path):
+    found = doctest.DocTestFinder().find(rare.of_study, "of_study", globs={"tolstat": tolstat})[0]
+    found.globs |= {"study": load(tmp_path), "path": tmp_path / "example.h5"}
+    assert doctest.DocTestRunner().run(found) == (0, 2)
+
+
+def test_level_0_is_the_random_campaign(whole):
+    plan, _, path = whole
+    drawn = load(plan.path.parent, PLAN.replace("n = 60", "n = 100"), "random")
+    with ResultStore.open(path) as store:
+        np.testing.assert_array_equal(store.errors(slice(0, 101)), sampling.draw(drawn))
+
+
+def test_stopped_and_gone_on_with_it_is_the_same_in_any_blocks(tmp_path, whole, monkeypatch):
+    plan, found, path = whole
+    calls = []
+
+    def stop_at_times(params, options, histories="none", n_harmonics=0):
+        calls.append(len(params))
+        if len(calls) % 5 == 0:
+            raise KeyboardInterrupt
+        return simulate(params, options)
+
+    def in_small_blocks(*args, execution, **kwargs):
+        return RUN(*args, execution=campaign.Execution("serial", 1, block=30), stages=stages(stop_at_times), **kwargs)
+
+    monkeypatch.setattr(campaign, "run", in_small_blocks)
+    other, stops = tmp_path / "other.h5", 0
+    while True:
+        try:
+            again = rare.run(plan, other, tell=lambda _: None)
+            break
+        except campaign.Interrupted:
+            stops += 1
+    assert stops > 1
+    assert again == found
+    assert datasets(other) == datasets(path)
+    with h5py.File(other) as a, h5py.File(path) as b:
+        for group in ("errors", "origin", "results"):
+            for name in a[group]:
+                np.testing.assert_array_equal(a[group][name][:], b[group][name][:], err_msg=name)
+
+
+def test_joints_without_a_load_are_counted_on_the_side_asked_for(tmp_path, whole):
+    _, below, _ = whole
+    above = rare.run(asked(load(tmp_path), unresolved="above"), tmp_path / "above.h5", tell=lambda _: None)
+    assert below.unresolved_first > 0
+    assert below.upper_if_above == pytest.approx(below.estimate.upper + below.unresolved_first / 100)
+    assert above.estimate.lower < norm.sf(2.5) + norm.cdf(FAILING) < above.estimate.upper
+    assert above.estimate.lower > below.estimate.probability
+
+
+def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
+    plan, _, path = whole
+    with pytest.raises(StoreError, match=r"sampling.above: 950.0 in the file, 960.0 in the study"):
+        rare.run(asked(load(tmp_path), 2.6), path)
+    with ResultStore.open(path, "r+") as store:
+        results = store.results()
+        results["F_max"][:, 0] *= -1.0
+        store.write(np.arange(store.n), Simulation(results, {}))
+    with pytest.raises(StoreError, match="do not follow from the loads before them"):
+        rare.run(plan, path)
+
+
+def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, whole):
+    _, found, path = whole
+    done = CliRunner().invoke(app, ["rare", str(path), "--json"])
+    assert done.exit_code == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert said["probability"] == found.estimate.probability
+    assert len(said["levels"]) == len(found.levels)
+    assert "failed or not settled" in done.stderr
+    table = CliRunner().invoke(app, ["rare", str(path)])
+    assert table.stdout.splitlines()[-1].startswith("P(cross1.F > 950 N) = ")
+    for command in (["report"], ["capability"], ["reweight", "--set", "pin1.offset_t.cpk=1.1"]):
+        refused = CliRunner().invoke(app, [command[0], str(path), *command[1:]])
+        assert refused.exit_code == 2
+        assert "tolstat rare" in refused.stderr
+    assert json.loads(CliRunner().invoke(app, ["status", "--json", str(path)]).stdout)["exceedance"] == []
+    assert CliRunner().invoke(app, ["rare", str(path), "--n", "300"]).exit_code == 2
+
+
+def test_every_fault_of_a_question_is_told(tmp_path):
+    path = load(tmp_path).path
+    for options, text in (
+        ([], "--limit: is missing"),
+        (["--limit", "cross1.F"], "'cross1.F' is no limit"),
+        (["--limit", "cross9.F > 1 N"], "'cross9.F' is not a load"),
+        (["--limit", "cross1.F > 1 mm"], "--limit: cross1.F"),
+        (["--limit", "fork1.T > 1 N*m"], "leaves out fork1.T of --limit"),
+        (["--limit", "cross1.F > 1 N", "--n", "55"], "55 joints are 5.5 seeds"),
+    ):
+        done = CliRunner().invoke(app, ["rare", str(path), "--out", str(tmp_path / "no.h5"), *options])
+        assert (done.exit_code, text in done.stderr) == (2, True), done.stderr
+    assert not (tmp_path / "no.h5").exists()
+    with pytest.raises(InputError, match="is what tolstat rare makes of a study"):
+        load(tmp_path, PLAN.replace("seed = 2021", 'seed = 2021\nmethod = "subset"'))

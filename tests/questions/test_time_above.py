@@ -1,0 +1,132 @@
+"""Time above a level within a revolution: known waves, coverage, and the table of a campaign."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import norm
+from typer.testing import CliRunner
+
+from tests.support import synthetic
+from tolstat import cli, sampling, study
+from tolstat.analysis import exceedance
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import CHANNELS, Options, Simulation
+from tolstat.questions.time_above import query as duration
+from tolstat.solver.simulation import history_specs
+from tolstat.store import ResultStore
+
+SEEDS = 500
+SAMPLES = 720
+TEXT = synthetic.STUDY.replace("n = 60", "n = 200").replace("[limits]", '[output]\nhistories = "full"\n\n[limits]')
+
+
+def wave(tops):
+    """Loads of joints: cross1.F a sine about 500 N that rises to `tops`, other loads none."""
+    loads = np.zeros((len(tops), SAMPLES, 8, 6), np.float32)
+    angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    loads[:, :, 0, 1] = 500.0 + (np.asarray(tops) - 500.0)[:, None] * np.sin(angle)
+    return loads
+
+
+def time_above(level, tops):
+    return np.arccos(np.clip((level - 500.0) / (np.asarray(tops) - 500.0), -1, 1)) / np.pi
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("duration")
+    source = folder / "waves.toml"
+    source.write_text(TEXT, encoding="utf-8")
+    plan = study.load(source)
+    specs = {"loads": history_specs(Options(steps_per_rev=SAMPLES), "full", 0)["loads"]}
+    with ResultStore.create(folder / "waves.h5", plan, sampling.draw(plan), specs) as store:
+        rows = np.arange(plan.rows)
+        store.write(rows, Simulation(synthetic.results(plan.rows, failed=2), {"loads": wave(tops(plan.rows))}))
+        store.finish()
+    return folder / "waves.h5"
+
+
+def tops(n):
+    return np.linspace(600.0, 800.0, n)
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, ["time-above", *map(str, arguments)])
+
+
+def test_times_of_known_waves_and_joints_told_apart_from_them(path):
+    with ResultStore.open(path) as store:
+        found = duration.of_store(store, ["cross1.F", "cross1.F_t"], ["0.75 kN"])
+    own = tops(201)[1:-2]  # row 0 is the nominal joint, the last two have failed
+    expected = time_above(750.0, own)
+    assert (found.joints, found.lost) == (198, 2)
+    for row in found.table.to_dict("records"):
+        assert row["time"] == pytest.approx(expected.mean(), abs=1e-3)
+        assert row["time_90"] == pytest.approx(np.quantile(expected, 0.9, method="inverted_cdf"), abs=1e-3)
+        assert row["joints_above"] == pytest.approx(np.mean(own > 750.0))
+        assert row["time_lower"] < row["time"] < row["time_upper"] < row["joints_above"]
+        assert row["time_50"] == 0.0
+
+
+def test_the_mean_time_is_covered_where_few_joints_exceed_a_level_and_students_interval_is_not():
+    """Times of joints whose largest load is normal; some one in fifty is above the level at all."""
+    rng, level = np.random.default_rng(9), 2.0
+    truth = np.mean(np.arccos(np.clip(level / norm.ppf((np.arange(100_000) + 0.5) / 100_000, 1.0, 0.5), -1, 1)) / np.pi)
+    covered, student = [], []
+    for top in rng.normal(1.0, 0.5, (SEEDS, 100)):
+        time = np.where(top > level, np.arccos(np.clip(level / top, -1, 1)) / np.pi, 0.0)
+        lower, upper = exceedance.clopper_pearson(time.sum(), time.size)
+        covered.append(lower <= truth <= upper)
+        student.append(abs(time.mean() - truth) <= 1.98 * time.std(ddof=1) / 10.0)
+    least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+    assert np.mean(covered) >= least
+    assert np.mean(student) < least
+
+
+def test_channels_are_components_and_moduli():
+    loads = np.random.default_rng(1).normal(size=(2, 5, 8, 6))
+    for name in CHANNELS:
+        assert duration.channel(loads, name).shape == (2, 5)
+    np.testing.assert_array_equal(duration.channel(loads, "fork2.T_t"), loads[:, :, 5, 4])
+    np.testing.assert_allclose(duration.channel(loads, "cross3.T") ** 2, (loads[:, :, 2, 3:] ** 2).sum(axis=-1))
+
+
+def test_command_prints_limits_and_writes_curves(path, tmp_path):
+    done = run(path, "--by", "cross1.F", "--out", tmp_path / "out")
+    assert done.exit_code == 0
+    assert "cross1.F > 700 N" in done.stdout
+    assert "198 joints, 2 without" in done.stderr
+    assert sorted(p.suffix for p in (tmp_path / "out").iterdir()) == [".csv", ".png", ".svg"]
+    curve = pd.read_csv(tmp_path / "out" / "waves_time_above.csv")
+    assert (np.diff(curve["time"]) <= 0).all()
+    assert (curve["time"] <= curve["joints_above"]).all()
+    found = json.loads(run(path, "--by", "cross1.F", "--json").stdout)["loads"][0]
+    assert found["level"] == 700.0
+    # without options: the limits of bushings
+    assert {line.split()[0] for line in run(path).stdout.splitlines()[1:]} == {
+        "cross1.F",
+        *(f"fork{i}.T" for i in (1, 2, 3, 4)),
+    }
+
+
+def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_path):
+    with ResultStore.open(path) as store:
+        with pytest.raises(InputError) as found:
+            duration.of_store(store, ["psi", "fork1.F"], ["700 mm"])
+        for words in ("'psi' is no load of a bushing", "'700 mm' cannot be a value in N"):
+            assert words in str(found.value)
+        with pytest.raises(InputError, match="neither a level nor a limit"):
+            duration.of_store(store, ["fork1.F"])
+        both = duration.of_store(store, ["cross1.F", "cross1.T"], ["1 N*m", "2 N", "1 N"]).table
+        assert list(zip(both["load"], both["level"], strict=True)) == [
+            ("cross1.F", 2.0),
+            ("cross1.F", 1.0),
+            ("cross1.T", 1.0),
+        ]
+    with ResultStore.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
+        duration.of_store(store)
+    done = run(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"))
+    assert done.exit_code == 2
+    assert "no sample of a production" in done.stderr

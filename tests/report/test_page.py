@@ -1,0 +1,278 @@
+"""The report as one page: its figures against counts by hand, every state of a campaign, the same bytes each time."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.support import synthetic
+from tolstat.analysis import exceedance
+from tolstat.cli import app
+from tolstat.common.errors import StoreError
+from tolstat.common.tables import Status
+from tolstat.report import compose as pages
+from tolstat.report import html as writer
+from tolstat.report import loads, page, verdict
+from tolstat.store import ResultStore
+from tolstat.store.view import load
+
+HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
+TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
+    "offset_t", "offset_[tz]"
+)
+VOID = {"meta", "link", "input", "br"}
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return synthetic.store(tmp_path_factory.mktemp("page"), TEXT, failed=15, unsettled=12)
+
+
+@pytest.fixture(scope="module")
+def found(path):
+    with ResultStore.open(path) as store:
+        return page.gather(store, accepted=0.05, again=0)
+
+
+@pytest.fixture(scope="module")
+def html(found, path):
+    writer.write(pages.compose(found), path.with_suffix(".html"))
+    return path.with_suffix(".html").read_text(encoding="utf-8")
+
+
+class Reading(HTMLParser):
+    """Checks that every element is closed where it must be; keeps names, links, and texts by element."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.names, self.links, self.sections, self.pictures = [], [], [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        own = dict(attrs)
+        self.names += [own["id"]] if "id" in own else []
+        self.links += [own[key] for key in ("href", "src", "xlink:href") if key in own]
+        self.sections += [own["id"]] if tag == "section" else []
+        self.pictures += [own] if tag == "svg" else []
+        self.open += [] if tag in VOID else [tag]
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_page_is_well_formed_and_loads_nothing(html):
+    read = Reading(html)
+    assert len(set(read.names)) == len(read.names)
+    assert all(link.startswith(("#", "data:")) for link in read.links)
+    assert {link[1:] for link in read.links if link.startswith("#")} <= set(read.names)
+    assert not re.search(r"@import|url\((?!#)|fetch\(|XMLHttp", html)
+    assert read.sections == ["verdict", "exceedance", "capability", "causes", "worst", "modes", "lost", "provenance"]
+
+
+def test_every_picture_has_a_title_and_a_description(html):
+    pictures = Reading(html).pictures
+    assert len(pictures) > 8
+    for own in pictures:
+        assert own["role"] == "img"
+        for name in own["aria-labelledby"].split():
+            assert re.search(rf'id="{name}">[^<]{{10,}}<', html), name
+
+
+def test_text_of_the_study_is_shown_and_not_run(html):
+    assert '<script>alert("no")' not in html
+    assert "&lt;script&gt;alert(" in html
+    assert "Question: how often is too much too much?<" in html
+
+
+def test_same_file_same_bytes(path, found, html, tmp_path):
+    with ResultStore.open(path) as store:
+        again = pages.compose(page.gather(store, 0.05, 0))
+    contents = []
+    for k, made in enumerate((pages.compose(found), again)):
+        some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
+        writer.write(replace(made, sections=some), tmp_path / f"{k}.html")
+        contents.append((tmp_path / f"{k}.html").read_bytes())
+    assert contents[0] == contents[1]
+
+
+def test_limits_and_their_verdicts_stand_on_the_page(found, html):
+    status = found.campaign.results["status"]
+    for name, level in found.campaign.limits.items():
+        share = exceedance.at(load(found.campaign.results, name)[0], status, level)
+        assert f"{share.count} of {share.n}" in html
+        assert f"{100 * share.estimate:.3g} %" in html
+        if share.outer_lower > 0.05:
+            assert ">not kept<" in html
+
+
+@pytest.mark.parametrize(("low", "high", "answer"), [(0.01, 0.05, "yes"), (0.04, 0.06, "open"), (0.051, 0.2, "no")])
+def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, high, answer):
+    wide = {"outer_lower": 0.03, "outer_upper": 0.04, "total_lower": low, "total_upper": high}
+    assert verdict.verdict(wide, 0.05) == answer
+    narrow = {"outer_lower": low, "outer_upper": high, "total_lower": np.nan, "total_upper": np.nan}
+    assert verdict.verdict(narrow, 0.05) == answer
+    assert verdict.verdict(narrow, np.nan) == ""
+    assert verdict.verdict(narrow | {"outer_lower": np.nan, "outer_upper": np.nan}, 0.05) == "open"
+
+
+def test_reader_holds_the_shares_that_are_counted(found):
+    curves = loads.readings(found.campaign)
+    assert list(curves) == list(found.campaign.drawn)
+    status = found.campaign.results["status"]
+    for name, curve in curves.items():
+        values = load(found.campaign.results, name)[0]
+        assert 100 < len(curve["x"]) <= 3 * loads.STEPS
+        assert curve["x"][curve["start"]] == found.campaign.limits.get(name, curve["x"][curve["start"]])
+        for i in (0, 7, curve["start"], -1):
+            share = exceedance.at(values, status, curve["x"][i])
+            assert curve["count"][i] == share.count
+            assert curve["lower"][i] == pytest.approx(share.lower, rel=5e-3, abs=1e-12)
+            assert curve["outer_upper"][i] == pytest.approx(share.outer_upper, rel=5e-3)
+
+
+def test_lost_joints_are_named_with_what_to_do_and_compared_with_the_others(found):
+    assert found.counts["newton_failed"] == 15
+    assert found.counts["not_settled"] == 12
+    assert len(found.lost) == page.NAMED
+    assert {joint.row for joint in found.lost} <= set(range(401 - 27, 401))
+    assert all(joint.remedy for joint in found.lost)
+    assert found.lost_errors is not None
+    assert list(found.lost_errors.columns[:2]) == ["error", "direction"]
+    assert found.lost_errors["direction_p"].min() > 0.01  # they are the last rows: chance
+
+
+def test_leading_load_is_the_one_whose_limit_most_joints_exceed(found):
+    assert found.leading[0] == "cross1.F"
+    torques = {f"fork{i}.T": exceedance.at(*_of(found, f"fork{i}.T"), 18.0).estimate for i in (1, 2, 3, 4)}
+    assert torques[found.leading[1]] == max(torques.values()) > min(torques.values())
+    assert [worst.load for worst in found.worst] == list(found.leading)
+    for worst in found.worst:
+        values, _ = _of(found, worst.load)
+        assert [joint.value for joint in worst.joints] == sorted(values[np.isfinite(values)])[::-1][: page.WORST]
+
+
+def _of(found, name):
+    return load(found.campaign.results, name)[0], found.campaign.results["status"]
+
+
+def words(path, accepted=np.nan):
+    """Sections of a page, and its paragraphs and cells, without drawing it."""
+    with ResultStore.open(path) as store:
+        made = pages.compose(page.gather(store, accepted, 0))
+    found = [made.subtitle]
+    for block in (block for section in made.sections for block in section.blocks):
+        found += [block.text] if block.kind == "text" else []
+        found += [cell for row in block.rows for cell in row] if block.kind == "table" else []
+    return [section.key for section in made.sections], found
+
+
+@pytest.mark.parametrize("simulated", [0, 31])
+def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
+    path = synthetic.store(tmp_path, simulated=simulated)
+    said = words(path)[1][0]
+    assert f"{60 - max(0, simulated - 1)} still pending" in said
+    if not simulated:
+        assert page.write(path, tmp_path / "page.html", again=0) == tmp_path / "page.html"
+        assert said in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
+    page.write(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, again=0)
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert Reading(text).sections == ["verdict", "lost", "provenance"]
+    assert text.count(">open<") == 7
+
+
+def test_dependent_samples_have_no_interval_on_the_page(tmp_path):
+    text = synthetic.STUDY.replace("seed = 2021", 'seed = 2021\nmethod = "sobol"')
+    said = words(synthetic.store(tmp_path, text), 0.01)[1]
+    assert any(line.startswith("No intervals: Clopper–Pearson holds for independent samples only") for line in said)
+    assert said.count("open") == 7
+
+
+def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
+    page.write(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"), tmp_path / "page.html")
+    read = Reading((tmp_path / "page.html").read_text(encoding="utf-8"))
+    assert read.sections[:2] == ["verdict", "sweep"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "asked"),
+    [
+        (["--out", "p.html", "--accept", "5 %", "--replay", "0"], ("p.html", 0.05, 0)),
+        (["--out", "p.htm", "--accept", "100 ppm", "--replay", "7"], ("p.htm", 1e-4, 7)),
+    ],
+)
+def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
+    calls = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(page, "write", lambda *given: calls.append(given) or tmp_path / "written")
+    monkeypatch.setattr(page, "simulates", lambda store: False)
+    done = CliRunner().invoke(app, ["report", str(path), *arguments])
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert "wrote" in done.stderr
+    _, out, accepted, again = calls[0]
+    assert (str(out), again) == (asked[0], asked[2])
+    assert accepted == pytest.approx(asked[1])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--out", "gone/p.html", "--accept", "much"], "no such folder"),
+        (["--out", "p.html", "--accept", "much"], "is no share"),
+        (["--out", "p.html", "--accept", "110 %"], "is no share"),
+        (["--accept", "5 %"], "is for a page"),
+    ],
+)
+def test_wrong_options_write_nothing(path, tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["report", str(path), *arguments])
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert "hint:" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
+    proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
+    text = synthetic.STUDY.replace("n = 60", 'method = "importance"\nn = 300') + proposal
+    path = synthetic.store(tmp_path, text, failed=3)
+    with ResultStore.open(path) as store:
+        found = page.gather(store, 0.05, 0)
+    page.write(path, tmp_path / "page.html", accepted=0.05, again=0)
+    html = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert Reading(html).sections == ["verdict", "exceedance", "worst", "modes", "lost", "provenance"]
+    campaign = found.campaign
+    valid = campaign.results["status"] == Status.OK
+    above = (campaign.results["F_max"][:, 0] > 700.0) & valid
+    share = campaign.weights[above].sum() / campaign.weights[valid].sum()
+    assert abs(share - above.sum() / valid.sum()) > 1e-3
+    assert f"{100 * share:.3g} %" in html
+    assert "counted by their weights" in html
+    assert "Causes are left out" in html
+
+
+def test_a_design_for_indices_has_its_causes_and_no_shares(tmp_path):
+    text = synthetic.STUDY.replace("n = 60", 'method = "pick_freeze"\ngroups = "error"\nn = 100')
+    sections, said = words(synthetic.store(tmp_path, text))
+    assert "causes" in sections
+    assert "capability" not in sections
+    assert "pin1.offset_t" in said
+
+
+def test_what_is_no_sample_has_no_page(tmp_path):
+    cases = "[joint]" + synthetic.STUDY.partition("[joint]")[2].partition("[tolerances]")[0]
+    cases += '[sampling]\nmethod = "cases"\n\n[[case]]\nname = "one"\nerrors = { pin1.offset_t = "0.1 mm" }\n'
+    path = synthetic.store(tmp_path, cases)
+    with pytest.raises(StoreError, match="lists its joints one by one"):
+        page.write(path, tmp_path / "page.html")
+    assert not (tmp_path / "page.html").exists()

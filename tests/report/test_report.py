@@ -1,0 +1,283 @@
+"""Reports: tables against hand-counted shares, files of every kind of campaign, pictures that can be read."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.text import Text
+
+from tests.support import synthetic
+from tests.support.environment import ROOT
+from tolstat import report
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import BUSHINGS, RESULT, Status
+from tolstat.display import style, text
+from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.questions.exceedance import sweep
+from tolstat.store import view as source
+
+
+def campaign(n=201, method="random", limits=None, **kwargs):
+    results = synthetic.results(n, **kwargs)
+    limits = {"cross1.F": 700.0} if limits is None else limits
+    return source.Campaign("made up", method, limits, synthetic.errors(n)[1:], results[1:], results[:1])
+
+
+def swept(second=1, limits=None):
+    """Grid of 11 pin diameters by `second` tilts."""
+    grid = campaign(11 * second + 1, "sweep", limits=limits or {})
+    grid.errors[:] = np.zeros((), grid.errors.dtype)
+    for k in (1, 2, 3, 4):
+        grid.errors[f"pin{k}.diameter"] = np.tile(np.linspace(-1e-4, 1e-4, 11), second)
+    grid.errors["pin1.tilt_z"] = np.repeat(np.radians(np.linspace(0.5, 1.0, second)), 11)
+    return replace(grid, patterns=("pin*.diameter", "pin1.tilt_z"))
+
+
+def texts(figure):
+    return [t.get_text() for t in figure.findobj(Text) if t.get_text()]
+
+
+def test_every_limit_has_a_row_with_its_share_and_the_nominal_load():
+    made = campaign(limits={"fork3.T": 18.0, "pin2.contact": 650.0, "psi": 1.1e-4})
+    table = exceedance.limits(made)
+    assert list(table["load"]) == ["fork3.T", "pin2.contact", "psi"]
+    assert list(table["unit"]) == ["N*m", "N", "1"]
+    assert list(table["count"]) == [
+        int((made.results["T_max"][:, BUSHINGS.index("fork3")] > 18.0).sum()),
+        int((made.results["contact_max"][:, 1].max(axis=1) > 650.0).sum()),
+        int((made.results["psi_max"] > 1.1e-4).sum()),
+    ]
+    assert table["nominal"][0] == made.nominal["T_max"][0, BUSHINGS.index("fork3")]
+
+
+def test_failed_and_unsettled_joints_are_counted_both_ways():
+    table = exceedance.limits(campaign(failed=7, unsettled=5))
+    row = table.iloc[0]
+    assert (row["n"], row["n_failed"], row["n_unsettled"]) == (200, 7, 5)
+    assert row["bound_upper"] - row["bound_lower"] == pytest.approx(12 / 200)
+    assert "failed, unsettled both ways" in text.limits(table)
+    assert "failed, unsettled both ways" not in text.limits(exceedance.limits(campaign()))
+
+
+def test_dependent_samples_have_no_interval_and_the_note_says_why():
+    made = campaign(method="sobol", failed=2)
+    assert exceedance.limits(made)[["lower", "upper", "outer_upper"]].isna().all(axis=None)
+    assert exceedance.limits(made)["bound_upper"].notna().all()
+    assert "independent samples only" in exceedance.note(made)
+    assert "95 % band" not in texts(exceedance.figure(made))
+
+
+def test_quantiles_rise_with_the_share():
+    table = exceedance.quantiles(campaign())
+    assert len(table) == 16 * len(exceedance.SHARES)
+    for _, part in table.groupby("load"):
+        assert part["estimate"].is_monotonic_increasing
+
+
+def test_curves_fall_from_every_load_to_none_and_are_thinned():
+    table = exceedance.curves(campaign(4001))
+    assert table["load"].nunique() == 16
+    for _, part in table.groupby("load"):
+        assert len(part) <= exceedance.MAX_LEVELS
+        assert part["level"].is_monotonic_increasing
+        assert part["estimate"].is_monotonic_decreasing
+        assert part["estimate"].iloc[-1] == 0.0
+        assert list(part["count"].iloc[-10:]) == list(range(9, -1, -1))
+
+
+def test_unknown_load_names_what_there_is():
+    with pytest.raises(InputError, match=r"cross9\.F.*\n.*cross1\.F"):
+        source.load(np.zeros(1, RESULT), "cross9.F")
+
+
+def test_picture_states_study_numbers_units_and_limits():
+    made = campaign(failed=3, unsettled=2, limits={"cross1.F": 700.0, "cross2.F": 705.0, "fork1.T": 500.0})
+    figure = exceedance.figure(made)
+    said = texts(figure)
+    assert any(t.startswith("made up") for t in said)
+    assert any("200 joints (random sampling), 3 failed, 2 not settled" in t for t in said)
+    assert "limit 700 N (1), 705 N (2)" in said  # one label: the two would lie on each other
+    assert "limit 500 N m (1) →" in said  # far off: an arrow, so that the curves keep their width
+    assert sum("[N]" in t for t in said) == 2
+    assert sum("[N m]" in t for t in said) == 2
+    floors = {ax.get_ylim()[0] for ax in figure.axes}
+    assert floors == {0.5 / 200}
+    assert {ax.get_yscale() for ax in figure.axes} == {"log"}
+
+
+def _not_drawn(figure):
+    """Labels of ticks outside of their axis, which matplotlib keeps but does not draw."""
+    hidden = []
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
+        low, high = sorted(axis.get_view_interval())
+        for tick in axis.get_major_ticks() + axis.get_minor_ticks():
+            if not low <= tick.get_loc() <= high:
+                hidden += [tick.label1, tick.label2]
+    return hidden
+
+
+def overlapping(figure):
+    """Pairs of texts on a page whose boxes overlap."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer, page = canvas.get_renderer(), figure.bbox
+    boxes = []
+    hidden = _not_drawn(figure)
+    for item in figure.findobj(Text):
+        if not item.get_text().strip() or not item.get_visible() or item in hidden:
+            continue
+        box = item.get_window_extent(renderer)
+        if box.xmin < 0 or box.ymin < 0 or box.xmax > page.xmax or box.ymax > page.ymax:
+            return [(item.get_text(), "the page's edge")]
+        boxes.append((item.get_text(), box.shrunk(0.96, 0.9)))
+    return [(a, b) for i, (a, x) in enumerate(boxes) for b, y in boxes[i + 1 :] if x.overlaps(y)]
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: exceedance.figure(campaign(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in BUSHINGS})),
+        lambda: exceedance.figure(campaign(limits={f"cross{i}.T": 16.0 + i for i in (1, 2, 3, 4)})),
+        lambda: sweep.figure(swept(limits={"cross1.F": 800.0})),
+        lambda: sweep.figure(swept(9)),
+    ],
+)
+def test_no_text_lies_on_another_or_leaves_the_page(draw):
+    assert overlapping(draw()) == []
+
+
+@pytest.mark.parametrize("status", [Status.PENDING, Status.NEWTON_FAILED])
+def test_a_campaign_without_a_valid_joint_still_gets_a_page(status):
+    made = campaign(21)
+    made.results["status"] = status
+    assert texts(exceedance.figure(made)).count("no joint with a valid result") == 4
+    assert exceedance.curves(made).empty
+    share = exceedance.limits(made)["estimate"]
+    assert share.isna().all()
+    assert "-" in text.limits(exceedance.limits(made))
+
+
+def test_joints_that_are_all_alike_can_be_drawn():
+    made = campaign(21)
+    made.results["F_max"] = 640.0
+    assert len(exceedance.figure(made).axes) == 4
+
+
+def test_sweep_finds_its_axes_and_their_units():
+    diameter, tilt = source.swept_axes(swept(3))
+    assert (diameter.label, diameter.unit) == ("pin*.diameter", "mm")
+    assert (diameter.values.min(), diameter.values.max()) == pytest.approx((-0.1, 0.1))
+    assert (tilt.label, tilt.unit) == ("pin1.tilt_z", "deg")
+    assert np.unique(tilt.values) == pytest.approx([0.5, 0.75, 1.0])
+    unnamed = replace(swept(1), patterns=())
+    assert source.swept_axes(unnamed)[0].label == "pin1.diameter and 3 more"
+
+
+def test_sweep_table_keeps_every_joint_with_its_status():
+    made = swept()
+    made.results["status"][[2, 5]] = [Status.OUTSIDE_MODEL, Status.NOT_SETTLED]
+    table = sweep.table(made)
+    assert len(table) == 11
+    assert list(table["status"][[2, 5]]) == ["outside_model", "not_settled"]
+    assert list(table["cross1.F [N]"]) == list(made.results["F_max"][:, 0])
+    short = sweep.worst(made)
+    assert list(short["fork.T [N*m]"]) == list(made.results["T_max"][:, 4:].max(axis=1))
+
+
+def test_sweep_page_shows_unsettled_and_failed_joints():
+    made = swept()
+    made.results["status"][[2, 5]] = [Status.OUTSIDE_MODEL, Status.NOT_SETTLED]
+    made.results["F_max"][2] = np.nan
+    said = texts(sweep.figure(made))
+    assert "not settled" in said
+    assert "no result" in said
+    assert said.count("pin*.diameter [mm]") == 4
+
+
+def test_report_of_a_random_campaign(tmp_path):
+    path = synthetic.store(tmp_path, failed=2)
+    made = report.build(path)
+    names = [f"small_{what}" for what in ("exceedance.png", "exceedance.svg", "exceedance.csv")]
+    names += ["small_quantiles.csv", "small_limits.csv"]
+    assert [file.name for file in made.files] == names
+    assert all(file.parent == tmp_path and file.stat().st_size > 500 for file in made.files)
+    assert made.table.splitlines()[0].split()[:4] == ["load", "nominal", "limit", "joints"]
+    assert len(made.table.splitlines()) == 1 + 7
+    assert "60 joints (random sampling), 2 failed, 0 not settled" in made.notes
+    limits = pd.read_csv(tmp_path / "small_limits.csv")
+    assert list(limits["n"]) == [60] * 7  # the nominal joint is not among them
+    assert (tmp_path / "small_exceedance.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_report_of_a_campaign_under_way_counts_what_is_pending(tmp_path):
+    made = report.build(synthetic.store(tmp_path, simulated=31))
+    assert "30 joints (random sampling), 0 failed, 0 not settled, 30 still pending" in made.notes
+
+
+def test_report_of_a_file_that_has_just_been_made(tmp_path):
+    made = report.build(synthetic.store(tmp_path, simulated=0))
+    assert "0 joints" in made.notes
+    assert len(made.files) == 5
+
+
+def test_report_without_limits_prints_quantiles(tmp_path):
+    plain = synthetic.STUDY.partition("[limits]")[0]
+    made = report.build(synthetic.store(tmp_path, plain))
+    assert "95 % interval of 99 %" in made.table
+    assert len(made.table.splitlines()) == 1 + 16
+    assert not (tmp_path / "small_limits.csv").exists()
+
+
+def test_report_of_a_sweep_into_another_folder(tmp_path):
+    elsewhere = tmp_path / "pictures"
+    elsewhere.mkdir()
+    files = report.write(synthetic.store(tmp_path, synthetic.SWEEP, "clearance"), elsewhere)
+    assert [f.name for f in files] == [f"clearance_sweep.{kind}" for kind in ("png", "svg", "csv")]
+    table = pd.read_csv(elsewhere / "clearance_sweep.csv")
+    assert table["pin*.diameter [mm]"].iloc[[0, -1]].tolist() == pytest.approx([-0.1, 0.1])
+
+
+def test_same_file_same_bytes(tmp_path):
+    path = synthetic.store(tmp_path)
+    first = [file.read_bytes() for file in report.write(path)]
+    assert [file.read_bytes() for file in report.write(path)] == first
+
+
+def test_folder_that_is_not_there_and_file_that_is_not_ours(tmp_path):
+    path = synthetic.store(tmp_path)
+    with pytest.raises(InputError, match="existing folder"):
+        report.build(path, tmp_path / "nowhere")
+    (tmp_path / "other.h5").write_text("not HDF5")
+    with pytest.raises(StoreError):
+        report.build(tmp_path / "other.h5")
+
+
+def test_drawing_leaves_the_callers_settings_alone_and_needs_no_pyplot():
+    code = (
+        "import sys, matplotlib as m; before = m.rcParams.copy();"
+        "from tests import test_report as t;"
+        "t.exceedance.figure(t.campaign(21));"
+        "print(dict.__eq__(before, m.rcParams), 'matplotlib.pyplot' in sys.modules)"
+    )
+    root = ROOT
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
+    assert done.stdout.split() == ["True", "False"]
+
+
+def test_colours_differ_for_dichromats():
+    """Distances of the four colours in a simulation of protan and deutan vision (Viénot et al. 1999)."""
+    from matplotlib.colors import to_rgb
+
+    linear = np.array([to_rgb(c) for c in style.COLOURS]) ** 2.2
+    to_lms = np.array([[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]])
+    protan = np.array([[0.0, 2.02344, -2.52581], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    deutan = np.array([[1.0, 0.0, 0.0], [0.494207, 0.0, 1.24827], [0.0, 0.0, 1.0]])
+    for loss in (protan, deutan):
+        seen = np.clip(linear @ (np.linalg.inv(to_lms) @ loss @ to_lms).T, 0, 1) ** (1 / 2.2)
+        apart = [np.linalg.norm(seen[i] - seen[j]) for i in range(4) for j in range(i)]
+        assert min(apart) > 0.25

@@ -1,0 +1,207 @@
+"""Importance sampling: what is drawn, what it weighs, and shares of one in a million against known answers."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from scipy.stats import norm
+from typer.testing import CliRunner
+
+from tests.cli.test_cli import invented_campaign
+from tests.support import synthetic
+from tolstat import sampling, study
+from tolstat.analysis import exceedance, weighted
+from tolstat.campaign import extend as combine
+from tolstat.cli import app
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Simulation, Status
+from tolstat.questions.reweight import query as reweighting
+from tolstat.store import ResultStore
+from tolstat.store import view as source
+from tolstat.study.proposal import Proposal, component, weights
+
+SEEDS = 500
+BETA = 4.75
+
+PLAN = (
+    synthetic.STUDY.replace("[sampling]\nn = 60", '[sampling]\nmethod = "importance"\nn = 4000')
+    + """
+[[proposal]]
+share = 0.5
+widen = { "pin[12].offset_t" = 1.7 }
+shift = { "pin3.offset_t" = -1.0 }
+
+[[proposal]]
+share = 0.25
+widen = 1.2
+"""
+)
+CORRELATED = '\n[[correlation]]\nbetween = ["pin1.offset_t", "pin2.offset_t"]\nrho = 0.6\n'
+
+
+def load(folder, text=PLAN, name="plan", **kwargs):
+    path = folder / f"{name}.toml"
+    path.write_text(text, encoding="utf-8")
+    return study.load(path, **kwargs)
+
+
+def weight_of(plan, rows=None):
+    blocks = sampling.origin_blocks(plan, range(plan.rows) if rows is None else rows)
+    return np.concatenate(list(blocks))
+
+
+def test_a_joint_depends_on_its_number_only_and_is_the_random_one_where_no_proposal_made_it(tmp_path):
+    plan = load(tmp_path)
+    errors, origin = sampling.draw(plan), weight_of(plan)
+    np.testing.assert_array_equal(errors[:50], sampling.draw(load(tmp_path, n=49)))
+    np.testing.assert_array_equal(errors[70:90], sampling.draw(plan, range(70, 90)))
+    np.testing.assert_array_equal(origin[70:90], weight_of(plan, range(70, 90)))
+    assert origin[0].tolist() == (-1, 0.0)
+    plain = sampling.draw(load(tmp_path, synthetic.STUDY.replace("n = 60", "n = 4000")))
+    own = origin["component"] <= 0
+    np.testing.assert_array_equal(errors[own], plain[own])
+    assert np.bincount(origin["component"][1:]) / 4000 == pytest.approx([0.25, 0.5, 0.25], abs=0.03)
+    third = errors["pin3.offset_t"][origin["component"] == 1] * 3e4
+    assert (third.mean(), third.std()) == (pytest.approx(-1.0, abs=0.1), pytest.approx(1.0, abs=0.1))
+
+
+def test_weights_are_ratios_of_the_densities_of_the_errors(tmp_path):
+    plan = load(tmp_path)
+    errors, w = sampling.draw(plan)[1:], weight_of(plan)["weight"][1:]
+    x = {name: errors[name] * 3e4 for name in plan.tolerances}
+    tolerances = np.prod([norm.pdf(v) for v in x.values()], axis=0)
+    first = np.prod([norm.pdf(x[n], m, s) for n, m, s in zip(x, (0, 0, -1, 0), (1.7, 1.7, 1, 1), strict=True)], axis=0)
+    second = np.prod([norm.pdf(v, 0, 1.2) for v in x.values()], axis=0)
+    mixture = 0.25 * tolerances + 0.5 * first + 0.25 * second
+    np.testing.assert_allclose(w, tolerances / mixture, rtol=1e-6)
+    assert w.max() < 4.0
+
+
+@pytest.mark.parametrize(
+    "entry",
+    ['distribution = "uniform"', 'distribution = "triangular"', 'distribution = "normal", cpk = 0.5, truncate = true'],
+)
+def test_weighted_moments_are_those_of_the_tolerances(tmp_path, entry):
+    text = PLAN.replace('distribution = "normal", cpk = 1.0', entry).replace("n = 4000", "n = 40000") + CORRELATED
+    drawn = load(tmp_path, text)
+    errors, w = sampling.draw(drawn)[1:], weight_of(drawn)["weight"][1:]
+    assert w.mean() == pytest.approx(1.0, abs=5 * w.std() / 200)
+    exact = load(tmp_path, text.replace('"importance"', '"random"').partition("[[proposal]]")[0] + CORRELATED)
+    truth = sampling.draw(exact)[1:]
+    a, b = "pin1.offset_t", "pin2.offset_t"
+    for moment in (lambda e: e[a] ** 2, lambda e: e[a] * e[b], lambda e: e["pin3.offset_t"]):
+        scale = np.sqrt((moment(truth) ** 2).mean())
+        assert (w * moment(errors)).mean() == pytest.approx(moment(truth).mean(), abs=0.04 * scale)
+
+
+def linear_limit_state(seed, n, dimensions=8):
+    """Sum of standard normal errors, drawn about its design point but for a tenth, and the weights."""
+    rng = np.random.default_rng(seed)
+    unit = dimensions**-0.5
+    proposals = [Proposal(0.9, {f"x{i}": (BETA * unit, 1.0) for i in range(dimensions)})]
+    z = rng.standard_normal((n, dimensions))
+    z[component(proposals, rng.random(n)) == 1] += BETA * unit
+    return z.sum(axis=1) * unit, weights(proposals, {f"x{i}": column for i, column in enumerate(z.T)})
+
+
+def test_one_in_a_million_is_covered_over_seeds_and_unweighted_it_is_not():
+    truth, covered, naive, estimates = norm.sf(BETA), [], [], []
+    for seed in range(SEEDS):
+        g, w = linear_limit_state(seed, 500)
+        found = weighted.at(g, np.full(500, Status.OK), w, BETA)
+        covered.append(found.lower <= truth <= found.upper)
+        estimates.append(found.estimate)
+        plain = exceedance.at(g, np.full(500, Status.OK), BETA)
+        naive.append(plain.lower <= truth <= plain.upper)
+    least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+    assert np.mean(covered) >= least
+    assert np.mean(naive) < least
+    assert np.mean(estimates) == pytest.approx(truth, rel=0.03)
+
+
+def test_equal_weights_give_what_joints_that_count_alike_give():
+    rng = np.random.default_rng(3)
+    values, status = rng.gamma(2.0, 1.0, 300), np.ones(300, int)
+    status[[5, 9, 17]] = Status.NOT_SETTLED, Status.NEWTON_FAILED, Status.PENDING
+    levels = [-1.0, 0.3, 2.0, 30.0]
+    own, theirs = weighted.curve(values, status, np.ones(300), levels), exceedance.curve(values, status, levels)
+    for name in theirs.dtype.names:
+        np.testing.assert_allclose(own[name], theirs[name], atol=1e-12, err_msg=name)
+    # a level that no joint is above: a joint as heavy as the heaviest could have been
+    heavy = np.where(np.arange(300) == 0, 20.0, 1.0)
+    assert weighted.at(values, status, heavy, 30.0).upper > 15 * theirs["upper"][-1]
+    assert not weighted.trust(values, status, heavy, 30.0).usable
+    assert weighted.trust(values, status, np.ones(300), 1.0).usable
+
+
+def campaign(folder, text=PLAN, name="plan", n=None):
+    """Campaign whose load cross1.F is a sum of its errors, in sigma."""
+    plan, path = load(folder, text, name, n=n), folder / f"{name}.h5"
+    invented_campaign()(plan, path, workers=1, check=False)
+    with ResultStore.open(path, "r+") as store:
+        results = synthetic.results(store.n)
+        results["F_max"][:, 0] = 700.0 + 100.0 * (3e4 * (store.errors()["pin1.offset_t"]) - 3.0)
+        store.write(np.arange(store.n), Simulation(results, None))
+    return path
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    return campaign(tmp_path_factory.mktemp("importance"))
+
+
+def test_the_file_keeps_weights_and_reports_go_by_them(stored):
+    with ResultStore.open(stored) as store:
+        view = source.read(store, weighted=True)
+        found = view.above(source.load(view.results, "cross1.F")[0], 700.0, 0.95)
+        frame = store.to_pandas()
+        shares = reweighting.of_store(store, ["pin4.offset_t.plus_minus=0.09 mm"]).table.iloc[0]
+    assert found.lower < norm.sf(3.0) < found.upper
+    assert found.upper < 2.0 * norm.sf(3.0)
+    assert frame["weight"].iloc[1:].mean() == pytest.approx(1.0, abs=0.05)
+    assert shares["lower"] < norm.sf(3.0) < shares["upper"]
+    done = CliRunner().invoke(app, ["status", "--json", str(stored)])
+    assert json.loads(done.stdout)["exceedance"][0]["estimate"] == pytest.approx(found.estimate, rel=1e-2)
+
+
+def test_statistics_that_count_joints_alike_are_refused(stored):
+    for command in ("capability", "causes"):
+        done = CliRunner().invoke(app, [command, str(stored)])
+        assert done.exit_code == 2
+        assert "joints that count differently" in done.stderr
+
+
+def test_slices_and_extensions_have_the_weights_of_one_run(tmp_path, stored):
+    few = campaign(tmp_path, name="few", n=1000)
+    combine.extend(few, 1200)
+    with ResultStore.open(stored) as whole, ResultStore.open(few) as grown:
+        np.testing.assert_array_equal(grown.origin(), whole.origin(slice(0, 1201)))
+    parts = []
+    for rows in (range(600), range(600, 1201)):
+        parts.append(tmp_path / f"part{rows.start}.h5")
+        invented_campaign()(load(tmp_path, n=1200), parts[-1], workers=1, rows=rows, check=False)
+    combine.merge(parts, tmp_path / "merged.h5")
+    with ResultStore.open(stored) as whole, ResultStore.open(tmp_path / "merged.h5") as merged:
+        np.testing.assert_array_equal(merged.origin(), whole.origin(slice(0, 1201)))
+    with h5py.File(parts[0], "r+") as file:
+        file["origin/weight"][7] *= 2.0
+    with ResultStore.open(parts[0]) as store, pytest.raises(StoreError, match="errors of row 7 are not as"):
+        store.origin()
+
+
+def test_every_fault_of_the_proposals_is_told(tmp_path):
+    bad = PLAN.replace('"pin[12].offset_t" = 1.7', '"pin[12].offset_t" = 0, "hole1.tilt_t" = 2').replace("0.25", "0.49")
+    with pytest.raises(InputError) as found:
+        load(tmp_path, bad)
+    text = str(found.value)
+    for part in ("0 is no widen", "proposal[0].widen.hole1.tilt_t: has no tolerance"):
+        assert part in text
+    with pytest.raises(InputError, match=r"leave 0\.01 of the joints"):
+        load(tmp_path, PLAN.replace("0.25", "0.49"))
+    with pytest.raises(InputError, match="proposal: has no effect with 'random'"):
+        load(tmp_path, PLAN.replace('method = "importance"', ""))
+    with pytest.raises(InputError, match="is the tolerances themselves"):
+        load(tmp_path, PLAN.replace("widen = 1.2", ""))
+    with pytest.raises(InputError, match="missing table: what joints are drawn from"):
+        load(tmp_path, PLAN.partition("[[proposal]]")[0])

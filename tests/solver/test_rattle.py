@@ -1,0 +1,193 @@
+"""Joints whose torque reverses: against solutions not written here, finer steps, and themselves."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.conftest import REFERENCE
+from tests.solver.test_refinement import assert_same
+from tests.support.environment import ROOT
+from tolstat import joint, sampling, study
+from tolstat.analysis import exceedance, weighted
+from tolstat.campaign import plan
+from tolstat.common.tables import PARAM, RESULT, Method, Motion, Options, Status
+from tolstat.joint import ideal
+from tolstat.kernel.integrators.mesh import CELL, FIRST_LEVEL, LOW, SHAPING, UNKNOWN, next_level
+from tolstat.solver import simulation, stationary
+from tolstat.solver.simulation import simulate_rows
+
+STUDIES = ROOT / "studies"
+RPM = np.pi / 30
+FOLLOWING = Options(method=int(Method.TR_BDF2), rtol=0.04, max_revs=48)
+UNIFORM = Options(method=int(Method.TR_BDF2), steps_per_rev=20_000, max_refinements=0)
+
+
+def joints(alpha: float, rpm: float, torque: float, rows: list[int]) -> np.ndarray:
+    """Joints of iso2768_f.toml at another operating point (deg, 1/min, N m)."""
+    made = study.load(STUDIES / "iso2768_f.toml", n=max(rows) + 1)
+    params = joint.perturb(made.joint, sampling.draw(made)[1:])[rows]
+    params["alpha"], params["omega"], params["torque"] = np.radians(alpha), rpm * RPM, torque
+    return params
+
+
+def test_an_independent_solution() -> None:
+    """Radau at rtol 1e-6 of another implementation, 7200 angles of the sixth revolution."""
+    case = study.load_case(REFERENCE / "rattling" / "rattle_30.toml")
+    errors = joint.nominal_errors(1, case.operation)
+    for key, value in case.errors.items():
+        errors[key] = value
+    row = simulate_rows(joint.perturb(case.joint, errors), Options()).results[0]
+    with (REFERENCE / "rattling" / "rattle_30_largest.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    assert (row["status"], row["motion"]) == (Status.OK, Motion.PERIODIC)
+    for column, name in (("F_N", "F_max"), ("T_Nm", "T_max")):
+        expected = np.array([float(line[column]) for line in lines])
+        np.testing.assert_allclose(row[name], expected, atol=0.02 * expected.max())
+
+
+@pytest.mark.parametrize(
+    ("point", "rows", "within"),
+    [((30, 1500, 100), [3, 10], 0.02), ((15, 3000, 100), [0, 13], 0.02), ((15, 500, 10), [112, 451], 0.01)],
+)
+def test_largest_loads_are_those_of_fine_uniform_steps(
+    point: tuple[float, float, float], rows: list[int], within: float
+) -> None:
+    params = joints(*point, rows)
+    found, fine = simulate_rows(params, Options()).results, simulate_rows(params, UNIFORM).results
+    assert (found["status"] == Status.OK).all()
+    assert (fine["status"] == Status.OK).all()
+    assert (found["refinement_change"] < 0.05).all()
+    for name in ("F_max", "T_max"):
+        size = fine[name].max(axis=1, keepdims=True)
+        assert (np.abs(found[name] - fine[name]) < within * size).all()
+
+
+def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order() -> None:
+    params = np.concatenate([joints(15, 3000, 100, [0, 7, 10, 13, 19]), joints(30, 1500, 100, [10, 13])])
+    options = FOLLOWING._replace(max_revs=24)
+
+    def run(how: object, these: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        results = np.zeros(len(these), RESULT).view(np.recarray)
+        blocks = np.zeros((len(these), options.max_revs), RESULT).view(np.recarray)
+        list(how(these, options, False, results, blocks))  # type: ignore[operator]
+        return results.view(np.ndarray), blocks.view(np.ndarray)
+
+    together, blocks = run(simulation._together, params)
+    alone, own = run(simulation._alone, params)
+    assert_same(together, alone)
+    for i, made in enumerate(together["revolutions"].astype(int)):
+        assert_same(blocks[i, :made], own[i, :made])
+    backwards, _ = run(simulation._together, params[::-1].copy())
+    assert_same(backwards[::-1], together)
+
+
+def cell(level: int, worst: float = 0.0, pinned: int = 0) -> np.recarray:
+    made = np.zeros(1, CELL).view(np.recarray)
+    made.level, made.worst, made.pinned = level, worst, pinned
+    return made[0]
+
+
+def test_levels_go_from_one_revolution_to_the_next() -> None:
+    new = cell(UNKNOWN)
+    assert next_level(0, new, new) == FIRST_LEVEL
+    assert next_level(0, new, cell(5, 0.5)) == 5
+    assert next_level(1, cell(5, 0.5), cell(2, 0.5)) == 5
+    assert next_level(1, cell(5, 0.9 * LOW), new) == 4
+    assert next_level(1, cell(5, 1e-12), new) == 0
+    assert next_level(1, cell(5, 1e-12, pinned=1), new) == 5
+    assert next_level(SHAPING, cell(5, 1e-12), new) == 5
+
+
+def watched(series: np.ndarray) -> np.ndarray:
+    """Statistics of revolutions with these largest forces of the first bushing."""
+    made = np.zeros(len(series), RESULT)
+    made["F_max"] = series[:, None] * np.linspace(1, 0.5, 8)
+    made["T_max"] = made["F_max"] / 10
+    return made
+
+
+def ended(revolutions: int, motion: Motion) -> np.ndarray:
+    made = np.zeros(1, RESULT)
+    made["status"], made["motion"], made["revolutions"] = Status.NOT_PERIODIC, motion, revolutions
+    made["F_max"] = 5.0
+    return made
+
+
+def test_what_becomes_stationary() -> None:
+    rng = np.random.default_rng(1)
+    steady = 100 + 10 * rng.random(48)
+    drift = steady + np.linspace(0, 30, 48)
+    wild = np.concatenate([np.full(32, 100.0), steady[32:]]) + 0.01 * rng.random(48)
+    for series, status in ((steady, Status.STATIONARY), (drift, Status.NOT_PERIODIC), (wild, Status.NOT_PERIODIC)):
+        result = ended(48, Motion.CHAOTIC)
+        stationary.tell(result, watched(series)[None], 100)
+        assert result["status"][0] == status
+    result = ended(48, Motion.CHAOTIC)
+    stationary.tell(result, watched(steady)[None], 100)
+    stationary.fill_ends(result)
+    assert 0.9 < result["F_lower"][0] < 1 < result["F_upper"][0] < 1.05
+    assert 105 < result["F_max"][0, 0] < 111
+    rolled = ended(50, Motion.CHAOTIC)  # revolution r lies at r modulo 48
+    stationary.tell(rolled, np.roll(watched(steady), 2)[None], 100)
+    assert rolled["F_max"].tobytes() == result["F_max"].tobytes()
+    twice = ended(48, Motion.SUBHARMONIC)
+    stationary.tell(twice, watched(drift)[None], 100)
+    stationary.fill_ends(twice)
+    assert (twice["status"][0], twice["F_lower"][0], twice["F_upper"][0]) == (Status.STATIONARY, 1.0, 1.0)
+
+
+def test_ends_of_other_joints() -> None:
+    results = np.zeros(2, RESULT)
+    results["status"], results["F_max"] = (Status.OK, Status.NOT_SETTLED), 7.0
+    stationary.fill_ends(results)
+    assert (results["F_lower"][0], results["contact_upper"][0]) == (1.0, 1.0)
+    assert np.isnan(results["F_lower"][1])
+
+
+@pytest.mark.parametrize("power", [2.0, 1.0, 0.5])
+def test_the_largest_of_many_lies_in_the_interval(power: float) -> None:
+    """Bounded loads whose density ends with a peak, a step, or gently at the largest; 95 % asked for."""
+    rng = np.random.default_rng(2)
+    inside = []
+    for _ in range(60):
+        found = stationary.largest(1 - rng.random((32, 12)) ** power, 100)
+        truth = (1 - rng.random((100, 12)) ** power).max(axis=0)
+        inside.append((found.lower <= truth) & (truth <= found.upper))
+    assert 0.90 <= np.mean(inside) <= 0.995
+
+
+def test_a_stationary_joint_counts_on_both_sides_of_a_limit_inside_its_interval() -> None:
+    values, status = [5.0, 7.0, 9.0, 8.0], [Status.OK, Status.STATIONARY, Status.OK, Status.STATIONARY]
+    ends = [5.0, 6.0, 9.0, 7.9], [5.0, 8.0, 9.0, 8.1]
+    for level, least, count, most in ((5.5, 3, 3, 3), (6.5, 2, 3, 3), (7.5, 2, 2, 3), (8.0, 1, 1, 2), (8.5, 1, 1, 1)):
+        found = exceedance.at(values, status, level, ends=ends)
+        assert (found.bound_lower, found.estimate, found.bound_upper) == (least / 4, count / 4, most / 4)
+        row = weighted.curve(values, status, np.ones(4), [level], ends=ends)[0]
+        assert (row["bound_lower"], row["bound_upper"]) == pytest.approx((least / 4, most / 4))
+    assert exceedance.at(values, status, 6.5).bound_lower == 0.75
+
+
+def test_torque_reverses_where_the_inertia_of_the_output_shaft_says() -> None:
+    params = joints(15, 3000, 100, [0, 1])
+    theta = np.linspace(0, 2 * np.pi, 100_001)
+    steepest = np.gradient(ideal.speed_ratio(theta, np.radians(15)), theta).max()
+    own = 0.01 + 2 * (params["arm_mass"][0] * params["R"][0] ** 2 + params["arm_inertia"][0, 2])
+    assert ideal.reversal_torque(params)[0] == pytest.approx(own * (3000 * RPM) ** 2 * steepest, rel=1e-3)
+    assert params.dtype == PARAM
+
+
+def test_the_plan_tells_of_joints_that_rattle(tmp_path: Path) -> None:
+    text = (STUDIES / "iso2768_f.toml").read_text()
+    calm = tmp_path / "calm.toml"
+    calm.write_text(text)
+    rattling = tmp_path / "rattling.toml"
+    rattling.write_text(text.replace('speed = "500 rpm"', 'speed = "1500 rpm"').replace('"100 N*m"', '"10 N*m"'))
+    assert plan.plan(study.load(calm), 1, 2).reversals.joints == 0
+    found = plan.plan(study.load(rattling), 1, 2).reversals
+    assert found.joints == 2
+    assert found.torque > 10
+    assert found.cost > 2

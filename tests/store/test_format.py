@@ -1,0 +1,303 @@
+"""Result files of every released schema are read, by xarray and MATLAB, too; damaged and hostile ones are refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests import make_golden
+from tests.campaign.test_campaign import datasets
+from tests.store.test_store import new_store, simulation
+from tests.support import fakes
+from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
+from tolstat.common.errors import StoreError
+from tolstat.store import ResultStore, integrity, result_file
+
+GOLDEN = sorted(make_golden.FOLDER.glob("schema*.h5"))
+
+
+def read_all(path: Path) -> int:
+    """Read everything that a result file holds; number of its joints."""
+    with ResultStore.open(path) as store:
+        store.counts()
+        store.errors()
+        store.results()
+        for name in store.history_specs:
+            store.histories(name)
+        if store.case_names:
+            store.design()
+        return store.n
+
+
+@pytest.mark.parametrize("path", GOLDEN, ids=lambda path: path.stem)
+def test_files_of_released_schemas_are_read(path: Path) -> None:
+    expected = pd.read_csv(path.with_suffix(".csv"), index_col="row")
+    with ResultStore.open(path) as store:
+        frame = store.to_pandas()
+        assert (store.n, store.rows, store.campaign_rows, store.whole) == (3, range(3), 3, True)
+        assert store.limits == {"cross1.F": 700.0}
+        assert (store.study_name, store.sampling["seed"], store.options["steps_per_rev"]) == ("fake", 7, 30)
+        assert store.complete
+        loads, modes = store.histories("loads"), store.histories("mode")
+    pd.testing.assert_frame_equal(frame[expected.columns], expected, check_exact=True, check_dtype=False)
+    x = frame["pin1.offset_t"].to_numpy() + 2 * frame["operation.alpha"].to_numpy()
+    np.testing.assert_array_equal(loads, fakes.history(fakes.SPECS["loads"], x))
+    np.testing.assert_array_equal(modes, fakes.history(fakes.SPECS["mode"], x))
+
+
+def test_the_layout_is_that_of_its_schema(tmp_path: Path) -> None:
+    """Whoever changes the layout raises SCHEMA_VERSION and adds a golden file."""
+    golden = make_golden.FOLDER / f"schema{result_file.SCHEMA_VERSION}.h5"
+    made = make_golden.make(tmp_path)
+    assert datasets(made) == datasets(golden), "raise SCHEMA_VERSION, then: python -m tests.make_golden"
+    with h5py.File(made) as new, h5py.File(golden) as old:
+        assert set(new.attrs) == set(old.attrs)
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> Path:
+    """Make the file of a complete campaign with histories."""
+    path, study = tmp_path / "a.h5", fakes.Study(n=6, output=fakes.Output("full"))
+    with new_store(path, study) as store:
+        store.write(np.arange(6), simulation(study, np.arange(6)))
+        store.finish()
+    assert read_all(path) == 6
+    return path
+
+
+def test_xarray_opens_each_group(whole: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    with ResultStore.open(whole) as store:
+        results, loads = store.results(), store.histories("loads")
+    with xarray.open_dataset(whole, engine="h5netcdf", group="results") as opened:
+        assert opened.sizes == {"row": 6}
+        np.testing.assert_array_equal(opened["cross3.F_max"], results["F_max"][:, 2])
+        assert opened["cross3.F_max"].attrs["units"] == "N"
+    with xarray.open_dataset(whole, engine="h5netcdf", group="histories") as opened:
+        assert opened["loads"].dims[0] == "row"
+        assert len(opened["loads"].dims) == 4
+        np.testing.assert_array_equal(opened["loads"], loads)
+
+
+def test_every_axis_has_a_dimension_scale(whole: Path) -> None:
+    with h5py.File(whole) as file:
+        assert file["row"][:].tolist() == list(range(6))
+        for group in ("errors", "results", "histories"):
+            for dataset in file[group].values():
+                if not dataset.is_scale:
+                    scales = zip(dataset.dims, dataset.shape, strict=True)
+                    assert all(len(dim) == 1 and len(dim[0]) == size for dim, size in scales)
+                    assert dataset.dims[0][0] == file["row"]
+
+
+def test_texts_have_a_fixed_length(whole: Path) -> None:
+    found = []
+
+    def look(name: str, item: h5py.HLObject) -> None:
+        found.extend(
+            h5py.check_string_dtype(item.attrs.get_id(key).dtype)
+            for key in ("units", "description")
+            if key in item.attrs
+        )
+
+    with h5py.File(whole) as file:
+        file.visititems(look)
+        found += [h5py.check_string_dtype(file.attrs.get_id(name).dtype) for name in file.attrs]
+    kinds = [info for info in found if info is not None]
+    assert len(kinds) > 200
+    assert all(info.length is not None for info in kinds)
+
+
+def test_histories_name_their_axes(tmp_path: Path) -> None:
+    from tolstat.solver.simulation import history_specs
+
+    for kind in ("full", "harmonics"):
+        for spec in history_specs(fakes.Options(), kind, 4).values():
+            assert len(spec.axes) == len(spec.shape)
+
+
+Damage = Callable[[h5py.File], object]
+
+
+def replaced(name: str, **how: object) -> Damage:
+    """Put another dataset in the place of one."""
+
+    def damage(file: h5py.File) -> None:
+        del file[name]
+        file.create_dataset(name, **how)
+
+    return damage
+
+
+def attribute(name: str, value: object) -> Damage:
+    return lambda file: file.attrs.__setitem__(name, value)
+
+
+def histories_of(shape: list[int], dtype: str = "f4") -> Damage:
+    return attribute("histories", json.dumps({"loads": [shape, dtype, "N", "loads"]}))
+
+
+def virtual(file: h5py.File) -> None:
+    layout = h5py.VirtualLayout((6,), "f8")
+    layout[:] = h5py.VirtualSource("/etc/hostname", "x", (6,))
+    del file["results/closure"]
+    file["results"].create_virtual_dataset("closure", layout)
+
+
+def outside(file: h5py.File) -> None:
+    del file["results/closure"]
+    file["results"].create_dataset("closure", (6,), "f8", external=[("/etc/passwd", 0, 48)])
+
+
+def linked(file: h5py.File) -> None:
+    del file["results/closure"]
+    file["results/closure"] = h5py.ExternalLink("/etc/hostname", "/x")
+
+
+def bomb(file: h5py.File) -> None:
+    """A history of which only the claim is in the file: 60 GB of nothing."""
+    spec = ["loads", [50_000_000], "f4"]
+    file.attrs["histories"] = json.dumps({spec[0]: [spec[1], spec[2], "N", "loads"]})
+    del file["histories/loads"]
+    file["histories"].create_dataset("loads", (6, 50_000_000), "f4", chunks=(1, 1 << 20), compression="gzip")
+
+
+HOSTILE: dict[str, Damage] = {
+    "type of a column": replaced("results/steps", data=np.zeros(6)),
+    "length of a column": replaced("errors/pin1.offset_e", data=np.zeros(7)),
+    "two dimensions": replaced("results/status", data=np.zeros((6, 2), np.uint8)),
+    "a huge column": replaced("results/closure", shape=(10**15,), dtype="f8"),
+    "a huge status": replaced("results/status", shape=(10**15,), dtype="u1"),
+    "space not taken": replaced("results/closure", shape=(6,), dtype="f8"),
+    "compressed": replaced("results/closure", data=np.zeros(6), compression="gzip"),
+    "a group for a column": lambda file: (file.__delitem__("results/closure"), file.create_group("results/closure")),
+    "texts for numbers": replaced("results/closure", data=np.array([b"abcdefgh"] * 6)),
+    "a virtual dataset": virtual,
+    "data of another file": outside,
+    "a link to another file": linked,
+    "no such column": lambda file: file.__delitem__("results/psi_max"),
+    "history of no size": histories_of([0]),
+    "history too large": histories_of([10**6, 10**6]),
+    "history of negative size": histories_of([-3]),
+    "history of objects": histories_of([30, 8, 6], "O"),
+    "history of another shape": histories_of([30, 8, 5]),
+    "a history that is not there": bomb,
+    "JSON too deep": attribute("joint", "[" * 100_000),
+    "JSON of another kind": attribute("design", "[1, 2]"),
+    "no JSON": attribute("identity", "{"),
+    "bytes that are no text": attribute("study", np.bytes_(b"\xff\xfe")),
+    "a number for a text": attribute("study_name", 3.0),
+    "version is a text": attribute("schema_version", "two"),
+    "a negative row": attribute("first_row", -5),
+    "rows beyond the campaign": attribute("campaign_rows", 5),
+    "no versions": lambda file: file.attrs.__delitem__("versions"),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_files_are_refused(whole: Path, name: str) -> None:
+    with h5py.File(whole, "r+") as file:
+        HOSTILE[name](file)
+    with pytest.raises(StoreError, match=r"a\.h5: is damaged: .*\n  hint: "):
+        read_all(whole)
+
+
+READ_ALL = """
+import pathlib, resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (1 << 32, 1 << 32))
+from tests.store.test_format import read_all
+from tolstat.common.errors import StoreError
+for line in sys.stdin:
+    try:
+        print("read", read_all(pathlib.Path(line.strip())), flush=True)
+    except StoreError as error:
+        print("refused", str(error).splitlines()[0], flush=True)
+"""
+
+
+def outcomes(paths: list[Path]) -> list[str]:
+    """What becomes of reading files, each in turn, in a process with bounded memory and time."""
+    told = "".join(f"{path}\n" for path in paths)
+    python = [sys.executable, "-c", READ_ALL]
+    done = subprocess.run(
+        python,
+        input=told,
+        capture_output=True,
+        text=True,
+        timeout=60 + len(paths),
+        check=False,
+        env=fakes.environment(),
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout.splitlines()
+
+
+def test_cut_files_are_refused(whole: Path, tmp_path: Path) -> None:
+    content = whole.read_bytes()
+    lengths = np.linspace(1, len(content) - 1, 60).astype(int)
+    paths = []
+    for length in lengths:
+        paths.append(tmp_path / f"cut{length}.h5")
+        paths[-1].write_bytes(content[:length])
+    told = outcomes(paths)
+    assert len(told) == len(paths)
+    assert all(line.startswith("refused") for line in told), told
+
+
+def test_changed_bytes_end_in_data_or_an_error(whole: Path, tmp_path: Path) -> None:
+    """Wherever a byte is changed: no crash, no traceback, no endless reading. Truth is not asked."""
+    rng = np.random.default_rng(11)
+    content = np.frombuffer(whole.read_bytes(), np.uint8)
+    count = int(os.environ.get("TOLSTAT_FLIPS", "60"))
+    paths = []
+    for number in range(count):
+        changed = content.copy()
+        # the first part of the file holds HDF5's own structures, which do the most harm
+        changed[rng.integers(0, changed.size if number % 2 else changed.size // 4)] = rng.integers(256)
+        paths.append(tmp_path / f"flip{number}.h5")
+        changed.tofile(paths[-1])
+    told = outcomes(paths)
+    assert len(told) == count
+    assert {line.split()[0] for line in told} == {"read", "refused"}
+
+
+def test_no_pickle_anywhere() -> None:
+    package = Path(result_file.__file__).parent.parent
+    for path in package.rglob("*.py"):
+        assert "allow_pickle" not in path.read_text(encoding="utf-8"), path
+        assert not path.read_text(encoding="utf-8").count("import pickle"), path
+
+
+def test_a_released_file_lacks_nothing_that_is_asked_for() -> None:
+    with ResultStore.open(GOLDEN[-1]) as store:
+        assert set(store.to_pandas().columns) >= {c.name for c in ERROR_COLUMNS + RESULT_COLUMNS}
+
+
+@pytest.mark.parametrize(("version", "remedy"), [(3, "run its study again"), (5, "use a newer tolstat")])
+def test_another_schema_is_refused_in_one_sentence(tmp_path: Path, version: int, remedy: str) -> None:
+    path = tmp_path / "other.h5"
+    shutil.copy(GOLDEN[-1], path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["schema_version"] = version
+        integrity.seal(file)
+    with pytest.raises(StoreError, match=rf"schema version {version}, this tolstat reads 4\n.*{remedy}"):
+        ResultStore.open(path)
+
+
+def test_a_copy_of_a_file_is_not_changed_by_reading(tmp_path: Path) -> None:
+    path = tmp_path / "copy.h5"
+    shutil.copy(GOLDEN[-1], path)
+    before = path.read_bytes()
+    read_all(path)
+    assert path.read_bytes() == before

@@ -1,0 +1,78 @@
+"""What a million joints ask of a command's memory: no table of a campaign is read whole where a part of it will do."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.questions.test_causes import TEXT, made
+from tolstat.cli import app
+from tolstat.common.tables import ERROR, RESULT
+from tolstat.store import ResultStore, reader
+from tolstat.store import view as source
+
+BLOCK = 256
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("memory"), TEXT.replace("3000", "1500"))
+
+
+@pytest.fixture
+def read(monkeypatch):
+    """Rows of each whole table that is read."""
+    rows = []
+    for module in (reader, source):
+        monkeypatch.setattr(module, "BLOCK", BLOCK)
+
+    def recording(method):
+        def wrapper(self, part):
+            table = method(self, part)
+            rows.append(len(table))
+            return table
+
+        return wrapper
+
+    for name in ("_errors", "_results"):
+        monkeypatch.setattr(reader.Reader, name, recording(getattr(reader.Reader, name)))
+    return rows
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("report", "--out", "."),
+        ("capability",),
+        ("causes", "--by", "psi"),
+        ("reweight", "--set", "pin*.offset_t.plus_minus=0.09 mm"),
+        ("allocate", "--limit", "P(cross1.F > 700 N) < 0.1"),
+        ("export", "--json", "all.json"),
+    ],
+)
+def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    name, *options = command
+    done = CliRunner().invoke(app, [name, str(path), *options])
+    assert done.exit_code == 0, done.stderr
+    assert max(read) <= BLOCK
+    assert len(read) >= 1500 // BLOCK
+
+
+def test_only_the_fields_asked_for_are_held(path):
+    with ResultStore.open(path) as store:
+        whole, part = source.read(store), source.read(store, source.LOAD_FIELDS, ["pin1.offset_t"])
+    assert whole.results.dtype == RESULT
+    assert whole.errors.dtype == ERROR
+    assert part.results.itemsize < 0.4 * RESULT.itemsize
+    assert part.errors.dtype.names == ("pin1.offset_t",)
+    for field in source.LOAD_FIELDS:
+        np.testing.assert_array_equal(part.results[field], whole.results[field])
+    np.testing.assert_array_equal(part.errors["pin1.offset_t"], whole.errors["pin1.offset_t"])
+
+
+def test_errors_of_some_joints_are_those_rows(path, monkeypatch):
+    monkeypatch.setattr(source, "BLOCK", BLOCK)
+    samples = np.array([0, 3, 254, 255, 256, 1499])
+    with ResultStore.open(path) as store:
+        found = source.errors_at(store, ["pin2.offset_z"], samples)
+        np.testing.assert_array_equal(found["pin2.offset_z"], store.errors()["pin2.offset_z"][1 + samples])

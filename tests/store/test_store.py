@@ -1,0 +1,335 @@
+"""Result files: what is written is read, what cannot be used is refused, and a kill does no harm."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import tolstat
+from tests import format_tables
+from tests.support import fakes
+from tolstat.campaign import run as campaign
+from tolstat.common import tables
+from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
+from tolstat.common.errors import StoreError
+from tolstat.common.tables import Simulation, Status
+from tolstat.store import Counts, ResultStore, provenance
+from tolstat.store.result_file import text
+
+
+def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
+    params = fakes.perturb(study.joint, fakes.draw(study)[rows])
+    return fakes.simulate(params, study.solver.options(), study.output.histories, study.output.harmonics)
+
+
+def new_store(path: Path, study: fakes.Study) -> ResultStore:
+    specs = fakes.specs_of(study.output.histories)
+    return ResultStore.create(path, study, fakes.draw(study), specs, {"pin1.offset_e": 3})
+
+
+@pytest.fixture
+def study() -> fakes.Study:
+    return fakes.Study(n=12, output=fakes.Output("full"))
+
+
+def test_what_is_written_is_read(tmp_path: Path, study: fakes.Study) -> None:
+    path = tmp_path / "a.h5"
+    rows = np.array([1, 2, 3, 7, 9, 8])
+    with new_store(path, study) as store:
+        assert store.pending().tolist() == list(range(12))
+        store.write(rows, simulation(study, rows))
+    with ResultStore.open(path) as store:
+        assert store.pending().tolist() == [0, 4, 5, 6, 10, 11]
+        assert store.errors().tobytes() == fakes.draw(study).tobytes()
+        written, expected = store.results(), simulation(study, rows)
+        for name in tables.RESULT.names or ():
+            np.testing.assert_array_equal(written[name][rows], expected.results[name])
+        assert np.isnan(written["F_max"][store.pending()]).all()
+        for name in fakes.SPECS:
+            np.testing.assert_array_equal(store.histories(name, rows), expected.histories[name])
+        assert np.isnan(store.histories("loads", [0, 4])).all()
+
+
+def test_attributes_tell_where_the_numbers_come_from(tmp_path: Path, study: fakes.Study) -> None:
+    with new_store(tmp_path / "a.h5", study) as store:
+        assert store.study_text == study.text
+        assert store.study_name == "fake"
+        assert store.identity == study.identity()
+        assert store.joint == study.joint
+        assert store.options["steps_per_rev"] == 30
+        assert store.sampling["dimensions"] == {"pin1.offset_e": 3}
+        assert store.sampling["seed"] == study.seed
+        assert store.limits == {"cross1.F": 700.0}
+        assert store.versions["tolstat"] == tolstat.__version__
+        assert {"sources", "python", "numpy", "numba", "scipy", "h5py"} <= store.versions.keys()
+        assert store.created.endswith("+00:00")
+
+
+def test_long_study_text_fits(tmp_path: Path) -> None:
+    study = fakes.Study(n=2, text="# ü\n" * 100_000)
+    new_store(tmp_path / "a.h5", study).close()
+    with ResultStore.open(tmp_path / "a.h5") as store:
+        assert store.study_text == study.text
+
+
+def test_every_dataset_has_unit_and_description(tmp_path: Path, study: fakes.Study) -> None:
+    new_store(tmp_path / "a.h5", study).close()
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file.attrs["filetype"] == b"tolstat campaign"
+        assert file.attrs["schema_version"] == 4
+        for group, columns in (("errors", ERROR_COLUMNS), ("results", RESULT_COLUMNS)):
+            assert set(file[group]) == {c.name for c in columns}
+            for c in columns:
+                dataset = file[group][c.name]
+                assert text(dataset.attrs, "units") == c.unit
+                assert text(dataset.attrs, "description") == c.description
+                assert dataset.shape == (study.n,)
+                assert dataset.dtype == c.dtype
+                assert dataset.chunks is None
+
+
+def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) -> None:
+    rows = np.arange(5)
+    with new_store(tmp_path / "a.h5", study) as store:
+        store.write(rows, simulation(study, rows))
+        frame, with_units = store.to_pandas(), store.to_pandas(units=True)
+        results = store.results()
+    columns = ERROR_COLUMNS + RESULT_COLUMNS
+    assert list(frame.columns) == [c.name for c in columns]
+    assert list(with_units.columns) == [(c.name, c.unit) for c in columns]
+    assert frame.index.name == "row"
+    assert len(frame) == study.n
+    assert frame["status"].tolist() == [Status(s).label for s in results["status"]]
+    assert frame["status"].iloc[-1] == "pending"
+    np.testing.assert_array_equal(frame["fork3.T_mean"], results["T_mean"][:, 6])
+    np.testing.assert_array_equal(frame["pin2.contact_inner_max"], results["contact_max"][:, 1, 1])
+    np.testing.assert_array_equal(frame["pin4.share_uniform"], results["mode_share"][:, 3, 3])
+
+
+def test_counts(tmp_path: Path, study: fakes.Study) -> None:
+    rows = np.arange(4)
+    part = simulation(study, rows)
+    part.results["status"] = [Status.NOT_PERIODIC, Status.NOT_SETTLED, Status.NOT_FINITE, Status.NOT_RESOLVED]
+    with new_store(tmp_path / "a.h5", study) as store:
+        store.write(rows, part)
+        assert store.counts() == Counts(total=12, done=4, not_settled=2, failed=1, not_resolved=1)
+
+
+def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
+    """Why a kill cannot make the file unreadable: bytes change inside the results' own space only."""
+    study, path = fakes.Study(n=500), tmp_path / "a.h5"
+    new_store(path, study).close()
+    before = np.fromfile(path, np.uint8)
+    with ResultStore.open(path, "r+") as store:
+        for rows in np.array_split(np.random.default_rng(1).permutation(study.n), 9):
+            store.write(rows, simulation(study, rows))
+        assert store.complete
+    after = np.fromfile(path, np.uint8)
+    assert before.size == after.size
+    may_change = np.zeros(before.size, bool)
+    with h5py.File(path) as file:
+        for dataset in (*file["results"].values(), *file["ledger"].values()):
+            may_change[dataset.id.get_offset() :][: dataset.id.get_storage_size()] = True
+    changed = before != after
+    assert changed.any()
+    assert not (changed & ~may_change).any()
+
+
+def in_another_process(path: Path, code: str) -> str:
+    """Run code on a result file opened for writing as `store`; gives what it prints, or why it cannot be opened."""
+    program = (
+        "from tolstat.common.errors import StoreError\nfrom tolstat.store import ResultStore\n"
+        f"try:\n    with ResultStore.open({str(path)!r}, 'r+') as store: {code}\n"
+        "except StoreError as error: print(error)"
+    )
+    python, environment = [sys.executable, "-c", program], fakes.environment()
+    return subprocess.run(python, capture_output=True, text=True, check=True, env=environment).stdout
+
+
+def test_limits_are_replaced_whole_or_not_at_all(
+    tmp_path: Path, study: fakes.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.h5"
+    with new_store(path, study) as store:
+        store.write(np.arange(5), simulation(study, np.arange(5)))
+    before = path.read_bytes()
+    other = dataclasses.replace(study, limits={"fork1.T": 40.0}, text="# edited", name="b")
+
+    def full(*args: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with ResultStore.open(path, "r+") as store, monkeypatch.context() as patch:
+        patch.setattr("os.replace", full)
+        store.judge_by(study)
+        with pytest.raises(StoreError, match=r"cannot be replaced: No space left on device\n  hint: make room"):
+            store.judge_by(other)
+        assert store.limits == study.limits
+    assert path.read_bytes() == before
+    with ResultStore.open(path, "r+") as store:
+        store.judge_by(other)
+        assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
+    with ResultStore.open(path) as store:
+        assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
+        assert store.identity == study.identity()
+        assert store.errors().tobytes() == fakes.draw(study).tobytes()
+        assert store.counts().done == 5
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"filetype": "statepoint"}, "is HDF5, but of type 'statepoint'"),
+        (
+            {"schema_version": 5},
+            "has schema version 5, this tolstat reads 4\n  hint: use a newer tolstat",
+        ),
+    ],
+)
+def test_other_files_are_refused(tmp_path: Path, study: fakes.Study, change: dict, message: str) -> None:
+    path = tmp_path / "a.h5"
+    new_store(path, study).close()
+    with h5py.File(path, "r+") as file:
+        file.attrs.update(change)
+    for mode in ("r", "r+"):
+        with pytest.raises(StoreError, match=message):
+            ResultStore.open(path, mode)
+
+
+def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> None:
+    plain = tmp_path / "text.h5"
+    plain.write_text("not HDF5")
+    with pytest.raises(StoreError, match=r"text.h5: is not an HDF5 file\n  hint: give a file"):
+        ResultStore.open(plain)
+    with pytest.raises(StoreError, match=r"none.h5: is not there"):
+        ResultStore.open(tmp_path / "none.h5")
+    with pytest.raises(StoreError, match="is a folder"):
+        ResultStore.open(tmp_path)
+    empty = tmp_path / "empty.h5"
+    empty.touch()
+    with pytest.raises(StoreError, match=r"empty.h5: is not an HDF5 file"):
+        ResultStore.open(empty, "r+")
+    assert empty.stat().st_size == 0
+    foreign = tmp_path / "foreign.h5"
+    h5py.File(foreign, "w").close()
+    with pytest.raises(StoreError, match="of type None"):
+        ResultStore.open(foreign)
+    cut = tmp_path / "cut.h5"
+    new_store(cut, study).close()
+    cut.write_bytes(cut.read_bytes()[:5000])
+    with pytest.raises(StoreError, match="is damaged"):
+        ResultStore.open(cut)
+    poor = tmp_path / "poor.h5"
+    new_store(poor, study).close()
+    with h5py.File(poor, "r+") as file:
+        del file["results"]
+    with pytest.raises(StoreError, match="is damaged"):
+        ResultStore.open(poor)
+
+
+def test_one_writer_and_any_readers(tmp_path: Path, study: fakes.Study) -> None:
+    path = tmp_path / "a.h5"
+    code = f"from tolstat.store import ResultStore\nprint(ResultStore.open({str(path)!r}).counts().done)"
+    with new_store(path, study) as store:
+        store.write(np.arange(5), simulation(study, np.arange(5)))
+        python, environment = [sys.executable, "-c", code], fakes.environment()
+        assert subprocess.run(python, capture_output=True, check=True, env=environment).stdout == b"5\n"
+        answer = in_another_process(path, "print('opened')")
+    assert answer.startswith(f"{path}: is being written by another process\n  hint: ")
+
+
+def test_create_replaces_nothing(tmp_path: Path, study: fakes.Study) -> None:
+    path = tmp_path / "a.h5"
+    path.write_text("precious")
+    with pytest.raises(StoreError, match="exists already"):
+        new_store(path, study)
+    assert path.read_text() == "precious"
+    (tmp_path / "b.h5.parts").mkdir()
+    with pytest.raises(StoreError, match=r"b.h5.parts: holds histories of another campaign"):
+        new_store(tmp_path / "b.h5", study)
+    with pytest.raises(StoreError, match="no such folder"):
+        new_store(tmp_path / "none" / "a.h5", study)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "b.h5.parts"]
+
+
+def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*args: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tolstat.store.result_store.fill", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        new_store(tmp_path / "a.h5", fakes.Study())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
+    code = (
+        "import os, signal, pathlib, tolstat.store.result_store\n"
+        "from tests.support import fakes\n"
+        "from tests.store import test_store\n"
+        "tolstat.store.result_store.fill = lambda *args: os.kill(os.getpid(), signal.SIGKILL)\n"
+        f"test_store.new_store(pathlib.Path({str(tmp_path / 'a.h5')!r}), fakes.Study())"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], env=fakes.environment(), check=False)
+    assert ended.returncode == -9
+    assert not (tmp_path / "a.h5").exists()
+    counts = campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+    assert counts.done == 40
+
+
+def test_other_sources_of_the_same_version_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, package = tmp_path / "a.h5", tmp_path / "tolstat"
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    shutil.copytree(Path(tolstat.__file__).parent, package)
+    monkeypatch.setattr("tolstat.__file__", str(package / "__init__.py"))
+    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())  # the same code in another place
+    for name in ("kernel/contact.py", "joint/material.py", "tolerance.py"):
+        (package / name).write_text("# edited")
+        says = (
+            f"a.h5: was begun by other code\n    sources: hash .* in the file, {provenance.source_hash()} now\n  hint: "
+        )
+        with pytest.raises(StoreError, match=says):
+            campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+
+
+def test_wrong_blocks_are_bugs(tmp_path: Path, study: fakes.Study) -> None:
+    rows = np.arange(3)
+    part = simulation(study, rows)
+    with new_store(tmp_path / "a.h5", study) as store:
+        with pytest.raises(ValueError, match="3 results for 2 rows"):
+            store.write(rows[:2], part)
+        with pytest.raises(ValueError, match=r"histories \[\] given"):
+            store.write(rows, Simulation(part.results, {}))
+        with pytest.raises(ValueError, match="history mode: shape"):
+            store.write(rows, Simulation(part.results, part.histories | {"mode": np.zeros((3, 2), np.uint8)}))
+        part.results["status"][1] = Status.PENDING
+        with pytest.raises(ValueError, match="must not have the status PENDING"):
+            store.write(rows, part)
+        assert store.pending().size == 12
+        with pytest.raises(StoreError, match="holds no histories 'heat'"):
+            store.histories("heat")
+
+
+def test_document_is_up_to_date() -> None:
+    text = format_tables.DOCUMENT.read_text(encoding="utf-8")
+    assert text == format_tables.updated(text), "run: python -m tests.format_tables"
+    for name in ("design", "errors", "results", "status"):
+        assert f"<!-- table: {name} -->\n| " in text
+
+
+def test_document_names_every_attribute(tmp_path: Path, study: fakes.Study) -> None:
+    new_store(tmp_path / "a.h5", study).close()
+    document = format_tables.DOCUMENT.read_text(encoding="utf-8")
+    with h5py.File(tmp_path / "a.h5") as file:
+        for name in file.attrs:
+            assert f"\n| `{name}` | " in document
+            if f"| `{name}` | JSON |" in document:
+                json.loads(text(file.attrs, name))

@@ -1,0 +1,215 @@
+"""A study and stages that cost nothing, so that stores and campaigns can be tested without a kernel.
+
+The numbers depend on the row's errors only, as those of the real simulation do. `main` runs a campaign, for
+tests that kill it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.support.environment import environment as environment
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Stages
+from tolstat.common import selected_results as kept
+from tolstat.common.columns import Column
+from tolstat.common.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
+from tolstat.solver import stationary
+from tolstat.study.model import Sampling
+
+SPECS = {
+    "loads": HistorySpec((30, 8, 6), "f4", "N, N*m", "bushing loads"),
+    "mode": HistorySpec((30, 4), "u1", "1", "contact modes"),
+    "error": HistorySpec((2,), "f8", "1", "error of the harmonics"),
+}
+
+
+class Dump(dict):
+    """A mapping with pydantic's way of writing itself."""
+
+    def model_dump(self, mode: str = "json") -> dict[str, Any]:
+        """Return the mapping itself."""
+        return dict(self)
+
+
+@dataclass(frozen=True)
+class Output:
+    """Table ``[output]`` of a study."""
+
+    histories: str = "none"
+    harmonics: int = 4
+    results: tuple[str, ...] | None = None
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns of the results that are kept."""
+        return kept.columns(self.identity())
+
+    def identity(self) -> dict[str, Any]:
+        """Return what decides the numbers."""
+        return {"output": self.histories} | ({} if self.results is None else {kept.KEY: list(self.results)})
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Table ``[solver]`` of a study."""
+
+    steps_per_rev: int = 30
+    fidelity: str = "dynamic"
+    error_budget: float = 0.005
+
+    def options(self) -> Options:
+        """Return the settings as the kernel takes them."""
+        return Options(steps_per_rev=self.steps_per_rev)
+
+
+@dataclass(frozen=True)
+class Study:
+    """What store and campaign ask of a study."""
+
+    n: int = 40
+    seed: int = 7
+    solver: Solver = Solver()
+    output: Output = Output()
+    limits: dict[str, float] = field(default_factory=lambda: {"cross1.F": 700.0})
+    name: str = "fake"
+    text: str = "# a study\n[sampling]\nn = 40  # Größe\n"
+    variants: tuple[()] = ()
+    case_names: tuple[()] = ()
+    joint: Dump = field(default_factory=lambda: Dump(material=Dump(E="2.1e11 Pa")))
+
+    @property
+    def sampling(self) -> Sampling:
+        """Table ``[sampling]`` of a study."""
+        return Sampling(n=self.samples, seed=self.seed)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of every table."""
+        return self.n
+
+    @property
+    def samples(self) -> int:
+        """Number of joints, the nominal one not counted."""
+        return self.n - 1
+
+    @property
+    def joints(self) -> tuple[Dump, ...]:
+        """One joint, of which all rows are variants without errors of their own."""
+        return (self.joint,)
+
+    @property
+    def solvers(self) -> tuple[Solver, ...]:
+        """Settings of the only joint."""
+        return (self.solver,)
+
+    @property
+    def design(self) -> np.ndarray:
+        """Row by row the only joint."""
+        return np.zeros(self.n, DESIGN)
+
+    def identity(self) -> dict[str, Any]:
+        """Return what decides the numbers."""
+        solver = {"solver.steps_per_rev": self.solver.steps_per_rev}
+        return solver | {"sampling.n": self.n, "sampling.seed": self.seed} | self.output.identity()
+
+
+def draw(study: Study) -> np.ndarray:
+    rng = np.random.default_rng(184 + study.seed)
+    errors = np.zeros(study.n, ERROR)
+    values = rng.normal(size=(study.n, len(ERROR_FIELDS)))  # row by row: those of a longer campaign begin alike
+    for number, f in enumerate(ERROR_FIELDS):
+        errors[f.name] = values[:, number]
+    return errors
+
+
+def draw_blocks(study: Study, rows: range) -> Iterator[np.ndarray]:
+    yield draw(study)[rows.start : rows.stop]
+
+
+def perturb(joint: Any, errors: np.ndarray) -> np.ndarray:
+    params = np.zeros(len(errors), PARAM)
+    params["alpha"] = errors["operation.alpha"]
+    params["R"] = errors["pin1.offset_t"]
+    return params
+
+
+def history_specs(options: Options, histories: str, n_harmonics: int) -> dict[str, HistorySpec]:
+    return SPECS if histories == "full" else {}
+
+
+def simulate(
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, seconds: float = 0.0
+) -> Simulation:
+    """Simulate joints by a formula, `seconds` each; one in ten fails, one in ten does not settle."""
+    time.sleep(seconds * len(params))
+    results = np.zeros(len(params), RESULT)
+    x = params["R"] + 2 * params["alpha"]
+    results["status"] = np.where(x > 3, Status.NEWTON_FAILED, np.where(x < -3, Status.NOT_SETTLED, Status.OK))
+    results["settled"] = results["status"] == Status.OK
+    results["steps"] = options.steps_per_rev
+    for i, name in enumerate(n for n in RESULT.names if RESULT[n].base == np.float64):
+        shape = (len(params),) + (1,) * len(RESULT[name].shape)
+        results[name] = np.where(x > 3, np.nan, np.sin(x + i)).reshape(shape)
+    stationary.fill_ends(results)
+    return Simulation(results, {name: history(spec, x) for name, spec in specs_of(histories).items()})
+
+
+def specs_of(histories: str) -> dict[str, HistorySpec]:
+    return history_specs(Options(), histories, 0)
+
+
+def history(spec: HistorySpec, x: np.ndarray) -> np.ndarray:
+    steps = np.arange(np.prod(spec.shape)).reshape(spec.shape)
+    values = x.reshape((-1,) + (1,) * len(spec.shape)) * np.cos(steps)
+    return (np.abs(values) * 50 % 4 if spec.dtype == "u1" else values).astype(spec.dtype)
+
+
+def simulate_and_raise(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+    raise ZeroDivisionError("a bug")
+
+
+def simulate_badly(
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, kills: float, hangs: float
+) -> Simulation:
+    """Simulate, but the joint with one value of R kills its process, and another one takes for ever."""
+    if kills in params["R"]:
+        os.kill(os.getpid(), signal.SIGKILL)
+    while hangs in params["R"]:
+        pass
+    return simulate(params, options, histories, n_harmonics)
+
+
+def warm_up() -> None:
+    """Compile nothing."""
+
+
+def stages(simulate: Any = simulate) -> Stages:
+    return Stages(draw_blocks, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up)
+
+
+def main(out: str, workers: int, block: int, seconds: float, histories: str = "none", n: int = 40) -> None:
+    """Run a campaign of `n` slow joints, as `tolstat run` does; says ``go`` after the first block."""
+    said: list[int] = []
+
+    def say(counts: Any) -> None:
+        said.append(counts.done)
+        if len(said) == 2:
+            print("go", flush=True)
+
+    study = Study(n=n, output=Output(histories))
+    try:
+        slow = stages(partial(simulate, seconds=seconds))
+        campaign.run(study, Path(out), workers, block, progress=say, stages=slow)
+    except campaign.Interrupted as stop:
+        print(stop, flush=True)
+        raise SystemExit(stop.exit_code) from None

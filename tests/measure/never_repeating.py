@@ -1,4 +1,4 @@
-"""``python -m tests.measure.never_repeating``: joints that never repeat, watched longer, and by another integrator.
+"""``NUMBA_CACHE_DIR=FOLDER python -m tests.measure.never_repeating``: joints that never repeat, watched longer and otherwise.
 
 Stationary joints at 15 deg, 3000 rpm and 100 N m go on for a thousand revolutions: how many of the largest loads of
 each hundred lie in the intervals that 48 revolutions gave. Ten chaotic ones are integrated by scipy's RK45 (rtol 1e-6)
@@ -7,6 +7,7 @@ beside a neighbour: exponent, and largest loads of one revolution after the othe
 
 from __future__ import annotations
 
+import os
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
 from tolstat.common.tables import RESULT, Method, Motion, Options, Status
+from tolstat.kernel.revolution import resolve
 from tolstat.solver import refinement
 from tolstat.solver.reference import first_order
 from tolstat.solver.simulation import _together, simulate_rows
@@ -52,12 +54,21 @@ def watch(params: NDArray[np.void], revolutions: int) -> tuple[NDArray[np.void],
     return results.view(np.ndarray), blocks.view(np.ndarray)
 
 
+def repeated(result: np.void, blocks: NDArray[np.void]) -> NDArray[np.void]:
+    """Statistics of all revolutions, those after a motion has begun to repeat from its last period."""
+    made, period = int(result["revolutions"]), int(result["period"])
+    if period:
+        later = np.arange(made, len(blocks))
+        blocks[made:] = blocks[made - period + (later - made) % period]
+    return blocks[: len(blocks) if period else made]
+
+
 def cover(params: NDArray[np.void], told: NDArray[np.void]) -> None:
     """Print which share of largest loads lies in the intervals told."""
-    _, blocks = watch(params, LONG)
+    results, blocks = watch(params, LONG)
     hits, all_hits = [], []
     for i, own in enumerate(told):
-        groups = blocks[i, STARTED:].reshape(-1, DURATION)
+        groups = repeated(results[i], blocks[i])[STARTED:].reshape(-1, DURATION)
         inside = []
         for load in ("F", "T"):
             ratio = groups[f"{load}_max"].max(axis=1) / own[f"{load}_max"]
@@ -65,7 +76,8 @@ def cover(params: NDArray[np.void], told: NDArray[np.void]) -> None:
             worst = groups[f"{load}_max"].max(axis=(1, 2)) / own[f"{load}_max"].max()
             hits.append((own[f"{load}_lower"] <= worst) & (worst <= own[f"{load}_upper"]))
         all_hits.append(np.concatenate(inside, axis=1).mean())
-        print(f"joint {i}: largest {np.mean(hits[-2:]):.2f}, each load {all_hits[-1]:.2f}", flush=True)
+        period = f", repeats from {results['revolutions'][i]:.0f}" if results["period"][i] else ""
+        print(f"joint {i}: largest {np.mean(hits[-2:]):.2f}, each load {all_hits[-1]:.2f}{period}", flush=True)
     width = np.median(told["F_upper"] - told["F_lower"])
     print(f"{len(told)} joints, {LONG - STARTED} revolutions: {np.mean(hits):.3f} of the largest |F| and |T|, ", end="")
     print(f"{np.mean(all_hits):.3f} of the largest of each bushing; median width of F {width:.3f}")
@@ -73,7 +85,7 @@ def cover(params: NDArray[np.void], told: NDArray[np.void]) -> None:
 
 def exponent(params: NDArray[np.void]) -> Exponent:
     """Integrate a joint and its neighbour as one system, so that both take the same steps."""
-    system = first_order(params, Options(max_refinements=0))
+    system = first_order(params, Options(max_refinements=0), from_start=True)
     n = len(system.y0)
     turn = system.period / 180 * np.ones(n)
     turn[: n // 2] = 1.0
@@ -114,6 +126,9 @@ def compare(params: NDArray[np.void], told: NDArray[np.void]) -> None:
 
 
 if __name__ == "__main__":
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        raise SystemExit("set NUMBA_CACHE_DIR to an empty folder: the kernels are compiled with another bound")
+    resolve.MOST_ITERATIONS = 10**9
     params = rattling(512)
     told = simulate_rows(params, Options()).results
     never = np.flatnonzero((told["status"] == Status.STATIONARY) & (told["motion"] != Motion.SUBHARMONIC))

@@ -37,7 +37,12 @@ def draw(source: Path, target: Path) -> None:
             more = f"\n+ {100 * stationary:.0f} % stat." if stationary > 0 else ""
             dark = shares[i, k] > 0.6
             ax.text(
-                k, i, f"{100 * ok:.0f} % ok{more}", ha="center", va="center", color="w" if dark else "k", fontsize=9
+                *(k, i, f"{100 * ok:.0f} % ok{more}"),
+                ha="center",
+                va="center",
+                fontsize=9,
+                zorder=5,
+                color="w" if dark else "k",
             )
     image = ax.imshow(shares, origin="lower", aspect="auto", vmin=0, vmax=1, cmap="cividis_r")
     figure.colorbar(image, label="share of joints that are ok or stationary")
@@ -45,13 +50,13 @@ def draw(source: Path, target: Path) -> None:
     fine = np.linspace(0, len(speeds) - 1, 200)
     speed = np.exp(np.interp(fine, np.arange(len(speeds)), np.log(speeds)))
     place = np.interp(np.log(inertia * speed**2), np.log(torques), np.arange(len(torques)), left=np.nan, right=np.nan)
-    ax.plot(fine, place, color="#d55e00", lw=3, label="below this line the torque reverses")
+    ax.plot(fine, place, color="#d55e00", lw=2, zorder=2, label="below this line the torque reverses")
     ax.set_xticks(range(len(speeds)), [f"{s / RPM:.0f}" for s in speeds])
     ax.set_yticks(range(len(torques)), [f"{t:.0f}" for t in torques])
     ax.set_xlabel("speed of the input shaft (1/min)")
     ax.set_ylabel("torque (N m)")
     ax.set_title(f"Joints to ISO 2768-f at 15°: {len(status)} joints, some {len(status) // shares.size} a field")
-    ax.legend(loc="lower right")
+    figure.legend(loc="outside lower right", frameon=False)
     figure.savefig(target, dpi=150)
 
 

@@ -102,7 +102,14 @@ def check_installed(codes: tuple[Code, ...]) -> None:
         raise InputError([Fault("CVODE", "needs scikit-sundae", 'pip install "tolstat[bench]", or leave CVODE out')])
 
 
-def solve(system: FirstOrder, competitor: Competitor, rtol: float, revolutions: int, limit: float) -> Solution:
+def solve(
+    system: FirstOrder,
+    competitor: Competitor,
+    rtol: float,
+    revolutions: int,
+    limit: float,
+    angles: int = SAMPLES_PER_REV,
+) -> Solution:
     """Integrate a joint and find the largest loads of the last revolution.
 
     Parameters
@@ -117,14 +124,15 @@ def solve(system: FirstOrder, competitor: Competitor, rtol: float, revolutions: 
         How many are integrated.
     limit : float
         CPU time (s) after which the run is stopped.
+    angles : int
+        Angles of the last revolution at which loads are looked at, by the integrator's own interpolation.
 
     Returns
     -------
     Solution
-        Loads are looked at 2880 angles of the last revolution, by the integrator's own interpolation.
     """
     run: Callable[..., FloatArray | None] = _cvode if competitor.code == "CVODE" else _scipy
-    last = revolutions - 1 + np.arange(1, SAMPLES_PER_REV + 1) / SAMPLES_PER_REV
+    last = revolutions - 1 + np.arange(1, angles + 1) / angles
     times = system.t0 + system.period * last
     counted = _Counted(system, limit)
     settings = {"rtol": rtol, "atol": rtol * system.scale}

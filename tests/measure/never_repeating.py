@@ -1,4 +1,4 @@
-"""``NUMBA_CACHE_DIR=FOLDER python -m tests.measure.never_repeating``: joints that never repeat, watched longer and otherwise.
+"""``NUMBA_CACHE_DIR=FOLDER python -m tests.measure.never_repeating``: joints that never repeat, watched longer.
 
 Stationary joints at 15 deg, 3000 rpm and 100 N m go on for a thousand revolutions: how many of the largest loads of
 each hundred lie in the intervals that 48 revolutions gave. Ten chaotic ones are integrated by scipy's RK45 (rtol 1e-6)

@@ -1,4 +1,4 @@
-"""``python -m tests.measure.rattle_precision``: work against error of joints whose contacts hit, beside other integrators.
+"""``python -m tests.measure.rattle_precision``: work against error where contacts hit, beside other integrators.
 
 Three joints of studies/iso2768_f.toml at 30 deg, 1500 rpm and 100 N m, from the equilibrium that the solver starts
 from. Others make six revolutions, of which the last counts; the solver makes as many as it needs. Errors are of the

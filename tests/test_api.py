@@ -66,6 +66,7 @@ def test_examples_on_files(module, examples):
     assert (found.failed, found.attempted > 0) == (0, True)
 
 
+@pytest.mark.slow
 def test_the_example_study_runs_cell_by_cell(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["example.py", str(tmp_path)])
     runpy.run_path(str(ROOT / "studies" / "example.py"))

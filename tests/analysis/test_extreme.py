@@ -39,6 +39,7 @@ def test_the_end_of_a_tail_has_no_likelihood_beyond_it():
     assert pareto.upper_share(2.5, -0.5, 1.0) == 0.0
 
 
+@pytest.mark.slow
 def test_return_loads_cover_over_seeds_and_without_doubt_of_the_shape_they_do_not():
     load, covered, narrow = expon(), [], []
     samples = np.random.default_rng(10).exponential(size=(SEEDS, 800))

@@ -43,6 +43,7 @@ def found():
     return first, bounds, np.array(naive)
 
 
+@pytest.mark.slow
 def test_first_order_indices_cover_and_are_not_biased(found):
     first, _, naive = found
     lower, upper, estimate = (np.array([getattr(f, e) for f in first]) for e in ("lower", "upper", "estimate"))
@@ -130,6 +131,7 @@ def test_shares_over_the_revolution_cover_and_their_plain_mean_does_not():
         assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_rank_coefficients_cover_over_seeds_and_without_the_groups_number_they_do_not():
     rng, covered, narrow = np.random.default_rng(77), [], []
     rho = SLOPES / np.sqrt(SLOPES @ SLOPES)

@@ -58,6 +58,7 @@ def these():
     return joints.sample(study.load(STUDY), 8)
 
 
+@pytest.mark.slow
 def test_operations_are_those_of_the_structure(these):
     """The elimination does the same for any joint: counted along `linsolve`, block by block."""
     counts = flops.count_apart(list(iteration.snapshots(these, 2)))
@@ -72,6 +73,7 @@ def test_operations_are_those_of_the_structure(these):
     assert counts[0]["substitution"] == counts[1]["substitution"]
 
 
+@pytest.mark.slow
 def test_parts_and_rest_are_the_whole(these):
     found = iteration.measure(these, 1)
     for part in (found.lanes, found.alone):

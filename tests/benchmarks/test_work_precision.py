@@ -90,6 +90,7 @@ def test_a_run_that_cannot_be_solved_has_failed(code):
         assert competitors.solve(blow_up, Competitor(code, False), 1e-6, 1, 20.0).outcome != "ok"
 
 
+@pytest.mark.slow
 def test_joint_begins_where_the_solver_does(params):
     par = params(alpha=0.2)
     system = first_order(par, Options(), from_start=True)

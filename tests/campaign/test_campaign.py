@@ -55,6 +55,7 @@ def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     return study, expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("workers", "block"), [(1, 1), (1, 7), (1, 40), (1, 1000), (2, None), (2, 3), (3, 1)])
 def test_workers_and_blocks_change_no_byte(tmp_path: Path, reference, workers: int, block: int | None) -> None:
     study, expected = reference
@@ -150,6 +151,7 @@ def start(
     return process
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("workers", "number"), [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGTERM)])
 def test_a_request_to_stop_keeps_finished_blocks(tmp_path: Path, workers: int, number: signal.Signals) -> None:
     path = tmp_path / "a.h5"

@@ -126,6 +126,7 @@ def test_slices_and_changed_studies_do_not_grow(tmp_path: Path, make: Make) -> N
         combine.extend(whole, 80, tmp_path / "small.toml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("method", ["random", "sobol", "lhs"])
 def test_merged_slices_are_one_run(tmp_path: Path, make: Make, method: str, kind: str) -> None:
@@ -204,6 +205,7 @@ def test_rows_of_a_slice_are_those_of_the_campaign(tmp_path: Path, make: Make) -
         assert store.errors().tobytes() == sampling.draw(study)[5:20].tobytes()
 
 
+@pytest.mark.slow
 def test_commands(tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     study, own = make(60), campaign.run
     monkeypatch.setattr(campaign, "run", lambda *args, **rest: own(*args, **rest | {"stages": STAGES}))
@@ -225,6 +227,7 @@ def test_commands(tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch) -
     assert "is not there" in call("merge", "x.h5", "--out", "d.h5", code=2)
 
 
+@pytest.mark.slow
 def test_large_campaigns_need_no_more_memory(tmp_path: Path) -> None:
     """A smaller count of ``python -m tests.measure.scale 10000000 FOLDER``: tables are nowhere held whole."""
     measured = []

@@ -120,6 +120,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_workers_and_blocks_do_not_move_the_stop(tmp_path: Path) -> None:
     outcomes = [stopped(tmp_path / "a.h5", 1, 7), stopped(tmp_path / "b.h5", 2, 50), stopped(tmp_path / "c.h5", 1, 999)]
     assert outcomes[0] == outcomes[1] == outcomes[2]
@@ -151,6 +152,7 @@ def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     assert f"stopped by {RULE} at 39 joints; 95% interval corrected for 2 looks: 0.02000 to 0.25000" in notes
 
 
+@pytest.mark.slow
 def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.campaign.test_extend import STAGES
 

@@ -52,6 +52,7 @@ def assert_same_but(path: Path, expected: dict[str, bytes], rows: list[int]) -> 
             np.testing.assert_array_equal(kept, wanted)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("workers", "block"), [(2, 4), (1, 40)] if LONG else [(2, 4)])
 def test_a_joint_that_kills_and_one_that_hangs_are_marked(
     tmp_path: Path, expected: dict[str, bytes], workers: int, block: int
@@ -94,6 +95,7 @@ def test_four_workers_change_no_byte(tmp_path: Path, expected: dict[str, bytes])
     assert datasets(tmp_path / "a.h5") == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", range(20 if LONG else 1))
 def test_all_processes_killed_again_and_again(tmp_path: Path, expected: dict[str, bytes], moment: int) -> None:
     chance, path, kills = random.Random(moment), tmp_path / "a.h5", 0

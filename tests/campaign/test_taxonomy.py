@@ -117,6 +117,7 @@ def test_a_campaign_reaches_every_state_of_the_kernel(path: Path) -> None:
     assert np.isnan(results["failed_theta"][~at_a_step]).all()
 
 
+@pytest.mark.slow
 def test_a_campaign_reaches_every_state_of_the_supervisor(tmp_path: Path) -> None:
     with ResultStore.open(of_stand_ins(tmp_path)) as store:
         assert store.status()[[2, 5, 7]].tolist() == [Status.CRASHED, Status.TIMEOUT, Status.PENDING]

@@ -233,6 +233,7 @@ def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
     assert accuracy.by_kind(tables.errors(found)[tables.TOTAL])[:, 0] == pytest.approx([0.0, 0.2])
 
 
+@pytest.mark.slow
 def test_command_checks_the_joints_of_a_file(tmp_path):
     plan_path, path, out = written(tmp_path), tmp_path / "real.h5", tmp_path / "out.csv"
     campaign.run(study.load(plan_path, n=4), path, workers=1)

@@ -251,6 +251,7 @@ def test_report_makes_the_folder_it_is_to_write_to(tmp_path):
     assert not (tmp_path / "other").exists()
 
 
+@pytest.mark.slow
 def test_run_ends_with_the_report_and_goes_on_where_it_was(study):
     done = call("run", study, "--executor", "serial")
     assert done.exit_code == 0, done.stderr

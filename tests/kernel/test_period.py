@@ -46,6 +46,7 @@ def test_slow_decay_is_told_from_motion_that_goes_on(params):
     assert longer["revolutions"] == pytest.approx(revs, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [180, 360])
 def test_rattle_at_low_torque_is_chaotic_at_any_step(params, steps):
     row = one(params(**RATTLE), steps_per_rev=steps)
@@ -60,6 +61,7 @@ def test_ringing_that_nothing_damps_is_quasi_periodic(params, steps):
     assert abs(row["lyapunov"]) < 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("joint", "options", "far"),
     [(RATTLE, {}, True), (None, NO_LOSS, False)],

@@ -68,6 +68,7 @@ def cycles(path):
         return fatigue.cycles(store), store.status()
 
 
+@pytest.mark.slow
 def test_the_same_cycles_from_worker_and_histories(campaign):
     counted, status = cycles(campaign("cycles"))
     with ResultStore.open(campaign("cycles")) as store:

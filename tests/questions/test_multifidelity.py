@@ -129,6 +129,7 @@ def plan(tmp_path, monkeypatch):
     return path
 
 
+@pytest.mark.slow
 def test_two_files_of_the_same_joints_stopped_and_gone_on_with(tmp_path, plan):
     command = ["multifidelity", str(plan), "--out", str(tmp_path), "--budget", "1 s", "--workers", "1", "--json"]
     stop_at.append(9)  # blocks into the joints that come after the pilots

@@ -154,6 +154,7 @@ def whole(once, tmp_path):
     return plan, found, Path(shutil.copy(path, tmp_path))
 
 
+@pytest.mark.slow
 def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
     plan, found, path = whole
     assert found.estimate.lower < norm.sf(2.5) < found.estimate.upper
@@ -183,6 +184,7 @@ def test_level_0_is_the_random_campaign(whole):
         np.testing.assert_array_equal(store.errors(slice(0, 101)), sampling.draw(drawn))
 
 
+@pytest.mark.slow
 def test_stopped_and_gone_on_with_it_is_the_same_in_any_blocks(tmp_path, whole, monkeypatch):
     plan, found, path = whole
     calls = []

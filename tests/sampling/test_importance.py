@@ -172,6 +172,7 @@ def test_statistics_that_count_joints_alike_are_refused(stored):
         assert "joints that count differently" in done.stderr
 
 
+@pytest.mark.slow
 def test_slices_and_extensions_have_the_weights_of_one_run(tmp_path, stored):
     few = campaign(tmp_path, name="few", n=1000)
     combine.extend(few, 1200)

@@ -19,6 +19,8 @@ from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultStore, verification
 from tolstat.store.verification import Check, Verification
 
+pytestmark = pytest.mark.slow
+
 STUDIES = ROOT / "studies"
 FLOATS = [f.name for f in RESULT_FIELDS if f.dtype == "f8"]
 ENDS = {f"{load}_{end}" for load in LARGEST for end in ("lower", "upper")}

@@ -12,6 +12,8 @@ from tolstat.common.tables import Status
 from tolstat.kernel.mechanics import rotation
 from tolstat.solver.integrate import integrate
 
+pytestmark = pytest.mark.slow
+
 METHODS = ("bdf2", "generalized_alpha", "tr_bdf2")
 
 

@@ -180,6 +180,7 @@ def test_torque_reverses_where_the_inertia_of_the_output_shaft_says() -> None:
     assert params.dtype == PARAM
 
 
+@pytest.mark.slow
 def test_the_plan_tells_of_joints_that_rattle(tmp_path: Path) -> None:
     text = (STUDIES / "iso2768_f.toml").read_text()
     calm = tmp_path / "calm.toml"

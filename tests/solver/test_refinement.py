@@ -72,6 +72,7 @@ def test_a_joint_that_is_wrong_at_180_steps_is_refined() -> None:
     assert wrong["newton_iterations"] > 4 * plain["newton_iterations"][1]
 
 
+@pytest.mark.slow
 def test_lively_joints_are_right_or_not_ok() -> None:
     params = parameters("fuzz.toml", *DAMPED, *DEEP)
     plain = simulate_rows(params, PLAIN).results

@@ -259,6 +259,7 @@ def test_failure_of_newton_is_said_and_nothing_invented(params):
     assert np.isnan(row["F_max"]).all()
 
 
+@pytest.mark.slow
 def test_a_joint_without_torque_ends(params):
     row = simulate_rows(params(alpha=0.2, torque=0.0), OPTIONS._replace(max_revs=4)).results[0]
     assert row["status"] in SIMULATED

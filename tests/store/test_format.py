@@ -255,6 +255,7 @@ def test_cut_files_are_refused(whole: Path, tmp_path: Path) -> None:
     assert all(line.startswith("refused") for line in told), told
 
 
+@pytest.mark.slow
 def test_changed_bytes_end_in_data_or_an_error(whole: Path, tmp_path: Path) -> None:
     """Wherever a byte is changed: no crash, no traceback, no endless reading. Truth is not asked."""
     rng = np.random.default_rng(11)

@@ -124,6 +124,7 @@ def test_counts(tmp_path: Path, study: fakes.Study) -> None:
         assert store.counts() == Counts(total=12, done=4, not_settled=2, failed=1, not_resolved=1)
 
 
+@pytest.mark.slow
 def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
     """Why a kill cannot make the file unreadable: bytes change inside the results' own space only."""
     study, path = fakes.Study(n=500), tmp_path / "a.h5"

@@ -1,8 +1,8 @@
-"""From a study to the errors of its joints, drawn before anything runs.
+"""Draw the errors of a study's joints, before any of them is simulated.
 
 The errors of joint i depend on the seed, i and the error's name only: not on the number of joints, not on which
-others are drawn with it, and not on other errors that are added to the study later (excepted are `lhs`, whose strata
-are as many as its joints, and `pick_freeze`, of which a point has as many joints as there are groups).
+others are drawn with it, and not on other errors that are added to the study later. There are two exceptions: `lhs` has
+as many strata as joints, and with `pick_freeze` the number of joints per point depends on the number of groups.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Table = NDArray[np.void]
 
 
 BLOCK = 1 << 16
-"""Rows drawn at a time: a table of 27 MB."""
+"""Number of rows drawn at a time: a table of 27 MB."""
 
 
 def draw(study: Study, rows: range | None = None) -> Table:
@@ -37,9 +37,9 @@ def draw(study: Study, rows: range | None = None) -> Table:
     Parameters
     ----------
     study : Study
-        What to draw.
+        Study whose errors are drawn.
     rows : range, optional
-        Which rows, without gaps; all of the study's without it.
+        Rows to draw, with step 1; all rows of the study by default.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def draw(study: Study, rows: range | None = None) -> Table:
 def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
     """Draw `rows` of a study as tables of at most `BLOCK` rows, one after the other.
 
-    A Latin hypercube, whose permutations go over all of its joints, is drawn in one.
+    A Latin hypercube is drawn as one table, because its permutations go over all joints.
     """
     size = len(rows) if study.sampling.method == "lhs" else BLOCK
     for first in range(rows.start, rows.stop, size):
@@ -76,7 +76,7 @@ def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
 
 
 def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
-    """How `rows` of a study are drawn, as tables of at most `BLOCK` rows; None where `origins` has no such table."""
+    """Return tables of how `rows` are drawn (`draw_records`), of at most `BLOCK` rows; None if the method has none."""
     if study.sampling.method == "subset":
         return iter([_level_0(study, rows)])
     if study.sampling.method != "importance":
@@ -103,18 +103,18 @@ def _origin(study: Study, rows: range) -> Table:
 
 
 def scores(study: Study, numbers: range) -> Array:
-    """Independent standard normal scores that the errors of samples of the random campaign are made from.
+    """Independent standard normal scores from which the errors of a random campaign's samples are computed.
 
     Returns
     -------
     ndarray, (len(numbers), d)
-        A column for each column of the errors that scatters.
+        One column for each of the d `columns`.
     """
     return np.column_stack([ndtri(u) for u in _uniforms(columns(study), numbers, study).values()])
 
 
 def noise(study: Study, level: int, first: int, count: int) -> Array:
-    """Independent standard normal numbers `first` and following of a level of a subset simulation, (count, d)."""
+    """Independent standard normal numbers of a level of a subset simulation, from number `first` on, (count, d)."""
     streams = (_stream(study.sampling.seed, f"subset {level} {name}", first) for name in columns(study))
     return np.column_stack([ndtri(np.maximum(stream.random(count), 2.0**-54)) for stream in streams])
 
@@ -125,9 +125,9 @@ def from_scores(study: Study, scores: Array) -> Table:
     Parameters
     ----------
     study : Study
-        Its tolerances, correlation and fixed errors hold.
+        Its tolerances, correlation and fixed errors are applied.
     scores : ndarray, (n, d)
-        As those of `scores`.
+        Standard normal scores, one column for each of `columns`, as the function `scores` returns them.
 
     Returns
     -------
@@ -141,27 +141,27 @@ def from_scores(study: Study, scores: Array) -> Table:
 
 
 def values(errors: Table, name: str) -> Array:
-    """Values that the distribution of an error gave, (n,), SI: for ``pin1.offset_radial`` the radii."""
+    """Values that were drawn from the distribution of an error, (n,), SI: for ``pin1.offset_radial`` the radii."""
     own = columns_of(name)
     return np.asarray(errors[name] if len(own) == 1 else np.hypot(*(errors[column] for column in own)))
 
 
 def columns(study: Study) -> list[str]:
-    """Columns of the errors that scatter."""
+    """Names of the columns of the table ERROR that scatter."""
     return list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
 
 
 def dimensions() -> dict[str, int]:
-    """Sobol' dimension of each error: its place in the table, whichever errors a study lets scatter.
+    """Sobol' dimension of each error: its position in the table ERROR, whichever errors scatter in a study.
 
-    New errors must be appended to the table: SciPy's scrambling gives all dimensions other values when their
-    number changes.
+    New errors must be appended to the table. SciPy's scrambling gives all dimensions other values when their number
+    changes.
     """
     return {field.name: number for number, field in enumerate(ERROR_FIELDS)}
 
 
 def _fill_grid(samples: Table, axes: Sequence[SweepAxis], numbers: range) -> None:
-    """Product grid of the axes, the last running fastest."""
+    """Set the points of the product grid of the axes; the last axis varies fastest."""
     index = np.unravel_index(np.arange(numbers.start, numbers.stop), [axis.points for axis in axes])
     for axis, at in zip(axes, index, strict=True):
         for name in axis.names:
@@ -169,7 +169,7 @@ def _fill_grid(samples: Table, axes: Sequence[SweepAxis], numbers: range) -> Non
 
 
 def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
-    """Operating point of the variant, point of the grid and errors of the case of each row."""
+    """Set each row's operating point (of its variant), grid point and errors (of its case)."""
     here = slice(numbers.start, numbers.stop)
     variant, case, point = design.table["variant"][here], design.table["case"][here], design.point()[here]
     for number, operation in enumerate(design.operations):
@@ -182,7 +182,7 @@ def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
 
 
 def _fill_frozen(samples: Table, study: Study, numbers: range) -> None:
-    """Two joints a point, A and B, and for each group A with the errors of that group from B."""
+    """Set the joints of each point: A, B, and for each group a copy of A with the errors of that group taken from B."""
     size = len(study.groups) + 2
     points = range(numbers.start // size, -(-numbers.stop // size))
     a, b = np.zeros(len(points), samples.dtype), np.zeros(len(points), samples.dtype)
@@ -204,7 +204,7 @@ def _fill_scatter(samples: Table, study: Study, numbers: range, stream: str = ""
 
 
 def _fill_from(samples: Table, study: Study, u: dict[str, Array]) -> None:
-    """Errors that scatter, from independent probabilities of their columns."""
+    """Set the errors that scatter, from independent probabilities `u` of their columns."""
     names = study.copula.names
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))
@@ -221,7 +221,7 @@ def _fill_from(samples: Table, study: Study, u: dict[str, Array]) -> None:
 def _uniforms(names: Sequence[str], numbers: range, study: Study, stream: str = "") -> dict[str, Array]:
     """Probabilities in (0, 1) of the samples `numbers`, independent from name to name; shape (len(numbers),) each.
 
-    Random ones of another `stream` are independent too.
+    Random probabilities of different `stream` are independent too; `sobol` and `lhs` ignore `stream`.
     """
     seed, n, first = study.sampling.seed, len(numbers), numbers.start
     if study.sampling.method == "sobol":
@@ -235,9 +235,9 @@ def _uniforms(names: Sequence[str], numbers: range, study: Study, stream: str = 
 
 
 def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[str, Array], NDArray[np.intp]]:
-    """Standard normal scores of the samples `numbers`, and the part of the mixture that each was drawn from.
+    """Standard normal scores of the samples `numbers`, and the component of the mixture that each was drawn from.
 
-    Joint i of the tolerances' part is joint i of the random campaign.
+    A sample i drawn from the tolerances (component 0) equals sample i of the random campaign.
     """
     part = component(study.proposals, _stream(study.sampling.seed, "proposal", numbers.start).random(len(numbers)))
     scores = {name: ndtri(u) for name, u in _uniforms(names, numbers, study).items()}
@@ -249,16 +249,16 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
 
 
 def _probability(scores: Array) -> Array:
-    """Probabilities in (0, 1) of standard normal scores; what is beyond those of double precision is at its end."""
+    """Probabilities in (0, 1) of standard normal scores, clipped where double precision would round to 0 or 1."""
     found: Array = np.clip(ndtr(scores), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
     return found
 
 
 def _stream(seed: int, name: str, first: int = 0) -> np.random.Generator:
-    """Random stream of one name from its number `first` on: counter-based, two keys never share a part of a stream."""
+    """Random stream of one name from number `first` on; counter-based, so that streams of two keys never overlap."""
     digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
     key = np.array([seed, int.from_bytes(digest, "little")], dtype=np.uint64)
-    counter, within = divmod(first, 4)  # a count of Philox gives four numbers
+    counter, within = divmod(first, 4)  # one Philox counter value gives four numbers
     bits = np.random.Philox(key=key)
     bits.advance(counter)
     stream = np.random.Generator(bits)

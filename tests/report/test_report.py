@@ -260,12 +260,11 @@ def test_folder_that_is_not_there_and_file_that_is_not_ours(tmp_path):
 def test_drawing_leaves_the_callers_settings_alone_and_needs_no_pyplot():
     code = (
         "import sys, matplotlib as m; before = m.rcParams.copy();"
-        "from tests import test_report as t;"
+        "from tests.report import test_report as t;"
         "t.exceedance.figure(t.campaign(21));"
         "print(dict.__eq__(before, m.rcParams), 'matplotlib.pyplot' in sys.modules)"
     )
-    root = ROOT
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout.split() == ["True", "False"]
 
 

@@ -1,1 +1,1 @@
-"""One file a question, each on plain arrays: no file, no figure, no physics is known here."""
+"""Statistical estimates with intervals, one file per question: plain arrays only, no files, figures or physics."""

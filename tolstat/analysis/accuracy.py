@@ -1,8 +1,8 @@
-"""How large is the numerical error of a campaign? Its joints beside the same joints simulated in other ways.
+"""How large is the numerical error of a campaign? Compare its joints with the same joints under other settings.
 
 Errors are relative to the largest load of the kind in the joint: a force to the largest |F| of its eight bushings, a
-torque to the largest |T|, a contact force to that of the four pins, Psi to itself. Loads that a campaign does not keep
-are NaN in all of its joints and left out of these.
+torque to the largest |T|, a contact force to the largest one of the four pins, Psi to itself. Loads that a campaign
+does not store are NaN in all of its joints and are left out of these maxima.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ OBSERVABLES = (
     *(f"{pin}.contact" for pin in PINS),
     "psi",
 )
-"""Largest loads of a joint that are judged, by the names that limits have."""
+"""Largest loads of a joint whose error is evaluated, named as in the limits of a study."""
 KIND_OF = np.array([0] * 8 + [1] * 8 + [2] * 4 + [3])
 UNITS = ("N", "N*m", "N", "1")
 
 REFERENCE, FIDELITY = "reference", "fidelity"
 HALF_STEP_SHARE = 4 / 3
-"""A method of order 2 that takes half the step keeps a quarter of its error: the other three are what changes."""
+"""Richardson extrapolation: half the step changes the result of a method of order 2 by 3/4 of its error."""
 USUAL = 0.95
-"""Share of the joints that the error put into a report covers."""
+"""Quantile over the joints at which a report gives the error."""
 
 
 class Spread(NamedTuple):
@@ -40,9 +40,10 @@ class Spread(NamedTuple):
     Attributes
     ----------
     n : int
-        Joints that have one.
+        Joints with a finite error.
     median, usual, worst : float
-        Of the error's modulus; `usual` covers 95 % of the joints (the worst one of fewer than twenty). NaN without any.
+        Median, 95 % quantile and maximum of the error's modulus; `usual` is the maximum for fewer than twenty joints.
+        NaN if no joint has an error.
     """
 
     n: int
@@ -52,18 +53,18 @@ class Spread(NamedTuple):
 
 
 def loads(results: NDArray[np.void]) -> FloatArray:
-    """Largest loads of joints, (m,) table RESULT, as (m, 21): SI, in the order of `OBSERVABLES`."""
+    """Collect the largest loads of joints, (m,) table RESULT, as (m, 21): SI, in the order of `OBSERVABLES`."""
     contact = results["contact_max"].max(axis=2)
     return np.concatenate([results["F_max"], results["T_max"], contact, results["psi_max"][:, None]], axis=1)
 
 
 def sizes(results: NDArray[np.void]) -> FloatArray:
-    """Largest load of the kind of each observable in each joint, (m, 21), SI."""
+    """Reference value of each observable in each joint: the largest load of its kind, (m, 21), SI."""
     return np.asarray(_largest(loads(results))[:, KIND_OF])
 
 
 def size(results: NDArray[np.void], observable: str) -> FloatArray:
-    """Largest load of the kind of one observable in each joint, (m,), SI: a column of `sizes`."""
+    """Reference value of one observable in each joint, (m,), SI: a column of `sizes`."""
     kind = KINDS[KIND_OF[OBSERVABLES.index(observable)]]
     fields = {"F": "F_max", "T": "T_max", "contact": "contact_max", "psi": "psi_max"}
     values = results[fields[kind]].reshape(len(results), -1)
@@ -72,7 +73,7 @@ def size(results: NDArray[np.void], observable: str) -> FloatArray:
 
 
 def _largest(values: FloatArray) -> FloatArray:
-    """Largest of each kind, (m, 21) -> (m, 4); NaN is kept, but for an observable that no joint has."""
+    """Largest value of each kind, (m, 21) -> (m, 4); NaN propagates unless an observable is NaN in all joints."""
     known = ~np.isnan(values).all(axis=0)
     largest = np.full((len(values), len(KINDS)), np.nan)
     for kind in range(len(KINDS)):
@@ -83,7 +84,7 @@ def _largest(values: FloatArray) -> FloatArray:
 
 
 def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
-    """How far `other` is from `base`, relative to the largest load of the kind.
+    """Difference of `base` and `other`, relative to the largest load of the kind in `other`.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
     Returns
     -------
     ndarray, shape (m, 21)
-        Of `base` less `other`, in the order of `OBSERVABLES`; NaN where a joint is not settled in `base` or has no
+        `base` less `other`, in the order of `OBSERVABLES`; NaN where a joint is not settled in `base` or has no
         results in `other`.
     """
     size = sizes(other)
@@ -104,18 +105,19 @@ def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
 
 
 def estimate(changes: Mapping[str, FloatArray]) -> FloatArray:
-    """Estimate the numerical error from what other settings change.
+    """Estimate the numerical error from the changes under other settings.
 
     Parameters
     ----------
     changes : mapping of str to ndarray, shape (m, 21)
-        `differences` to the checks ``half_step``, ``newton``, ``settling`` and, where made, ``method``, ``fidelity``.
+        `differences` from each check: ``half_step``, ``newton``, ``settling`` and, if made, ``method``, ``fidelity``.
 
     Returns
     -------
     ndarray, shape (m, 21)
-        Error of the steps (the larger of what half the step, extrapolated, and another method change), plus that of
-        Newton's stopping, of settling, and of a joint simulated below dynamic fidelity; relative, not negative.
+        Time discretisation error (the larger of the extrapolated change under half the step and the change under
+        another method) plus the errors of Newton's tolerance, of the settling tolerance, and of a fidelity below
+        dynamic; relative, not negative.
     """
     steps = HALF_STEP_SHARE * np.abs(changes["half_step"])
     if "method" in changes:
@@ -125,12 +127,12 @@ def estimate(changes: Mapping[str, FloatArray]) -> FloatArray:
 
 
 def numerical(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> FloatArray:
-    """Numerical error of joints, with that of fidelity: measured where the reference settled, estimated otherwise.
+    """Numerical error of joints, fidelity included: measured where the reference settled, estimated otherwise.
 
     Returns
     -------
     ndarray, shape (m, 21)
-        Relative, not negative; NaN where there is neither.
+        Relative, not negative; NaN where neither is available.
     """
     changes = {name: differences(base, results) for name, results in checks.items()}
     found = estimate(changes)
@@ -142,12 +144,12 @@ def numerical(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) ->
 
 
 def by_kind(errors: FloatArray) -> FloatArray:
-    """Largest error of each kind in each joint, (m, 21) -> (m, 4); NaN is kept, but for an observable without any."""
+    """Largest error of each kind in each joint, (m, 21) -> (m, 4); NaN as in `_largest`."""
     return _largest(np.abs(errors))
 
 
 def spread(errors: FloatArray) -> Spread:
-    """Distribution of the moduli of errors of joints, (m,), those that are NaN left out."""
+    """Distribution of the error's modulus over joints, (m,); errors that are not finite are left out."""
     known = np.abs(errors[np.isfinite(errors)])
     if not known.size:
         return Spread(0, np.nan, np.nan, np.nan)

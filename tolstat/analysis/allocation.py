@@ -1,7 +1,7 @@
-"""The cheapest tolerances that keep loads below limits, as far as the joints drawn can tell.
+"""Tolerance allocation: the cheapest tolerances that keep loads below limits, estimated from the joints drawn.
 
-Each joint counts by how much more often other tolerances make it (`reweight`); what the weights can carry is the region
-that the search stays in. Half of the joints choose; the other half, which had no part in it, is to judge the choice.
+Each joint is weighted with the likelihood ratio of other tolerances (`reweight`). The search stays in the region where
+enough joints remain effective. It uses half of the joints; the other half serves as an independent check of the choice.
 """
 
 from __future__ import annotations
@@ -17,35 +17,35 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
 
 FEWEST = 10
-"""Joints above a limit from which on a search may rest on the estimate of their share."""
+"""Minimum number of joints above each limit for a search that aims at the estimated shares."""
 REGION = 0.3
-"""Share of the joints that must be left effective, on the average, where the search goes."""
+"""Minimum share of the joints that is effective, in expectation, within the search region."""
 _EDGE = 1e-9
 
 
 class Problem(NamedTuple):
-    """What is searched.
+    """Objective, constraints and bounds of a search.
 
     Attributes
     ----------
     log_ratios : callable
-        Factors on the tolerances, (g,), to the logarithm of the new density of each joint over the old one, (n,).
+        Maps factors on the tolerances, (g,), to the logarithm of new over old density of each joint, (n,).
     log_spread : callable
-        Factors to the logarithm of the mean square of that ratio over all joints that the old tolerances make (1 more
-        than Pearson's chi-squared divergence): n joints are worth n over it. The weights of a sample know it too well
-        to be asked, since the joints that would tell are missing in it.
+        Maps factors to the logarithm of the mean square of that ratio under the old tolerances (1 plus Pearson's
+        chi-squared divergence): n joints have n over that mean square effective ones. It is exact, because the weights
+        of a sample underestimate it where no joint was drawn.
     above : ndarray of bool, shape (n, c)
         Which joints are above each of c limits.
     targets : ndarray, shape (c,)
         Shares that must not be exceeded.
     cost : callable
-        Factors to their cost.
+        Maps factors to their cost.
     lower, upper : ndarray, shape (g,)
-        Ends of the factors.
+        Bounds of the factors.
     iid : bool
         Whether the joints are independent samples.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     """
 
     log_ratios: Callable[[FloatArray], FloatArray]
@@ -60,15 +60,15 @@ class Problem(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """What a search came to.
+    """Result of a search.
 
     Attributes
     ----------
     factors : ndarray, shape (g,)
-        On the tolerances.
+        Factors on the tolerances.
     aim : str
-        ``interval``: upper ends of the intervals below the targets; ``estimate``: the shares themselves;
-        ``step``: neither can be had within reach of the joints, and the shares are as low there as can be.
+        What does not exceed the targets. ``interval``: the upper ends of the intervals; ``estimate``: the estimated
+        shares; ``step``: neither is feasible in the search region, and the factors give the lowest shares there.
     """
 
     factors: FloatArray
@@ -76,21 +76,21 @@ class Choice(NamedTuple):
 
 
 def search(problem: Problem) -> Choice:
-    """Find the cheapest factors within reach of the joints.
+    """Find the cheapest factors in the region where enough joints remain effective.
 
-    Sequential quadratic programming (Kraft 1988) on the logarithms of the factors, from the tolerances as they are and
-    from those with the lowest shares; the region has `reweight.LEAST_ESS` effective joints or more, and more of them
-    where the Pareto shape of the weights' tail asks for it.
+    Sequential quadratic programming (Kraft 1988) on the logarithms of the factors, started at the present tolerances
+    and at those with the lowest shares. The region has at least `reweight.LEAST_ESS` effective joints; the required
+    share is raised, up to 0.9, while the weights of the choice are not `usable`.
 
     Parameters
     ----------
     problem : Problem
-        What to search.
+        Objective, constraints and bounds.
 
     Returns
     -------
     Choice
-        The factors, and what could be aimed at.
+        The factors, and the constraint that they meet.
     """
     share = max(REGION, reweight.LEAST_ESS / len(problem.above))
     choice = _within(problem, share)
@@ -101,7 +101,7 @@ def search(problem: Problem) -> Choice:
 
 
 def _within(problem: Problem, share: float) -> Choice:
-    """Search where at least that share of the joints is left effective."""
+    """Search where at least `share` of the joints is effective."""
     lowest = _lowest(problem, share)
     starts = [np.zeros(len(problem.lower)), lowest]
     enough = not problem.iid or problem.above.sum(axis=0).min() >= FEWEST
@@ -114,12 +114,12 @@ def _within(problem: Problem, share: float) -> Choice:
 
 
 def _room(problem: Problem, x: FloatArray, share: float) -> float:
-    """Distance from the edge of the region, a logarithm: not negative inside."""
+    """Constraint of the region: logarithm of the effective share over `share`, not negative inside."""
     return float(np.clip(-problem.log_spread(np.exp(x)) - np.log(share), -30.0, 30.0))
 
 
 def _cheapest(problem: Problem, share: float, aim: str, start: FloatArray) -> FloatArray | None:
-    """Logarithms of the cheapest factors that hold; None where none are found."""
+    """Logarithms of the cheapest factors that meet the constraints; None if none are found."""
     scale = problem.cost(np.ones(len(start)))
 
     def room(x: FloatArray) -> FloatArray:
@@ -131,7 +131,7 @@ def _cheapest(problem: Problem, share: float, aim: str, start: FloatArray) -> Fl
 
 
 def _lowest(problem: Problem, share: float) -> FloatArray:
-    """Logarithms of the factors with the lowest shares, over the targets, within the region."""
+    """Logarithms of the factors in the region that minimise the largest ratio of share to target."""
 
     def height(x: FloatArray) -> float:
         shares = _shares(problem, x, "estimate") + 0.5 / len(problem.above)
@@ -139,7 +139,7 @@ def _lowest(problem: Problem, share: float) -> FloatArray:
 
     start = np.zeros(len(problem.lower))
     x = _minimise(height, lambda x: np.atleast_1d(_room(problem, x, share)), problem, start)
-    while _room(problem, x, share) < -1e-6:  # a program that ends outside still says which way
+    while _room(problem, x, share) < -1e-6:  # SLSQP may end outside: shrink towards the present tolerances
         x = 0.9 * x
     return x
 
@@ -157,7 +157,7 @@ def _minimise(
 
 
 def _shares(problem: Problem, x: FloatArray, aim: str) -> FloatArray:
-    """Share of the joints above each limit, or its upper end; weights as they are."""
+    """Share of the joints above each limit, or its upper end for ``interval``; the weights are not smoothed."""
     logs = problem.log_ratios(np.exp(x))
     raw = np.exp(logs - logs.max())
     values = raw / raw.sum()
@@ -168,18 +168,18 @@ def _shares(problem: Problem, x: FloatArray, aim: str) -> FloatArray:
 
 
 def joints_needed(share: float, ess: float, target: float, confidence: float = 0.95) -> float:
-    """How many times as many joints show that a share is below a target, if it is as estimated.
+    """Factor on the number of joints with which an interval lies below a target, if the share is as estimated.
 
     Parameters
     ----------
     share : float
         Estimate.
     ess : float
-        Effective joints that it stands on.
+        Effective number of joints behind the estimate.
     target : float
         Share that the upper end must be below.
     confidence : float
-        Of the interval.
+        Confidence level of the interval.
 
     Returns
     -------
@@ -202,7 +202,7 @@ def joints_needed(share: float, ess: float, target: float, confidence: float = 0
 
 
 def halves(n: int, most: int) -> Sequence[NDArray[np.intp]]:
-    """Joints that choose, at most `most` of them, and those that judge: every other one each."""
+    """Split n joints: every second one, at most `most`, for the search; all others for the check."""
     rows = np.arange(n)
     chosen = rows[::2][:most]
     return chosen, np.setdiff1d(rows, chosen, assume_unique=True)

@@ -1,9 +1,9 @@
 """How capable is the production of staying below a limit? Yield, ppm and Cpk with intervals.
 
-A load has an upper limit only. So there is no Cp, which compares a band with the scatter, and Cpk is its upper half,
-Cpu = (limit - mean) / (3 sigma). It speaks of the joints' share above the limit only where the load is normal, which
-loads under clearance are not; the index of quantiles, (limit - median) / (q(99.865 %) - median) (ISO 22514-2), asks
-the same of any distribution. Yield and ppm assume nothing.
+A load has an upper limit only. So there is no Cp, which compares a two-sided band with the scatter, and Cpk equals
+Cpu = (limit - mean) / (3 sigma). Cpu determines the share of the joints above the limit only if the load is normal,
+which loads of joints with clearance are not. The quantile index, (limit - median) / (q(99.865 %) - median)
+(ISO 22514-2), is defined for any distribution. Yield and ppm assume no distribution.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ REFERENCE = 0.9986501019683699
 
 @dataclass(frozen=True)
 class Capability:
-    """How a load stands against its upper limit.
+    """Capability of a load against its upper limit.
 
     Attributes
     ----------
@@ -32,13 +32,13 @@ class Capability:
     cpk_normal, cpk_normal_lower, cpk_normal_upper : float
         (limit - mean) / (3 sigma) of the valid joints and its exact interval for a normal load.
     normal_p : float
-        p-value of skewness and kurtosis together (D'Agostino and Pearson 1973); where it is small, `cpk_normal` is not
-        to be used. NaN for fewer than 20 joints.
+        p-value of the normality test by skewness and kurtosis (D'Agostino and Pearson 1973); where it is small, do not
+        use `cpk_normal`. NaN for fewer than 20 joints.
     cpk, cpk_lower, cpk_upper : float
-        Index of quantiles of the valid joints. Its interval covers at least with the confidence asked for; the lower
-        end is 0 at best where the joints are fewer than `needed`.
+        Quantile index of the valid joints. Its interval is conservative: it covers with at least the given confidence.
+        With fewer joints than `needed` the lower end is at most 0.
     needed : int
-        Joints from which the interval of the 99.865 % quantile has an upper end.
+        Minimum number of joints for a finite upper end of the interval of the 99.865 % quantile.
 
     The intervals are NaN when the samples are not independent, the indices when there are fewer than two valid joints
     or no scatter.
@@ -82,7 +82,7 @@ def at(
     limit : float
         Upper limit, in the unit of the values.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not.
     ends : tuple of array_like, shape (n,), optional
@@ -112,13 +112,13 @@ def at(
     scatters = valid.size > 1 and np.ptp(valid) > 0
     normal = _normal(valid, limit, confidence, iid) if scatters else blank
     general = _of_quantiles(valid, limit, confidence, iid) if scatters else blank
-    # each of the two quantiles may miss on either side: a quarter of the error for the upper end
+    # Bonferroni over two quantiles with two ends each: a quarter of the error probability for this upper end
     needed = quantile.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
     return Capability(above, *normal, _normality(valid) if scatters else np.nan, *general, needed)
 
 
 def utilization(values: ArrayLike, limits: ArrayLike) -> FloatArray:
-    """Largest of a joint's loads, each over its limit: the joint is good when it is at most 1.
+    """Largest ratio of load to limit in each joint: the joint meets all limits if it is at most 1.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floa
     n : int
         Joints, at least 2.
     confidence : float
-        Of the interval.
+        Confidence level of the interval.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def _normality(valid: FloatArray) -> float:
 
 
 def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
-    """Index of quantiles; its interval from those of median and 99.865 % quantile, half the error each (Bonferroni)."""
+    """Quantile index; interval from those of both quantiles, half the error probability each (Bonferroni)."""
     fine = np.full(valid.size, Status.OK)
     each = 0.5 * (1.0 + confidence)
     middle, high = (quantile.at(valid, fine, share, each, iid) for share in (0.5, REFERENCE))
@@ -187,7 +187,7 @@ def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool)
         return index, np.nan, np.nan
     if not middle.upper < high.lower:
         return index, -np.inf, np.inf
-    # monotone in each quantile while the other is kept: the ends are at the corners
+    # the index is monotone in each quantile with the other fixed: its extremes are at the corners
     corners = [_index(limit, m, h) for m in (middle.lower, middle.upper) for h in (high.lower, high.upper)]
     return index, min(corners), max(corners)
 
@@ -195,6 +195,6 @@ def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool)
 def _index(limit: float, middle: float, high: float) -> float:
     if np.isinf(high):
         return 0.0
-    if np.isinf(middle):  # the limit of the index for a median that falls without end
+    if np.isinf(middle):  # limit of the index as the median goes to -inf
         return 1.0
     return (limit - middle) / (high - middle) if high > middle else np.nan

@@ -1,8 +1,8 @@
 """Which cycles does a load go through in a revolution? Mixtures, spectra, and the time above a level.
 
-Cycles are those of one revolution that repeats: everything is counted per revolution. What a share of the *joints*
-exceeds is asked of these values by `exceedance` and `quantile`; for which share of a *revolution* a load is above a
-level, by `share_of_revolution_above`.
+Cycles are those of one periodic revolution: all numbers are per revolution. `exceedance` and `quantile` evaluate the
+distribution of these values over the *joints*; `share_of_revolution_above` gives the share of a *revolution* during
+which a load is above a level.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ class Cycles(NamedTuple):
     channels : tuple of str
         Names of the loads, keys of `tables.CHANNELS`.
     ranges, means : ndarray, shape (n, channels, k)
-        Range and mean of each cycle, N or N m; a range of 0 where there is none, NaN for joints without results.
+        Range and mean of each cycle, N or N m; a range of 0 marks an empty place, NaN a joint without results.
     number : ndarray, shape (n, channels)
-        Cycles per revolution, those without a place among the k included; NaN for joints without results.
+        Cycles per revolution, including those not stored among the k; NaN for joints without results.
     weights : ndarray, shape (k,)
-        How often per revolution a cycle in this place happens: 1, or the share of its operating point.
+        Occurrences per revolution of the cycle in each place: 1, or the share of its operating point.
     """
 
     channels: tuple[str, ...]
@@ -38,7 +38,7 @@ class Cycles(NamedTuple):
     weights: FloatArray
 
     def of(self, channel: str) -> Cycles:
-        """Cycles of one channel, the axis of channels kept."""
+        """Select one channel; the axis of channels stays, with length 1."""
         c = self.channels.index(channel)
         part = slice(c, c + 1)
         return Cycles((channel,), self.ranges[:, part], self.means[:, part], self.number[:, part], self.weights)
@@ -50,7 +50,7 @@ def mix(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
     Parameters
     ----------
     parts : sequence of Cycles
-        Row i is the same joint in each. Cycles that the change of operating point itself would close are not there.
+        Row i is the same joint in each. Cycles closed by the change of operating point itself are not included.
     shares : sequence of float
         Shares of the revolutions, positive, with the sum 1.
 
@@ -78,12 +78,12 @@ def mix(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
 
 
 def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
-    """Cumulative spectrum, read at numbers of cycles: the range that so many cycles of a revolution reach.
+    """Cumulative load spectrum: the range that given numbers of cycles per revolution reach or exceed.
 
     Parameters
     ----------
     cycles : Cycles
-        Of one revolution, or a mixture.
+        Cycles of one revolution, or of a mixture.
     numbers : array_like, shape (q,)
         Cycles per revolution, positive.
 
@@ -93,7 +93,7 @@ def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
         Largest range that at least `numbers` cycles per revolution reach or exceed, 0 where there are fewer; N or
         N m, NaN for joints without results.
     """
-    wanted = np.atleast_1d(np.asarray(numbers, dtype=float)) * (1.0 - 1e-6)  # sums of shares are rounded
+    wanted = np.atleast_1d(np.asarray(numbers, dtype=float)) * (1.0 - 1e-6)  # slack for rounded sums of shares
     order = np.argsort(-cycles.ranges, axis=2)
     ranges = np.take_along_axis(cycles.ranges, order, axis=2).astype(float)
     reached = np.cumsum(cycles.weights[order], axis=2)
@@ -112,7 +112,7 @@ def share_of_revolution_above(loads: ArrayLike, level: float) -> FloatArray:
     Parameters
     ----------
     loads : array_like, shape (n, samples)
-        One load of each joint over a revolution, joined by straight lines, the last sample to the first.
+        One load of each joint over a revolution, interpolated linearly, from the last sample back to the first too.
     level : float
         Level in the unit of the loads.
 

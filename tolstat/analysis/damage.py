@@ -1,8 +1,7 @@
-"""What do the cycles of a revolution do to the parts? Equivalent loads and damage sums of each joint.
+"""How much fatigue damage do the cycles of a revolution cause? Equivalent loads and damage sums of each joint.
 
 S is a range, twice an amplitude. S–N lines have no knee and no endurance limit (Miner's rule in its elementary form);
-mean loads are not corrected for. What a share of the joints exceeds is asked of these values by `exceedance` and
-`quantile`.
+there is no mean-load correction. `exceedance` and `quantile` evaluate the distribution of these values over the joints.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ class Line(NamedTuple):
     m : float
         Wöhler exponent.
     S0 : float
-        Range that is borne `N0` times, N or N m.
+        Range with a life of `N0` cycles, N or N m.
     N0 : float
-        Cycles.
+        Cycles to failure at `S0`.
     """
 
     m: float
@@ -41,16 +40,16 @@ def moment(cycles: Cycles, m: float) -> FloatArray:
 
 
 def equivalent_load(cycles: Cycles, m: float, revolutions: float = 1.0, reference_cycles: float = 1.0) -> FloatArray:
-    """Damage-equivalent load: the range whose `reference_cycles` do the damage of `revolutions`.
+    """Damage-equivalent load: the range that causes the damage of `revolutions` in `reference_cycles` cycles.
 
     Parameters
     ----------
     cycles : Cycles
-        Of one revolution.
+        Cycles of one revolution.
     m : float
         Wöhler exponent, positive.
     revolutions, reference_cycles : float
-        Service life, and cycles that the range is for.
+        Service life, and number of cycles of the equivalent range.
 
     Returns
     -------
@@ -68,9 +67,9 @@ def damage(cycles: Cycles, line: Line, revolutions: float) -> FloatArray:
 
 
 def shortfall(cycles: Cycles, m: float) -> FloatArray:
-    """Upper bound of the part of `moment` that the cycles without a place would add, shape (n, channels).
+    """Upper bound of the relative increase of `moment` by cycles that were not stored, shape (n, channels).
 
-    None of them is larger than the smallest that has a place.
+    None of them is larger than the smallest stored cycle.
     """
     placed = ((cycles.ranges > 0) * cycles.weights).sum(axis=2)
     without = np.maximum(cycles.number - placed, 0.0)

@@ -1,9 +1,9 @@
 """Did it change anything? Differences between the joints of two studies, B less A, with intervals.
 
-Joints that share their random numbers are compared one by one (*paired*): what two of a pair have in common falls out
-of the difference, which is then known much better than either side. Differences of independent estimates get their
-interval from those of the sides, each as long as it is in its own direction (method of variance estimates recovery,
-Newcombe 1998, Zou and Donner 2008), so that nothing is normal that is rare or skew.
+Joints that share their random numbers are compared one by one (*paired*): the scatter that both of a pair have in
+common cancels, so the difference is known much better than either side. The interval of a difference of independent
+estimates is recovered from the intervals of both sides, with separate lengths below and above the estimate (method of
+variance estimates recovery, Newcombe 1998, Zou and Donner 2008), so rare or skew quantities are not taken as normal.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from tolstat.analysis import quantile
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
 
 RESAMPLES = 500
-"""Of the bootstrap of paired quantiles."""
+"""Number of resamples in the bootstrap of paired quantiles."""
 BEYOND = 50
-"""Joints beyond a quantile, on either side, from which on it is resampled: with fewer a resample knows no others."""
+"""Minimum number of pairs on either side of a quantile for the bootstrap, which with fewer repeats the same values."""
 _REACH = 6.0
-"""Standard deviations of a rank that resampled quantiles are looked for in."""
+"""Half width of the ranks among which a resampled quantile is searched, in standard deviations of its rank."""
 _SEED = 20
 
 
@@ -31,19 +31,19 @@ class ShareDifference(NamedTuple):
     Attributes
     ----------
     a, b : ndarray
-        Shares; of the joints with a valid load in both studies, where they are paired.
+        Shares in A and in B; with pairs, of the joints that have a valid load in both studies.
     n : int
-        Pairs compared; without pairs the joints of the smaller side.
+        Number of pairs; without pairs, number of joints of the smaller side.
     only_a, only_b : ndarray of int
-        Pairs of which one only is above the level; joints above it where there are no pairs.
+        Pairs above the level in A only, and in B only; without pairs, joints of A, and of B, above the level.
     estimate, lower, upper : ndarray
         Share of B less that of A and its interval, pointwise; NaN ends for dependent samples.
     p : ndarray
-        Of McNemar's test (1947), exact; NaN without pairs and for dependent samples.
+        p-value of McNemar's test (1947), exact; NaN without pairs and for dependent samples.
     bound_lower, bound_upper : ndarray
-        Estimate when each joint without a valid load is above the level in A and below it in B, and the other way.
+        Estimate with each joint without a valid load counted above the level in A and below it in B, and vice versa.
     outer_lower, outer_upper : ndarray
-        Lower end of the interval of the first, upper end of that of the second.
+        Lower end of the interval of `bound_lower`, upper end of the interval of `bound_upper`.
     """
 
     a: FloatArray
@@ -83,17 +83,17 @@ def shares(
     levels : array_like, shape (m,)
         Levels, in the unit of the loads.
     paired : bool
-        Whether joint i of both has the same random numbers.
+        Whether joint i has the same random numbers in both studies.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     iid : bool
         Whether the joints of each study are independent samples.
 
     Returns
     -------
     ShareDifference
-        The interval is recovered from Clopper and Pearson's intervals of the two shares; of pairs, from those of the
-        pairs that differ one way and the other.
+        The interval is recovered from Clopper and Pearson's intervals of the two shares; with pairs, of the shares of
+        pairs above the level in A only and in B only.
 
     Raises
     ------
@@ -136,9 +136,9 @@ def quantiles(
     Returns
     -------
     Difference
-        Of pairs with `BEYOND` of them on either side of the quantile, the interval is of the bootstrap of pairs
-        (percentiles, Efron 1979); else it is recovered from the order statistics that enclose each quantile, which is
-        wide for pairs, and infinite where the joints are too few for these.
+        With `BEYOND` or more pairs on either side of the quantile, the interval is the percentile bootstrap over pairs
+        (Efron 1979); else it is recovered from the order-statistic intervals of both quantiles: wide for pairs, and
+        infinite where there are too few joints.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def quantiles(
 
 
 def means(a: ArrayLike, b: ArrayLike, paired: bool, confidence: float = 0.95, iid: bool = True) -> Difference:
-    """Difference of the mean loads, with Student's interval of the pairs' differences, or Welch's (1947).
+    """Difference of the mean loads, with Student's interval for paired differences, else Welch's (1947).
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def means(a: ArrayLike, b: ArrayLike, paired: bool, confidence: float = 0.95, ii
     Returns
     -------
     Difference
-        The interval is for means of many joints: loads of which a few joints make the mean need more of them.
+        The interval assumes nearly normal means: loads whose mean is dominated by a few joints need more joints.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def _valid(x: FloatArray, y: FloatArray, paired: bool) -> tuple[FloatArray, Floa
 
 
 def _interval(x: FloatArray, y: FloatArray, level: FloatArray, paired: bool, confidence: float) -> ShareDifference:
-    """Shares, counts, estimate and interval of complete sides; the rest is still to be filled in."""
+    """Shares, counts, estimate and interval for loads without NaN; the other fields are NaN."""
     a, b = _above(x, level), _above(y, level)
     only_a, only_b, correlation = a, b, np.zeros(level.shape)
     if paired:
@@ -224,7 +224,7 @@ def _interval(x: FloatArray, y: FloatArray, level: FloatArray, paired: bool, con
         only_b = _above(y[up], level) - _above(x[up], level)
         only_a = _above(x[down], level) - _above(y[down], level)
         one, other = only_a / x.size, only_b / x.size
-        with np.errstate(divide="ignore", invalid="ignore"):  # counts of one sample: more of these are fewer of those
+        with np.errstate(divide="ignore", invalid="ignore"):  # multinomial counts: negatively correlated
             correlation = -np.nan_to_num(np.sqrt(one * other / ((1.0 - one) * (1.0 - other))))
     (p, q), (n, m) = (only_a / x.size, only_b / y.size), (x.size, y.size)
     (lower_p, upper_p), (lower_q, upper_q) = (
@@ -245,7 +245,7 @@ def _above(values: FloatArray, level: FloatArray) -> NDArray[np.intp]:
 def _recovered(
     of_b: tuple[ArrayLike, ArrayLike], of_a: tuple[ArrayLike, ArrayLike], rho: ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Lengths of the interval of b - a below and above it, from the lengths below and above b and a."""
+    """Lengths of the interval of b - a below and above the estimate, from those of b and of a, correlated by `rho`."""
     ends = []
     for one, other in ((of_b[0], of_a[1]), (of_b[1], of_a[0])):
         i, j = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
@@ -273,8 +273,8 @@ def _mcnemar(only_a: NDArray[np.intp], only_b: NDArray[np.intp]) -> FloatArray:
 def _resampled(x: FloatArray, y: FloatArray, share: float) -> FloatArray:
     """Differences of the quantiles of resampled pairs, (RESAMPLES,).
 
-    A resampled quantile is one of the values whose rank is near the quantile's. Only pairs with such a value on either
-    side are resampled one by one; of the others it counts how many are resampled that are below or above on each side.
+    A resampled quantile is one of the values whose rank is near the quantile's. Only pairs with such a value in A or B
+    are resampled one by one; of the other pairs, only the numbers resampled below and above the quantile in A and B.
     """
     n = x.size
     rank = int(np.ceil(n * share * (1.0 - 4e-16)))

@@ -1,10 +1,9 @@
 """Which share of the joints exceeds a load? Estimates with exact binomial intervals.
 
-Two kinds of doubt are kept apart. *Sampling*: other joints could have been drawn; the Clopper–Pearson
-interval covers it, for independent samples only. *Unresolved joints*: a joint that failed or did not
-settle has no valid load; counting all of them below the level, then all of them above it, bounds what they
-could change. Neither is ever dropped in silence. So it is with a stationary joint, whose largest load has an interval:
-at a level inside it the joint counts below, then above.
+Two uncertainties are reported separately. *Sampling*: other joints could have been drawn; the Clopper–Pearson interval
+covers it, for independent samples only. *Unresolved joints*: a joint that failed or did not settle has no valid load;
+counting all of them below the level, then all of them above it, bounds their effect. They are never dropped silently.
+The largest load of a stationary joint has an interval; at a level inside it, that joint too counts below, then above.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ class Exceedance:
     Attributes
     ----------
     level : float
-        The load asked about, in the unit of the values.
+        Load level, in the unit of the values.
     n : int
         Joints simulated, the unresolved ones included.
     n_failed, n_unsettled : int
@@ -40,11 +39,11 @@ class Exceedance:
     lower, upper : float
         Clopper–Pearson interval of the valid joints; NaN when the samples are not independent.
     bound_lower, bound_upper : float
-        Share of all `n` joints above the level when every joint in doubt is below it, and above it: unresolved ones,
-        and stationary ones in whose interval the level is.
+        Share of all `n` joints above the level with every undecided joint counted below it, and above it. Undecided
+        are the unresolved joints, and stationary ones whose interval contains the level.
     outer_lower, outer_upper : float
-        Lower Clopper–Pearson end of ``bound_lower`` and upper end of ``bound_upper``: covers both kinds of
-        doubt. NaN when the samples are not independent.
+        Lower Clopper–Pearson end of ``bound_lower`` and upper end of ``bound_upper``: covers both uncertainties.
+        NaN when the samples are not independent.
     """
 
     level: float
@@ -66,7 +65,7 @@ CURVE = np.dtype([(f.name, "i8" if f.type == "int" else "f8") for f in fields(Ex
 
 
 class Sample(NamedTuple):
-    """Values of one load, sorted out by what became of each joint; see `sort_out`."""
+    """Valid values of one load, ascending, and numbers of the joints without one; see `sort_out`."""
 
     valid: FloatArray
     n_failed: int
@@ -91,9 +90,9 @@ def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
     values : array_like, shape (n,)
         Load of each joint, any unit.
     status : array_like of int, shape (n,)
-        `tables.Status` of each joint. Pending joints are left out: rows are simulated in their order, so that the
-        missing ones are the last, but for those in work, where hard joints take longer. A value that is not finite
-        counts as failed whatever its status.
+        `tables.Status` of each joint. Pending joints are left out. Rows are simulated in order, so pending joints are
+        the last rows and those being simulated, among which slow joints are over-represented. A value that is not
+        finite counts as failed even if its status is valid.
 
     Returns
     -------
@@ -151,7 +150,7 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) ->
 
 
 def simultaneous(n: int, confidence: float = 0.95) -> float:
-    """Half width of the band that holds the whole exceedance curve at once (Dvoretzky, Kiefer and Wolfowitz 1956).
+    """Half width of the simultaneous band of the exceedance curve (Dvoretzky, Kiefer and Wolfowitz 1956).
 
     With the constant of Massart (1990): P(sup |estimate - truth| > e) <= 2 exp(-2 n e^2), for every distribution.
 
@@ -165,7 +164,7 @@ def simultaneous(n: int, confidence: float = 0.95) -> float:
     Returns
     -------
     float
-        Largest distance e of the curve from its estimate, a share of the joints; 1 at most.
+        Half width e, a share of the joints; at most 1.
 
     Raises
     ------
@@ -183,27 +182,27 @@ def simultaneous(n: int, confidence: float = 0.95) -> float:
 
 
 def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
-    """Joints from which a Clopper–Pearson interval tells on which side of an accepted share another one lies.
+    """Minimum number of joints for a Clopper–Pearson interval that excludes an accepted share.
 
     Parameters
     ----------
     share : float
-        Share of the joints that is taken to be above the level, as an earlier campaign estimates it.
+        Assumed share of the joints above the level, such as the estimate of an earlier campaign.
     accepted : float
-        Share that it is compared with, between 0 and 1.
+        Accepted share, between 0 and 1.
     confidence : float
-        Of the interval.
+        Confidence level of the interval.
 
     Returns
     -------
     float
-        Least number of independent joints whose interval, with that very share of them above the level, leaves
-        `accepted` out; infinite where both are equal.
+        Least number of independent joints whose interval, with exactly `share` of them above the level, excludes
+        `accepted`; infinite if both shares are equal.
 
     Raises
     ------
     ValueError
-        When `accepted` or the confidence is not between 0 and 1, or the share is none.
+        When `accepted` or the confidence is not between 0 and 1, or `share` not from 0 to 1.
 
     Examples
     --------
@@ -223,7 +222,7 @@ def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
     while not tells(high) and high < 1e15:
         high *= 2.0
     low = 0.5 * high
-    while high - low > 1.0:  # the share kept, more joints make the interval narrower
+    while high - low > 1.0:  # bisection: with the share fixed, more joints make the interval narrower
         middle = np.floor(0.5 * (low + high))
         low, high = (low, middle) if tells(middle) else (middle, high)
     return float(high)
@@ -246,7 +245,7 @@ def at(
     level : float
         Level, in the unit of the values; a load equal to it does not exceed it.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not (Sobol', Latin
         hypercube, sweep), since Clopper–Pearson holds for independent samples only.
@@ -289,7 +288,7 @@ def curve(
         Levels in the unit of the values. By default every value that a valid joint has, ascending; between
         two of them the share does not change, so that the table is the whole step curve.
     ends : tuple of array_like, shape (n,), optional
-        Interval of each load, lower and upper end; without it no load has a doubt.
+        Interval of each load, lower and upper end; by default every load is exact.
 
     Returns
     -------
@@ -325,7 +324,7 @@ def curve(
 
 
 def _count_above(ends: ArrayLike, values: ArrayLike, status: ArrayLike, levels: FloatArray) -> NDArray[np.intp]:
-    """Valid joints one end of whose load is above each level."""
+    """Number of valid joints with an interval end above each level; the load itself where the end is not finite."""
     own = np.where(np.isfinite(ends), ends, values)
     valid = sort_out(np.where(np.isfinite(values), own, np.nan), status).valid
     return valid.size - np.searchsorted(valid, levels, side="right")

@@ -1,9 +1,9 @@
-"""Loads rarer than any joint simulated: a generalised Pareto tail above a threshold, and what it says.
+"""Extrapolation to loads rarer than any joint simulated: generalised Pareto tail above a threshold.
 
-Excesses over a high threshold are, for nearly every distribution, nearly generalised Pareto (Pickands 1975). *Nearly*
-is what can go wrong: the goodness of the fit is tested, and `stability` shows whether the shape stays at other
-thresholds. A tail too thin to tell is refused with the number of joints needed. Intervals are of profile likelihood,
-the share above the threshold included (Coles 2001, 4.3.3): one extrapolates with them, not with the estimate.
+Excesses over a high threshold are approximately generalised Pareto for nearly every distribution (Pickands 1975). The
+approximation can fail: the goodness of fit is tested, and `stability` shows whether the shape is the same at other
+thresholds. A tail with too few joints is refused, with the number of joints needed. Intervals are of profile
+likelihood, the share above the threshold included (Coles 2001, 4.3.3): extrapolate with them, not with the estimate.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from tolstat.analysis import exceedance, pareto
 from tolstat.analysis.exceedance import FloatArray
 
 FEWEST = 50
-"""Excesses that a fit is made of."""
+"""Minimum number of excesses for a fit."""
 REPLICATES = 400
-"""Samples of the fitted distribution that the goodness of a fit is judged by."""
+"""Parametric bootstrap samples of the goodness-of-fit test."""
 GRID, SHARES = 81, 13
-"""Points of shape and scale each, and of the share above the threshold, at which the likelihood is read."""
+"""Grid points of the likelihood: in shape and scale each, and in the share above the threshold."""
 
 
 class TooThinError(ValueError):
-    """The tail has too few joints; `needed` is the number of joints that has enough above the threshold."""
+    """The tail has too few joints; `needed` is the number to simulate for enough of them above the threshold."""
 
     def __init__(self, found: int, needed: int) -> None:
         self.needed = needed
@@ -49,16 +49,16 @@ class Tail:
     Attributes
     ----------
     threshold : float
-        Load above which the tail is, in the unit of the values.
+        Load above which the tail is fitted, in the unit of the values.
     n, n_unresolved, n_above : int
         Joints simulated, those without a valid load, and valid ones above the threshold.
     shape, scale : Estimate
-        k, and sigma in the unit of the values. A negative k is a tail that ends.
+        k, and sigma in the unit of the values. With a negative k the tail has a finite upper end.
     excesses : ndarray, shape (n_above,)
-        What those are above the threshold.
+        Loads above the threshold, less the threshold.
     region : ndarray, shape (r, 3)
-        Share above the threshold, k and sigma wherever the likelihood is in reach of its maximum: what intervals are
-        read from.
+        Grid points (share above the threshold, k, sigma) of the likelihood confidence region; the interval of any
+        quantity is its range over them.
     iid : bool
         Whether the joints are independent samples.
     """
@@ -75,9 +75,9 @@ class Tail:
 
     @cached_property
     def p(self) -> float:
-        """Goodness of the fit; below 0.05 do not extrapolate.
+        """p-value of the goodness of fit; below 0.05 do not extrapolate.
 
-        p-value of the Anderson–Darling distance, by samples of the fitted distribution that are fitted again.
+        Anderson–Darling distance, by parametric bootstrap: samples of the fitted distribution, each fitted again.
         """
         k, sigma = pareto.fit(self.excesses)
         distance = pareto.anderson_darling(self.excesses, k, sigma)
@@ -113,7 +113,7 @@ class Tail:
         Raises
         ------
         ValueError
-            When more joints than that are above the threshold.
+            When `share` is not positive or is larger than the share of the joints above the threshold.
         """
         if not 0.0 < share <= self.share:
             remedy = "ask for its quantile"
@@ -124,19 +124,19 @@ class Tail:
         return self._between(self.threshold + best, self.threshold + excess)
 
     def bounds(self, share: float) -> tuple[float, float]:
-        """``level(share)`` with every unresolved joint below it, and above it; infinite where they alone decide."""
+        """``level(share)`` with unresolved joints counted below it, and above it; infinite if they make up `share`."""
         lost = self.n_unresolved / self.n
         ends = [share / (1.0 - lost), (share - lost) / (1.0 - lost)]
         low = self.level(min(ends[0], self.share)).estimate
         return low, self.level(ends[1]).estimate if ends[1] > 0 else np.inf
 
     def largest(self, fleet: int, probability: float = 0.5) -> Estimate:
-        """Load that the largest of a fleet of independent joints stays below with a probability; its median by default.
+        """Quantile of the largest load in a fleet of independent joints; its median by default.
 
         Raises
         ------
         ValueError
-            As `level`: when the fleet is so small that its largest is not in the tail.
+            As `level`: when the fleet is so small that its largest load is not in the tail.
         """
         return self.level(-np.expm1(np.log(probability) / fleet))
 
@@ -149,24 +149,24 @@ class Tail:
 def fit(
     values: ArrayLike, status: ArrayLike, share: float | None = None, confidence: float = 0.95, iid: bool = True
 ) -> Tail:
-    """Fit the tail that the largest loads make.
+    """Fit a generalised Pareto tail to the loads above a threshold.
 
     Parameters
     ----------
     values, status : array_like, shape (n,)
         Load and `tables.Status` of each joint; leave the nominal joint out.
     share : float, optional
-        Share of the valid joints in the tail; by default the smaller of 0.1 and 3 / sqrt(n), since with more joints the
-        intervals shrink and the tail must be truer.
+        Share of the valid joints in the tail; by default the smaller of 0.1 and 3 / sqrt(n): with more joints the
+        intervals shrink, so the error of the approximation must shrink too.
     confidence : float
-        Of all intervals.
+        Confidence level of all intervals.
     iid : bool
         Whether the joints are independent samples; there are no intervals when they are not.
 
     Returns
     -------
     Tail
-        Its estimates are those of maximum likelihood, k > -1/2 (below it there is no such theory).
+        Maximum likelihood estimates, k > -1/2 (at smaller k the asymptotic theory does not hold).
 
     Raises
     ------
@@ -203,7 +203,7 @@ def fit(
 def stability(
     values: ArrayLike, status: ArrayLike, shares: ArrayLike | None = None, confidence: float = 0.95, iid: bool = True
 ) -> list[Tail]:
-    """Fit tails of several thresholds, ascending: k, and sigma - k threshold, should not drift beyond their intervals.
+    """Fit tails above several thresholds, ascending: k and sigma - k threshold should stay within their intervals.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def stability(
     Raises
     ------
     TooThinError
-        When even the largest share has too few.
+        When a share has fewer than `FEWEST` joints.
     """
     n = exceedance.sort_out(values, status).valid.size
     least = min(0.3, (FEWEST + 1) / max(n, 1))
@@ -226,8 +226,8 @@ def stability(
 def _likelihood(excesses: FloatArray, reach: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Grid of k and sigma, and how far the log-likelihood is below its maximum, each (GRID, GRID).
 
-    The grid is of k and log(sigma (1 + k)), whose estimates are independent of each other (Chavez-Demoulin and Davison
-    2005), and just holds where the likelihood is in reach.
+    The grid is regular in k and log(sigma (1 + k)), which are orthogonal parameters (Chavez-Demoulin and Davison 2005),
+    and just encloses the points whose log-likelihood is within `reach` of the maximum.
     """
     first = [float(v) for v in pareto.fit(excesses)]
     k0, nu0 = max(first[0], -0.45), np.log(first[1] * (1.0 + max(first[0], -0.45)))

@@ -16,12 +16,12 @@ def gamma(results: NDArray[np.void], group: NDArray[np.int32]) -> NDArray[np.flo
     results : ndarray of RESULT, shape (n,)
         Joints; the first of a group is the one without errors.
     group : ndarray of int, shape (n,)
-        Joints that differ by their errors only share a number.
+        Group number of each joint; joints of a group differ in their errors only.
 
     Returns
     -------
     ndarray, shape (n, 8, 2)
-        Per cent, with its sign: force, torque. NaN where the joint or the first of its group is not ok.
+        Relative difference in per cent, signed: force, torque. NaN unless the joint and the first of its group are OK.
     """
     loads = np.stack([results["F_max"], results["T_max"]], axis=-1)
     loads[results["status"] != Status.OK] = np.nan

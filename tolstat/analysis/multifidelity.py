@@ -1,9 +1,9 @@
-"""Two fidelities of the same joints: a few dear ones and many cheap ones tell of the dear one's statistics.
+"""Two-fidelity estimation: statistics of the high fidelity from few joints at high and many at low fidelity.
 
-The dear simulation of m joints is corrected by what the cheap one of the same joints says of these m beside all n >= m
-(control variate, common random numbers). The estimates are of the dear simulation whatever the cheap one is: a bad one
-only gains nothing. How many joints each should have follows from costs and correlation (Ng and Willcox 2014;
-Peherstorfer, Willcox and Gunzburger 2016, two models).
+The high-fidelity estimate from m joints is corrected by the difference of the low-fidelity estimates from all n >= m
+joints and from the same m (control variate, common random numbers). It estimates the high fidelity whatever the low one
+is: a poor low fidelity only gains nothing. The optimal numbers of joints follow from costs and correlation (Ng and
+Willcox 2014; Peherstorfer, Willcox and Gunzburger 2016, two models).
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
 
 GRID, NEAR = 400, 0.1
-"""Loads of the low fidelity that a quantile is looked for among, and how far about it."""
+"""Low-fidelity loads among which a quantile is searched, and half width of the shares that they span."""
 
 
 LEAST_LEFT = 1e-3
-"""Least share of the variance that the low fidelity is taken to leave: a pilot does not know it better, and shares and
-quantiles need more pairs than means."""
+"""Lower bound of 1 - rho^2 in `allocate`: a pilot does not estimate smaller values, and shares and quantiles need more
+pairs than means."""
 
 
 class Allocation(NamedTuple):
-    """What two fidelities are worth, and how to share the work between them.
+    """Gain of two fidelities, and optimal split of the work between them.
 
     Attributes
     ----------
     rho : float
         Correlation of the two.
     ratio : float
-        Joints of the low fidelity for one of the high, at best; 1 where there is no gain.
+        Optimal number of low-fidelity joints per high-fidelity joint; 1 where there is no gain.
     gain : float
-        Joints of the high fidelity alone, for the same cost, that one joint of it is worth; 1 or less: no gain.
+        Variance of the high fidelity alone over that of both together, at the same cost; 1 or less: no gain.
     """
 
     rho: float
@@ -43,7 +43,7 @@ class Allocation(NamedTuple):
     gain: float
 
     def joints(self, budget: float, cost_high: float, cost_low: float, least: int = 1) -> tuple[int, int]:
-        """Joints of high and of low fidelity for a budget in the unit of the costs; `least` of each at least."""
+        """Numbers of high- and low-fidelity joints, at least `least` each, for a budget in the unit of the costs."""
         high = max(least, int(budget / (cost_high + self.ratio * cost_low)))
         return high, max(high, int((budget - high * cost_high) / cost_low))
 
@@ -54,13 +54,13 @@ class Estimate(NamedTuple):
     Attributes
     ----------
     estimate, lower, upper : float
-        With the low fidelity, and interval.
+        Two-fidelity estimate and its interval.
     alone, alone_lower, alone_upper : float
-        Of the same joints of the high fidelity alone.
+        Estimate and interval from the high-fidelity joints alone.
     rho : float
-        Correlation of what is averaged; NaN where one of the two does not scatter.
+        Correlation of the averaged quantity at both fidelities; NaN where one of the two does not scatter.
     gain : float
-        Variance of as many joints of the high fidelity alone as the same cost would buy, over that of the estimate.
+        Variance of the high fidelity alone, at the same total cost, over that of the estimate.
     """
 
     estimate: float
@@ -79,11 +79,11 @@ class Pairs(NamedTuple):
     Attributes
     ----------
     high : ndarray, shape (m,)
-        High fidelity of the first m joints; NaN without a valid load.
+        High-fidelity loads of the first m joints; NaN without a valid load.
     low : ndarray, shape (n,)
-        Low fidelity of all joints, the same m first.
+        Low-fidelity loads of all joints, the same m first; NaN without a valid load.
     cost_high, cost_low : float
-        Of a joint, in one unit.
+        Cost of a joint at each fidelity, in one unit.
     """
 
     high: FloatArray
@@ -93,11 +93,11 @@ class Pairs(NamedTuple):
 
     @property
     def relative_cost(self) -> float:
-        """Cost of all in joints of the high fidelity."""
+        """Total cost, as a number of high-fidelity joints."""
         return self.high.size + self.low.size * self.cost_low / self.cost_high
 
     def control(self) -> FloatArray:
-        """Low fidelity mapped to the high one, (n,): equal ranks among the m joints are equal loads; lost: -inf."""
+        """Low-fidelity loads mapped to high-fidelity ones by equal ranks among the m joints, (n,); invalid: -inf."""
         low = self.low[: self.high.size]
         both = np.isfinite(self.high) & np.isfinite(low)
         known = np.isfinite(self.low)
@@ -113,14 +113,14 @@ class Pairs(NamedTuple):
 
 
 def allocate(high: ArrayLike, low: ArrayLike, cost_high: float, cost_low: float) -> Allocation:
-    """Share the work between two fidelities.
+    """Split the work optimally between two fidelities.
 
     Parameters
     ----------
     high, low : array_like, shape (m,)
-        What is to be averaged, of the same joints: loads, or whether they are above a level.
+        Quantity to be averaged, of the same joints: loads, or whether they are above a level.
     cost_high, cost_low : float
-        Of a joint, in one unit.
+        Cost of a joint at each fidelity, in one unit.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def mean(pairs: Pairs, confidence: float = 0.95) -> Estimate:
     pairs : Pairs
         The loads; a joint without a valid load at one fidelity is left out.
     confidence : float
-        Of the intervals, Student's (regression in double sampling: Cochran 1977, 12.6).
+        Confidence level of the intervals, Student's (regression in double sampling: Cochran 1977, 12.6).
 
     Returns
     -------
@@ -191,18 +191,18 @@ def share_above(pairs: Pairs, level: float, confidence: float = 0.95) -> Estimat
     Parameters
     ----------
     pairs : Pairs
-        The loads. Joints without a valid load of the high fidelity are below at the lower end and above at the upper
-        end; at the low fidelity they count as below, which a control may.
+        The loads. Joints without a valid high-fidelity load count as below the level at the lower end and as above it
+        at the upper end. Joints without a valid low-fidelity load count as below, which a control variate allows.
     level : float
-        Level, in the unit of the loads; the low fidelity is asked at the level of the same rank, `Pairs.control`.
+        Level, in the unit of the loads; the low fidelity is evaluated at the level of equal rank, `Pairs.control`.
     confidence : float
-        Of the intervals: of the three shares that the estimate is made of by Clopper and Pearson, put together by
-        their distances (MOVER: Zou and Donner 2008). Alone: Clopper and Pearson's.
+        Confidence level. The Clopper–Pearson intervals of the three shares in the estimate are combined by MOVER (Zou
+        and Donner 2008); the high fidelity alone has a Clopper–Pearson interval.
 
     Returns
     -------
     Estimate
-        The estimate is NaN where no joint of both is above the level at the low fidelity: the pairs do not tell then.
+        The estimate is NaN where no pair is above the level at the low fidelity: P(high | low) is unknown then.
     """
     table = _shares(pairs, np.array([level]), confidence)
     return Estimate(*(float(column[0]) for column in table))
@@ -214,7 +214,7 @@ def quantile(pairs: Pairs, share: float, confidence: float = 0.95) -> Estimate:
     Parameters
     ----------
     pairs, confidence
-        As in `share_above`, whose intervals are turned round (Woodruff 1952).
+        As in `share_above`, whose intervals are inverted (Woodruff 1952).
     share : float
         Between 0 and 1.
 
@@ -235,7 +235,7 @@ def quantile(pairs: Pairs, share: float, confidence: float = 0.95) -> Estimate:
 def _where(
     x: FloatArray, estimate: FloatArray, lower: FloatArray, upper: FloatArray, left: float
 ) -> tuple[float, float, float]:
-    """Load at which the share above has come down to `left`, and the loads between which its interval holds that."""
+    """Smallest load with a share above of at most `left`, and the loads between which its interval contains `left`."""
     reached, least, most = (np.flatnonzero(found) for found in (estimate <= left, lower <= left, upper >= left))
     low = float(x[least[0]]) if least.size and least[0] > 0 else -math.inf
     high = float(x[most[-1] + 1]) if most.size and most[-1] + 1 < x.size else math.inf
@@ -243,7 +243,7 @@ def _where(
 
 
 def _grid(pairs: Pairs, share: float) -> FloatArray:
-    """Loads among which a quantile is looked for: those of the high fidelity, and some of the low one near it."""
+    """Loads among which a quantile is searched: all of the high fidelity, and mapped low-fidelity ones near it."""
     control = np.sort(pairs.control())
     near = np.linspace(max(0.0, share - NEAR), min(1.0, share + NEAR), GRID) * (control.size - 1)
     loads = np.concatenate([pairs.high, control[near.astype(np.intp)]])

@@ -1,8 +1,8 @@
 """Errors that are over-represented among the joints above a limit.
 
-Variance speaks of all joints; the few above the limit may have causes of their own. For each error two questions are
-asked of a joint above the limit and one not above it: which has the larger error (*direction*), and which has the error
-farther from the middle (*size*)? The answer is a probability: 1/2 when the error plays no part in the tail.
+Variance describes all joints; the few above the limit may have other causes. For each error, a random joint above the
+limit is compared with one not above it: which has the larger error (*direction*), and which has the error farther from
+the middle of its distribution (*size*)? The answer is a probability: 1/2 if the error does not affect the tail.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ FEWEST = 10
 
 
 class Part(NamedTuple):
-    """What errors play a part in the tail; each array has the shape (d,).
+    """Over-representation of each error in the tail; each array has the shape (d,).
 
     Attributes
     ----------
     estimate, lower, upper : ndarray
-        Probability that a joint above the limit has the larger value, and its interval, for each error by itself (NaN
-        for dependent samples).
+        Probability that a joint above the limit has the larger value, and its interval, valid for each error by itself
+        (NaN for dependent samples).
     p : ndarray
         p-value of the Wilcoxon–Mann–Whitney test, adjusted by Holm's method (1979) for both questions and all errors:
         when none plays a part, the probability that any is below 0.05 is at most 0.05.
@@ -56,7 +56,7 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
     above : array_like of bool, shape (n,)
         Which joints are above the limit.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     iid : bool
         Whether the joints are independent samples.
 
@@ -85,7 +85,7 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
 
 
 def _larger(values: FloatArray, over: BoolArray, confidence: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """P(value of one above > of one not above), ties half, with DeLong's (1988) interval on the logit scale."""
+    """P(value of one above > of one not above), ties count half, with DeLong's (1988) interval on the logit scale."""
     from scipy.special import expit, logit, ndtri
     from scipy.stats import rankdata
 

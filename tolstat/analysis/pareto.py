@@ -31,7 +31,7 @@ def fit(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
     n = x.shape[-1]
     m = 30 + int(np.sqrt(n))
     quartile, largest = x[..., int(n / 4 + 0.5) - 1, None], x[..., -1, None]
-    # b = -k / sigma, spread over where the likelihood is
+    # grid of b = -k / sigma over the range of high likelihood
     b = 1.0 / largest + (1.0 - np.sqrt(m / (np.arange(1, m + 1) - 0.5))) / (3.0 * quartile)
     k = np.stack([np.log1p(-b[..., j, None] * x).mean(axis=-1) for j in range(m)], axis=-1)
     likelihood = n * (np.log(-b / k) - k - 1.0)
@@ -86,7 +86,7 @@ def quantile(share_above: ArrayLike, k: ArrayLike, sigma: ArrayLike) -> FloatArr
 
 
 def anderson_darling(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> FloatArray:
-    """Anderson–Darling distance of samples (..., n) from the distribution, more weight on the ends; shape (...)."""
+    """Anderson–Darling distance of samples (..., n) from the distribution, shape (...); emphasises both ends."""
     n = excesses.shape[-1]
     above = upper_share(np.sort(excesses, axis=-1), np.asarray(k)[..., None], np.asarray(sigma)[..., None])
     above = np.clip(above, 1e-300, 1.0 - 1e-16)

@@ -1,7 +1,7 @@
-"""Sobol' indices from a pick-freeze design: what other joints it takes, no fit and no assumption on the load.
+"""Sobol' indices from a pick-freeze design: it needs joints of its own, but no fit and no assumption on the load.
 
-Joints A and B are independent; AB_i is A with the errors of group i from B. What A and AB_i have in common is all but
-group i, what B and AB_i have in common is group i alone.
+Joints A and B are independent; AB_i is A with the errors of group i from B. So A and AB_i have all errors but group i
+in common, B and AB_i have group i alone in common.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.sensitivity import normal_half
 
 FEWEST = 50
-"""Points below which no index is given."""
+"""Minimum number of points for an index."""
 
 
 class Index(NamedTuple):
@@ -32,11 +32,11 @@ class Indices(NamedTuple):
     Attributes
     ----------
     first, total : Index
-        Share of the load's variance that a group explains alone, and that it has a part in.
+        Share of the load's variance that a group explains alone, and in which it takes part, interactions included.
     variance : float
-        Of the load, in its unit squared.
+        Variance of the load, in its unit squared.
     points : int
-        Points of which A and B are valid.
+        Points with valid loads of A and B.
     """
 
     first: Index
@@ -48,8 +48,8 @@ class Indices(NamedTuple):
 def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95) -> Indices:
     """First-order (Saltelli et al. 2010) and total indices (Jansen 1999) of a load.
 
-    The same estimators as those of ``scipy.stats.sobol_indices``; a joint without a valid load is left out of the
-    indices that it belongs to, with no other.
+    The same estimators as those of ``scipy.stats.sobol_indices``. A point without valid loads of A and B is left out;
+    a joint AB_i without a valid load is left out of the indices of group i only.
 
     Parameters
     ----------
@@ -58,13 +58,14 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     ab : array_like, shape (n, d)
         Load of the joints AB_i.
     confidence : float
-        Of the intervals, which are from the indices' influence functions over the points: indices are ratios of means,
-        nearly normal (the percentiles of a bootstrap of 500 points of Ishigami's function cover 1 % less).
+        Confidence level of the intervals: normal, with standard errors from the indices' influence functions over the
+        points, since indices are ratios of means and so nearly normal (the percentiles of a bootstrap of 500 points of
+        Ishigami's function cover 1 % less).
 
     Returns
     -------
     Indices
-        Chance is not taken off: an index near 0 may come out below it.
+        Not corrected for chance: the estimate of an index near 0 may be negative.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
 
 
 def _index(terms: FloatArray, square: FloatArray, half: float) -> Index:
-    """Mean of terms (n, d), NaN where there is none, over that of the squares (n,)."""
+    """Ratio of the mean of `terms`, (n, d), NaN where missing, to the mean of `square`, (n,), with its interval."""
     valid = np.isfinite(terms)
     counts = valid.sum(axis=0)
     estimate = np.where(valid, terms, 0.0).sum(axis=0) / counts / square.mean()

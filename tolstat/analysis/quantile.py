@@ -1,7 +1,7 @@
 """Which load does a given share of the joints stay below? Quantiles with distribution-free intervals.
 
-The interval's ends are order statistics (Wilks 1941): the inverse of the Clopper–Pearson question, so that
-both tables of a report tell one story. An end that the number of joints cannot support is infinite.
+The interval's ends are order statistics (Wilks 1941): the inverse of the Clopper–Pearson interval, so that both tables
+of a report agree. An end is infinite if there are too few joints for it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Quantile(NamedTuple):
     Attributes
     ----------
     share : float
-        The share asked about, between 0 and 1.
+        Share of the joints, between 0 and 1.
     n, n_failed, n_unsettled : int
         As in `exceedance.Exceedance`.
     estimate : float
@@ -28,8 +28,8 @@ class Quantile(NamedTuple):
     lower, upper : float
         Two-sided interval from the valid joints, ±inf when they are too few; NaN for dependent samples.
     bound_lower, bound_upper : float
-        The estimate when every unresolved joint is below every valid one, and above: ±inf when the
-        unresolved joints alone decide.
+        The estimate with every unresolved joint below all valid ones, and above all of them; ±inf if the quantile
+        falls among the unresolved joints.
     """
 
     share: float
@@ -53,7 +53,7 @@ def at(values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0
     share : float
         Share of the joints that stay at or below the quantile, 0 < share < 1.
     confidence : float
-        Of the interval.
+        Confidence level of the interval.
     iid : bool
         Whether the joints are independent samples; the interval is NaN when they are not.
 
@@ -102,7 +102,7 @@ def wilks(share: float, confidence: float = 0.95) -> int:
     share : float
         Share of the joints that stay at or below the quantile, 0 < share < 1.
     confidence : float
-        Of the bound.
+        Confidence level of the bound.
 
     Raises
     ------
@@ -120,12 +120,12 @@ def wilks(share: float, confidence: float = 0.95) -> int:
 
 
 def _rank(n: int, share: float) -> int:
-    """Rank (from 1) of the inverted empirical distribution; rounding of ``n * share`` is not an excess."""
+    """Rank (from 1) of the quantile in the empirical distribution, with slack for the rounding of ``n * share``."""
     return max(1, int(np.ceil(n * share * (1.0 - 4e-16))))
 
 
 def _order(x: FloatArray, rank: int) -> float:
-    """Value of a rank counted from 1; outside of the sample nothing is known."""
+    """Value of a rank counted from 1; ±inf for a rank outside the sample."""
     if rank < 1:
         return -np.inf
     return float(x[rank - 1]) if rank <= x.size else np.inf

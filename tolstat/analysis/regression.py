@@ -1,4 +1,4 @@
-"""Rank regression: how a load moves with each error, whatever its units and however bent the relation, if monotone."""
+"""Rank regression: effect of each error on a load, independent of units and of any monotone nonlinearity."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from tolstat.analysis.exceedance import FloatArray
 
 GROUPS = 20
-"""Groups of joints that are left out in turn."""
+"""Number of groups in the delete-a-group jackknife."""
 
 
 class RankRegression(NamedTuple):
@@ -19,11 +19,11 @@ class RankRegression(NamedTuple):
     Attributes
     ----------
     estimate, lower, upper : ndarray, shape (d,)
-        Change of the load's rank with an error's, the others kept, both in standard deviations; the sign is the
-        direction. The interval is NaN for dependent samples.
+        Change of the load's rank per change of an error's rank, the other errors fixed, both in standard deviations;
+        the sign is the direction. The interval is NaN for dependent samples.
     r2 : float
-        Share of the ranks' variance that all errors together explain; where it is small the load is not monotone in
-        the errors, and the coefficients say little.
+        Share of the variance of the load's ranks that all errors together explain; where it is small, the load is not
+        monotone in the errors and the coefficients mean little.
     """
 
     estimate: FloatArray
@@ -45,7 +45,7 @@ def ranks(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
     y : array_like, shape (n,)
         Load of each joint, valid joints only.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     iid : bool
         Whether the joints are independent samples.
 

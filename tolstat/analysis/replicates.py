@@ -1,7 +1,7 @@
 """Intervals for Sobol' points and Latin hypercubes: independent replicates of the whole campaign.
 
-The joints of such a campaign are not independent of each other, so no formula for independent samples tells how sure
-its estimates are. Campaigns of different seeds are independent.
+The joints of such a campaign are not independent of each other, so formulas for independent samples do not give the
+uncertainty of its estimates. Campaigns of different seeds are independent.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ class Replicated(NamedTuple):
 def interval(
     estimates: ArrayLike, confidence: float = 0.95, least: float = -np.inf, most: float = np.inf
 ) -> Replicated:
-    """Interval of what the estimates of independent replicates are the mean of, by Student's t (Owen 2013, 17.4).
+    """Student's t interval of the expectation of an estimator, from independent replicates (Owen 2013, 17.4).
 
-    It covers the expectation of an estimate: right for shares and means, which are without bias; a quantile of few
-    joints is not, and more replicates do not cure that. Where the replicates are skew, few of them cover too rarely.
+    The expectation is the true value for shares and means, which are unbiased. A quantile of few joints is biased, and
+    more replicates do not reduce the bias. With few replicates of a skew distribution the coverage is too low.
 
     Parameters
     ----------
     estimates : array_like, shape (r, ...)
         Any statistics of each of r >= 2 replicates, each with its own seed and the same number of joints.
     confidence : float
-        Of each interval by itself.
+        Confidence level of each interval by itself.
     least, most : float
-        What the quantity cannot be beyond, such as 0 and 1 for shares.
+        Bounds of the quantity, such as 0 and 1 for shares.
 
     Returns
     -------

@@ -1,9 +1,9 @@
-"""Other tolerances from the same joints: each joint counts as often as the others would have made it.
+"""Likelihood-ratio reweighting of the same joints to other tolerances.
 
 The weight of a joint is the ratio of the densities of its errors under the new tolerances and under those it was drawn
-from. Where a few joints have most of the weight the estimates are a matter of luck, and nothing in them tells; the
-shape k of the weights' own tail does (Vehtari, Simpson, Gelman, Yao and Gabry 2024, Pareto-smoothed importance
-sampling), and whatever lies where no joint was drawn has no weight at all.
+from. Where a few joints have most of the weight, the estimates are unreliable without showing it; the shape k of the
+weights' tail shows it (Vehtari, Simpson, Gelman, Yao and Gabry 2024, Pareto-smoothed importance sampling). Errors where
+no joint was drawn have no weight at all.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from tolstat.analysis import pareto
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
 
 LEAST_ESS = 50
-"""Effective number of joints below which a verdict is against."""
+"""Minimum effective number of joints for usable weights."""
 
 
 class Weights(NamedTuple):
-    """Weights of joints, smoothed.
+    """Smoothed weights of joints.
 
     Attributes
     ----------
     values : ndarray, shape (n,)
-        Sum 1.
+        Weights; their sum is 1.
     ess : float
         Effective number of joints, 1 / sum of squares (Kish 1965).
     k : float
-        Shape of the weights' tail; -inf where they are all equal, inf where too few are left to tell.
+        Pareto shape of the weights' tail; -inf if all weights are equal, inf if too few are positive for a fit.
     allowed : float
-        min(1 - 1 / log10(n), 0.7): with a larger k the estimates have not settled with n joints.
+        Largest k allowed, min(1 - 1 / log10(n), 0.7): with a larger one the estimates have not converged at n joints.
     """
 
     values: FloatArray
@@ -42,7 +42,7 @@ class Weights(NamedTuple):
 
     @property
     def usable(self) -> bool:
-        """The verdict: whether estimates from these weights can be trusted. Otherwise new runs are needed."""
+        """Whether estimates from these weights can be trusted; otherwise new runs are needed."""
         return self.k < self.allowed and self.ess >= LEAST_ESS
 
 
@@ -54,7 +54,7 @@ class Share(NamedTuple):
     estimate, lower, upper : float
         Share and interval; NaN ends for dependent samples.
     ess : float
-        Joints that would be as sure of it if each had the same weight.
+        Number of equally weighted joints with the same variance of the share.
     """
 
     estimate: float
@@ -64,17 +64,17 @@ class Share(NamedTuple):
 
 
 def smooth(log_ratios: ArrayLike) -> Weights:
-    """Weights from the ratios of densities, their largest ones replaced by what a generalised Pareto tail expects.
+    """Weights from density ratios, the largest replaced by quantiles of a fitted generalised Pareto tail.
 
     Parameters
     ----------
     log_ratios : array_like, shape (n,)
-        Logarithm of new density over old, up to a constant; -inf for a joint that the new tolerances do not make.
+        Logarithm of new density over old, up to a constant; -inf for a joint impossible under the new tolerances.
 
     Returns
     -------
     Weights
-        Of all joints.
+        Weights of all joints.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def smooth(log_ratios: ArrayLike) -> Weights:
         k = np.inf
         if m >= 5 and raw[tail[0]] > cut > 0:
             shape, scale = (float(v) for v in pareto.fit(raw[tail] - cut))
-            k = (shape * m + 0.5 * 10.0) / (m + 10.0)  # drawn to 1/2 as by ten observations
+            k = (shape * m + 0.5 * 10.0) / (m + 10.0)  # shrunk towards 1/2 as by ten observations
             raw[tail] = np.minimum(cut + pareto.quantile(1.0 - (np.arange(1, m + 1) - 0.5) / m, k, scale), 1.0)
     weights = raw / raw.sum()
     allowed = min(1.0 - 1.0 / np.log10(max(n, 11)), 0.7)
@@ -122,18 +122,18 @@ def share_above(values: ArrayLike, weights: Weights, level: float, confidence: f
     values : array_like, shape (n,)
         Load of each joint that has a weight.
     weights : Weights
-        Of the same joints.
+        Weights of the same joints.
     level : float
         Level, in the unit of the values.
     confidence : float
-        Of the interval: Clopper and Pearson's for as many joints as would be as sure (Korn and Graubard 1998).
+        Confidence level of Clopper and Pearson's interval for the effective joints (Korn and Graubard 1998).
     iid : bool
         Whether the joints are independent samples.
 
     Returns
     -------
     Share
-        Estimate and interval; it does not cover what `Weights.usable` warns of.
+        Estimate and interval, which is valid only if `Weights.usable`.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def share_above(values: ArrayLike, weights: Weights, level: float, confidence: f
         raise ValueError(f"loads {loads.shape} and weights {w.shape} must be of one length")
     above = loads > level
     estimate = float(np.clip((w * above).sum(), 0.0, 1.0))
-    # variance of a ratio of sums; without a joint on one side that of the weights alone
+    # variance of a ratio of sums; if all joints are on one side, the effective number of the weights
     variance = float(((w * (above - estimate)) ** 2).sum())
     ess = estimate * (1.0 - estimate) / variance if 0.0 < estimate < 1.0 else weights.ess
     ess = min(ess, float(loads.size))

@@ -1,9 +1,9 @@
 """Which errors make the loads scatter? Sobol' indices from the joints of a campaign, without further runs.
 
-The errors must be independent of each other for shares of variance to add up. *First order*: the part of the variance
-that goes when an error is made perfect on the average over the others. *Total*: the part that stays when all others
-are. Total indices of fifty errors cannot be read from a thousand joints without an assumption; they are bounded here:
-from below by effects of one and two errors, from above by also counting all that these do not explain.
+The errors must be independent of each other for shares of variance to add up. *First order*: the expected reduction of
+the variance when an error is fixed. *Total*: the expected variance that remains when all other errors are fixed. Total
+indices of fifty errors cannot be estimated from a thousand joints without an assumption; they are bounded here: from
+below by effects of one and two errors, from above by adding all variance that these do not explain.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis.exceedance import FloatArray
 
 FEWEST = 50
-"""Joints below which no index is given."""
+"""Minimum number of joints for an index."""
 DEGREE = 3
-"""Of the polynomials in each of two errors that an interaction is made of."""
+"""Degree in each error of the polynomials that model the interaction of two errors."""
 MOST = 20_000
-"""Joints that interactions are read from; memory is some 3 kB a joint and error, and more joints tell little more."""
+"""Maximum number of joints used for interactions: memory is some 3 kB a joint and error, and more joints add little."""
 
 
 class FirstOrder(NamedTuple):
@@ -29,10 +29,10 @@ class FirstOrder(NamedTuple):
     Attributes
     ----------
     estimate, lower, upper : ndarray, shape (d,) or (d, m)
-        Corrected for chance, so that an error without effect has the mean 0 and may come out below it; the interval is
-        NaN for dependent samples, an index is NaN where error or load does not scatter.
+        Corrected for chance: the estimate for an error without effect has the mean 0 and may be negative. The interval
+        is NaN for dependent samples, an index is NaN where error or load does not scatter.
     variance : ndarray, shape () or (m,)
-        Of the load, in its unit squared: times this, an index is a contribution.
+        Variance of the load, in its unit squared; an index times the variance is the error's contribution.
     """
 
     estimate: FloatArray
@@ -42,18 +42,18 @@ class FirstOrder(NamedTuple):
 
 
 class Total(NamedTuple):
-    """Shares of a load's variance in which each error has a part.
+    """Shares of a load's variance in which each error takes part.
 
     Attributes
     ----------
     estimate : ndarray, shape (d,)
-        Effects of the error and of its pairs with the others: what is seen of the total index.
+        Effects of the error and of its pairs with the others: the part of the total index that can be estimated.
     lower, upper : ndarray, shape (d,)
         Interval of the total index: from the lower end of `estimate` to the upper end of `estimate` with `rest`.
     pairs : ndarray, shape (d, d)
         Share of each interaction of two errors, corrected for chance; NaN on the diagonal.
     rest : float
-        Share that no error and no pair explains: effects of three and more, and what the fits are too coarse for.
+        Share that no error and no pair explains: interactions of three and more errors, and lack of fit.
     """
 
     estimate: FloatArray
@@ -66,9 +66,10 @@ class Total(NamedTuple):
 def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> FirstOrder:
     """First-order Sobol' indices from given data.
 
-    The mean of the load over one error is fitted by a line of cbrt(n) pieces (8 to 32) of as many joints each
-    (Plischke, Borgonovo and Smith 2013 have steps; pieces of lines are exact for a load that is linear in the error),
-    its share of the variance corrected for the degrees of freedom. The interval is from the index's influence function.
+    The conditional mean of the load given one error is fitted by a continuous piecewise linear function with cbrt(n)
+    pieces (8 to 32) of equally many joints (Plischke, Borgonovo and Smith 2013 use a step function; linear pieces are
+    exact for a load that is linear in the error). Its share of the variance is corrected for the degrees of freedom.
+    The interval is from the index's influence function.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     y : array_like, shape (n,) or (n, m)
         Load of each joint, or m of them, such as the load at m shaft angles.
     confidence : float
-        Of the interval.
+        Confidence level of the interval.
     iid : bool
         Whether the joints are independent samples.
 
@@ -116,8 +117,8 @@ def over_revolution(
 ) -> tuple[FirstOrder, FirstOrder]:
     """First-order indices of a load at each shaft angle, and over the whole revolution.
 
-    The latter are shares of the sum of the variances at all angles (Lamboni, Monod and Makowski 2011): an angle counts
-    as much as the load scatters there.
+    Indices over the revolution are shares of the sum of the variances at all angles (Lamboni, Monod and Makowski 2011):
+    each angle is weighted with the variance of the load there.
 
     Parameters
     ----------
@@ -144,7 +145,7 @@ def over_revolution(
     n, centred = len(loads), (loads - loads.mean(axis=0)).reshape(len(loads), -1)
     variance, square = centred.var(axis=0), centred**2
     whole = variance.sum()
-    # an index that is there by chance is the same at all angles as far as their loads are correlated
+    # chance contributions at two angles are correlated as the loads at these angles are
     alike = ((centred.T @ centred / n) ** 2).sum() / whole**2 if whole > 0 else np.nan
     local = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
     found = np.full((2, errors.shape[1]), np.nan)
@@ -165,11 +166,11 @@ def over_revolution(
 def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> Total:
     """Bounds of the total Sobol' indices from given data.
 
-    Interactions of two errors are products of Legendre polynomials of their ranks (high-dimensional model
-    representation, Li, Wang and Rabitz 2002), their shares corrected for chance by leaving the squares out of the
-    double sums (U-statistics), read from what the errors alone leave. Interactions of more errors are not resolved:
-    they are between none and all of the rest, which is why the interval is one of bounds. A fit too coarse widens it,
-    and makes it no less true.
+    Interactions of two errors are expanded in products of Legendre polynomials of their ranks (high-dimensional model
+    representation, Li, Wang and Rabitz 2002), estimated from the residual of the effects of single errors. Their shares
+    are corrected for chance by leaving the squares out of the double sums (U-statistics). Interactions of more errors
+    are not estimated: they make up between none and all of the rest, so the interval is one of bounds. Lack of fit
+    widens it, but does not invalidate it.
 
     Parameters
     ----------
@@ -199,7 +200,7 @@ def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
     first = np.array([share[0] for _, share, _, _ in fits])
     influence = np.column_stack([own[:, 0] for _, _, own, _ in fits])
     chance = np.array([_chance(share, degrees, n)[0] for _, share, _, degrees in fits])
-    # what is plainly explained by single errors is no noise to the pairs
+    # subtract significant effects of single errors, which would be noise in the estimates of pairs
     main = sum((m[:, 0] for (m, _, _, _), s, c in zip(fits, first, chance, strict=True) if s > 2 * c**0.5), 0.0 * e)
     pairs, of_pairs, chance_of_pairs = _interactions(errors, e - main, e.var())
     influence_of_pairs = of_pairs - pairs.sum(axis=1) * (e**2 / e.var())[:, None]
@@ -236,9 +237,10 @@ def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def _fit(column: FloatArray, centred: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """Mean of loads over one error, (n, m), its shares of the variance, (m,), their influence functions, and degrees.
+    """Fitted mean of loads given one error, (n, m), shares of the variance, (m,), influence functions, and degrees.
 
-    With mean m(x) and deviation e the influence function of Var m / Var e is (m² + 2 m (e - m) - S e²) / Var e.
+    With mean m(x), deviation e and share S = Var m / Var e, the influence function of S is
+    (m² + 2 m (e - m) - S e²) / Var e.
     """
     n = len(column)
     basis = _pieces(column)
@@ -252,7 +254,7 @@ def _fit(column: FloatArray, centred: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def _pieces(column: FloatArray) -> FloatArray:
-    """Orthonormal basis, (n, degrees), of continuous lines of pieces with equally many joints, without the constant."""
+    """Orthonormal basis, (n, degrees), of continuous piecewise linear functions, centred; as many joints a piece."""
     n = len(column)
     knots = np.unique(np.quantile(column, np.linspace(0, 1, min(max(8, round(np.cbrt(n))), 32) + 1)))
     hats = np.column_stack([np.interp(column, knots, unit) for unit in np.eye(len(knots))[1:]])
@@ -264,9 +266,10 @@ def _pieces(column: FloatArray) -> FloatArray:
 
 
 def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Shares of the pairs, (d, d), influence functions of the errors' sums but for Var e, (n, d), and chance, (d, d).
+    """Shares of the pairs, (d, d), influence functions of their sums by error, (n, d), and chance variances, (d, d).
 
-    A share is a sum of squared coefficients c = E[left p_a(x_i) p_b(x_j)] over the variance.
+    A share is a sum of squared coefficients c = E[left p_a(x_i) p_b(x_j)] over the variance, `left` being the residual
+    of single errors. The influence functions lack the term of the estimated variance.
     """
     n, d = errors.shape
     p = _polynomials(errors).reshape(n, d * DEGREE)
@@ -293,13 +296,13 @@ def _polynomials(errors: FloatArray) -> FloatArray:
 
 
 def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:
-    """Variance of a share that is there without any effect, where the influence function vanishes."""
+    """Variance of an estimated share in the absence of any effect, where the influence function vanishes."""
     found: FloatArray = 2.0 * degrees * ((1.0 - share) / n) ** 2
     return found
 
 
 def _error(influence: FloatArray, chance: FloatArray) -> NDArray[np.float64]:
-    """Standard errors. The influence function of noisy coefficients holds the variance of chance twice already."""
+    """Standard errors. The influence function of noisy coefficients counts chance variance twice: subtract it once."""
     plain = influence.var(axis=0) / len(influence)
     return np.asarray(np.sqrt(np.maximum(plain - chance, chance)))
 

@@ -1,18 +1,17 @@
-"""Subset simulation: a small probability as a product of larger ones, level by level.
+"""Subset simulation: a small probability as a product of larger conditional ones, level by level.
 
 Au and Beck (2001). The joints of level 0 are drawn from the tolerances. The share p0 of them with the largest loads are
-the seeds of level 1: chains that start from them walk among all joints beyond the threshold that the seeds have passed,
-as often in each place as the tolerances make it there. The largest loads of these are the next seeds, until the limit
-asked about is no farther than the threshold. A chain moves in the space of independent standard normal scores that the
-errors are made from: from z to sqrt(1 - s^2) z + s xi, which leaves the normal distribution as it is, and stays where
-it was if the load there is not beyond the threshold (conditional sampling: Papaioannou, Betz, Zwirglmaier and Straub
-2015). The step s is the same for a whole level and follows the acceptance of the level before, so that no chain's own
-path decides about its law.
+the seeds of level 1: Markov chains started from them sample the tolerances conditional on a load beyond the threshold,
+which all seeds exceed. The largest loads of level 1 are the next seeds, and so on until the threshold reaches the
+limit. A chain moves in the space of the independent standard normal scores of the errors: it proposes
+sqrt(1 - s^2) z + s xi, which preserves the normal distribution, and stays at z if the load of the proposal is not
+beyond the threshold (conditional sampling: Papaioannou, Betz, Zwirglmaier and Straub 2015). The step s is the same for
+a whole level and is adapted to the acceptance of the level before, so that no chain's path affects its own transitions.
 
-The logarithm of the product is a sum over the levels of what each of their states adds to it. States of one family
-(those that descend from one chain two levels before) are not independent of each other, families are: the variance is
-that of the families' sums, those of adjacent levels together (fixed lag: Olsson and Douc 2019). A region of large loads
-that no seed lies in is not found, and no variance tells of it.
+The variance of the logarithm of the product is estimated from the influence of each state on its level's share. States
+of one family (descendants of one chain two levels before) are dependent, families are independent: the variance is that
+of the families' sums, including covariances of levels up to `LAG` apart (fixed lag: Olsson and Douc 2019). A region of
+large loads that contains no seed is not found, and the variance does not show it.
 """
 
 from __future__ import annotations
@@ -30,26 +29,26 @@ Noise = Callable[[int, int, int], FloatArray]
 FIRST_STEP = 0.6
 """Step of level 1 (Papaioannou et al. 2015)."""
 ACCEPTANCE = 0.44
-"""Share of the moves that should be accepted (same)."""
+"""Target share of accepted moves (same source)."""
 LAG = 2
-"""Levels over which relationship counts: more of them leave too few families to tell a variance by."""
+"""Number of levels back that families reach: with more, too few families are left to estimate a variance."""
 FAMILIES = 5
-"""Seeds for a degree of freedom of the variance: its scatter, measured over seeds (docs/rare_events.md)."""
+"""Seeds per degree of freedom of the variance: from its scatter, measured over random seeds (docs/rare_events.md)."""
 LEAST = 1e-12
-"""Probability below which the levels end: normal scores are at the end of double precision not far from it."""
+"""Probability below which no further level starts: normal scores reach the end of double precision not far from it."""
 
 
 class Settings(NamedTuple):
-    """What is asked, and of how many joints.
+    """Limit, and number of joints, of a subset simulation.
 
     Attributes
     ----------
     n : int
         Joints a level.
     p0 : float
-        Share of them that is carried to the next level; ``n * p0`` is a whole number.
+        Share of them that seeds the next level; ``n * p0`` is a whole number.
     limit : float
-        The load, in the unit of the loads.
+        Load whose exceedance is estimated, in the unit of the loads.
     """
 
     n: int
@@ -76,7 +75,7 @@ class Candidates(NamedTuple):
 
 
 class Level(NamedTuple):
-    """What came of a level.
+    """Statistics of a completed level.
 
     Attributes
     ----------
@@ -85,7 +84,7 @@ class Level(NamedTuple):
     share : float
         Share of them beyond the next threshold, or beyond the limit at the last level.
     deviation : float
-        Coefficient of variation of `share`, joints of one chain not being independent.
+        Coefficient of variation of `share`, with the dependence of joints within a chain.
     joints : int
         Joints simulated for it.
     acceptance : float
@@ -103,14 +102,14 @@ class Level(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """The probability asked for.
+    """Estimated probability of a load above the limit.
 
     Attributes
     ----------
     probability, lower, upper : float
-        Estimate, without bias, and interval. Where the limit was not reached: NaN, 0 and what is left at most.
+        Unbiased estimate and its interval. If the limit was not reached: NaN, 0 and an upper bound.
     deviation : float
-        Coefficient of variation, chains and families included; NaN where the limit was not reached.
+        Coefficient of variation, with the dependence within chains and families; NaN if the limit was not reached.
     """
 
     probability: float
@@ -136,26 +135,26 @@ class _States(NamedTuple):
 
 
 class Walk:
-    """A subset simulation under way: it says which joints to simulate next, and takes their loads.
+    """State of a subset simulation: it provides the joints to simulate next, and takes their loads.
 
-    What it says depends on the settings, the noise and the loads taken so far only. Whoever keeps the loads can go on
-    where another stopped, by taking them again.
+    The joints depend on the settings, the noise and the loads taken so far only. To resume a simulation, take its
+    stored loads again.
 
     Parameters
     ----------
     settings : Settings
-        What is asked.
+        Limit, and number of joints.
     noise : callable
-        (level, first, m) -> independent standard normal numbers, (m, d), number `first` and following of the level.
+        (level, first, m) -> independent standard normal numbers, (m, d): rows `first` and following of the level.
 
     Attributes
     ----------
     levels : list of Level
         Levels that are complete.
     done : bool
-        Whether the last one is.
+        Whether the last level is complete.
     reached : bool
-        Whether it ends at the limit. Otherwise no joint went beyond the threshold any more, or the probability is
+        Whether the last level ends at the limit. Otherwise the threshold did not rise any more, or the probability is
         below `LEAST`.
 
     Examples
@@ -184,12 +183,12 @@ class Walk:
         self.next = Candidates(0, noise(0, 0, settings.n), np.full(settings.n, -1))
 
     def take(self, loads: FloatArray) -> None:
-        """Take the loads of the joints `next`, (m,), in the unit of the limit, and renew `next` unless all is done.
+        """Take the loads of the joints `next`, (m,), in the unit of the limit, and update `next` unless `done`.
 
         Raises
         ------
         ValueError
-            When they are not as many, one of them is NaN, or all is done.
+            When the number of loads differs from `next`, a load is NaN, or the simulation is done.
         """
         loads = np.asarray(loads, dtype=float)
         if self.done or loads.shape != self.next.parent.shape or np.isnan(loads).any():
@@ -230,7 +229,7 @@ class Walk:
         seeds = round(n * self.settings.p0)
         ordered = np.sort(states.loads)[::-1]
         middle = 0.5 * (ordered[seeds - 1] + ordered[seeds])
-        # between infinite loads (joints without one) there is no middle
+        # infinite loads (joints without a valid one) have no midpoint
         threshold = min(limit, middle if math.isfinite(middle) else ordered[seeds])
         beyond = states.loads > threshold
         tried = self._simulated if self.levels else 0
@@ -252,7 +251,7 @@ class Walk:
         self._parts = [self._start]
 
     def _add_variance(self, beyond: NDArray[np.bool_], share: float, families: NDArray[np.intp]) -> None:
-        """Add what a level does to the variance of the logarithm, related states together."""
+        """Add a level's part of the variance of the logarithm, with covariances within families."""
         if not share:
             self._sums.append([np.array([math.inf])])
             return
@@ -275,8 +274,8 @@ class Walk:
     def estimate(self, confidence: float = 0.95) -> Estimate:
         """Estimate of the probability that a load is above the limit, from the levels that are complete.
 
-        The logarithm's interval is Student's, with a degree of freedom for every `FAMILIES` seeds, about the logarithm
-        and half its variance: the product is without bias, so its logarithm is low by that.
+        The interval is Student's on the logarithm, with one degree of freedom per `FAMILIES` seeds, centred at the
+        logarithm plus half its variance: the product is unbiased, so its logarithm is biased low by that much.
         """
         from scipy.special import stdtrit
 

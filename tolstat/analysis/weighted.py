@@ -1,10 +1,10 @@
-"""Exceedance and quantiles of joints that were drawn more often than the tolerances make them: importance sampling.
+"""Exceedance and quantiles under importance sampling.
 
-Each joint counts by its weight, the density of its errors under the tolerances over that under what it was drawn from.
-Shares are ratios of sums of weights; their variance is that of such a ratio. The interval is Clopper and Pearson's for
-the number of equal joints that would be as sure of the share (Korn and Graubard 1998), its far end for one joint more,
-as heavy as the heaviest there, or of the outermost twenty (after Fay and Feuer 1997). With equal weights it is just
-Clopper and Pearson's; with no joint above, one as heavy as any could have been.
+The weight of a joint is the density of its errors under the tolerances over that under the proposal. Shares are ratios
+of sums of weights; their variance is that of such a ratio. The interval is Clopper and Pearson's for the effective
+number of joints (Korn and Graubard 1998). Each end is computed with one joint added on the side that moves it outward,
+with the largest weight on that side, or among the outermost twenty (after Fay and Feuer 1997). With equal weights the
+interval is exactly Clopper and Pearson's; if no joint is above, the joint added has the largest weight of all.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from tolstat.analysis.reweight import smooth
 from tolstat.common.tables import UNSETTLED, VALID, Status
 
 LEAST_EFFECTIVE = 20.0
-"""Effective number of joints above a level below which its share is to be taken with care."""
+"""Minimum effective number of joints above a level for a trusted share."""
 
 
 class Trust(NamedTuple):
-    """How far the joints above a level can be believed to be all that matters there.
+    """Diagnostics of the weights above a level.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Trust(NamedTuple):
     k : float
         Shape of the tail of their weights (Vehtari et al. 2024); NaN below 25 joints, -inf with equal weights.
     usable : bool
-        Whether there are `LEAST_EFFECTIVE`, and k is below 0.7.
+        Whether `effective` is at least `LEAST_EFFECTIVE` and k, if known, is below 0.7.
     """
 
     effective: float
@@ -43,9 +43,9 @@ class Trust(NamedTuple):
 
 
 class _Sums(NamedTuple):
-    """Sum of weights, sum of their squares and largest of them, of the joints above each level and of the others.
+    """Sum, sum of squares and maximum of the weights of the joints above each level, and of the others.
 
-    The largest is that of the outermost `LEAST_EFFECTIVE` joints where there are fewer.
+    With fewer than `LEAST_EFFECTIVE` joints on a side, the maximum is that of the outermost `LEAST_EFFECTIVE` joints.
     """
 
     above: FloatArray
@@ -53,7 +53,7 @@ class _Sums(NamedTuple):
 
     @classmethod
     def at(cls, first: NDArray[np.intp], weights: FloatArray, below: FloatArray, above: FloatArray) -> _Sums:
-        """Take the weights from number `first` on, and `above`, as above; those before, and `below`, as below."""
+        """Count weights from index `first` on, and `above`, as above the level; earlier ones, and `below`, as below."""
         parts = []
         for w, rest, number in ((weights[::-1], above, weights.size - first), (weights, below, first)):
             sums, squares, largest = (
@@ -77,7 +77,7 @@ class _Sums(NamedTuple):
         most = np.maximum(self.above[2], self.below[2])
         ends = []
         for end, own, other, empty in ((1.0 - tail, *self, none_above), (1.0 - tail, *self[::-1], none_below)):
-            # one more joint on the side that is to be larger, as heavy as the heaviest there, or of all
+            # add one joint on the side that this end enlarges, with the largest weight there, or of all if it is empty
             one = np.where(empty, most, own[2])
             first, squares = own[0] + one, own[1] + one**2
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -112,14 +112,14 @@ def curve(
     Parameters
     ----------
     values, status, levels, confidence, ends
-        As there.
+        As in `exceedance.curve`.
     weights : array_like, shape (n,)
         Weight of each joint; independent draws, mean 1.
 
     Returns
     -------
     ndarray of CURVE, shape (m,)
-        ``count``, ``n``, ``n_failed`` and ``n_unsettled`` are numbers of joints; all shares are of weights.
+        ``count``, ``n``, ``n_failed`` and ``n_unsettled`` are numbers of joints; all shares are weighted.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def curve(
 
 
 def at(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, confidence: float = 0.95) -> Exceedance:
-    """Share of the joints above one level; see `curve` for parameters and what is raised.
+    """Share of the joints above one level; parameters and errors raised as in `curve`.
 
     Returns
     -------
@@ -172,7 +172,7 @@ def at(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, c
 
 
 def trust(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float) -> Trust:
-    """Tell how far the share above a level can be trusted; parameters as in `at`."""
+    """Diagnose whether the share above a level can be trusted; parameters as in `at`."""
     sample = _sort_out(values, status, weights)
     w = sample.weights[sample.loads > level]
     w = w[w > 0]
@@ -196,7 +196,7 @@ def quantile(
     Returns
     -------
     Quantile
-        As `quantile.at` gives it for joints that count alike.
+        As from `quantile.at`, which is for equal weights.
     """
     sample = _sort_out(values, status, weights)
     loads, below = sample.loads, np.cumsum(sample.weights)
@@ -208,7 +208,7 @@ def quantile(
     total = below[-1]
 
     def load_at(part: float) -> float:
-        """Smallest load that joints of this weight do not exceed; infinite where there is none."""
+        """Smallest load at or below which joints have the weight `part`; infinite where there is none."""
         if part <= 0:
             return -np.inf
         rank = int(np.searchsorted(below, part * (1 - 1e-12)))
@@ -219,7 +219,7 @@ def quantile(
     effective = share * (1.0 - share) * total**2 / (spread**2).sum()
     low, high = clopper_pearson(share * effective, effective, confidence)
     bounds = load_at(share * (total + lost) - lost), load_at(share * (total + lost))
-    # as in order statistics: the largest load is no upper end unless a heavier one could have been seen
+    # as for order statistics: no finite upper end if it falls within the weight of the largest load
     ends = load_at(low * total), load_at(high * total) if high < 1.0 - sample.weights[-1] / total else np.inf
     return Quantile(*numbers, estimate, *ends, *bounds)
 
@@ -227,7 +227,7 @@ def quantile(
 def _above(
     ends: ArrayLike, values: ArrayLike, status: ArrayLike, weights: ArrayLike, levels: FloatArray
 ) -> tuple[NDArray[np.intp], FloatArray]:
-    """Where the valid joints begin one end of whose load is above each level, and the weights of all in that order."""
+    """Sort the valid joints by an interval end of their loads: first index above each level, and sorted weights."""
     own = np.where(np.isfinite(values), np.where(np.isfinite(ends), ends, values), np.nan)
     sample = _sort_out(own, status, weights)
     return np.searchsorted(sample.loads, levels, side="right"), sample.weights

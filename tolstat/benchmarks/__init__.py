@@ -1,1 +1,1 @@
-"""The instruments: what a joint costs, where the time goes, and ratios to other ways, all measured in one run."""
+"""Benchmarks: cost of a joint, its split by part, and ratios to other methods, all measured in one run."""

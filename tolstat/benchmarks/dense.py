@@ -1,4 +1,4 @@
-"""Newton's iteration with a tangent without structure, solved by LAPACK."""
+"""Newton's iteration with the tangent as a dense matrix, solved by LAPACK."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from tolstat.solver import simulation
 
 @dataclass(frozen=True)
 class Dense:
-    """A Newton iteration with a tangent of its own against the same with LAPACK's dense factors, one joint at a time.
+    """Newton iteration with tolstat's structured solver compared with LAPACK's dense one, one joint at a time.
 
     Attributes
     ----------
     lapack_us, structured_us : float
-        Factors and one solution with them, µs.
+        Factorisation and one solution, µs.
     lapack_solve_us : float
         The solution alone, µs.
     solver_ratio, iteration_ratio, iteration_ratio_lanes : float
-        LAPACK over ours: factors and solution; the whole iteration (residual, tangent, factors, solution); the
-        same with ours in lanes.
+        Time of LAPACK over ours: factorisation and solution; a whole iteration with a new tangent (residual, tangent,
+        factorisation, solution); that iteration with ours in lanes.
     kept_ratio, kept_ratio_lanes : float
-        The same of the mean iteration of a joint, which keeps tangents on both sides.
+        Ratios of the mean iteration of a joint, in which both reuse tangents: one joint at a time, and ours in lanes.
     """
 
     lapack_us: float
@@ -63,7 +63,7 @@ def dense(work: np.record) -> NDArray[np.float64]:
 
 
 def systems(snaps: Sequence[Snapshot], options: Options) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Tangent and right-hand side of each state, dense."""
+    """Yield the dense tangent and the right-hand side of each state."""
     from tolstat.kernel.revolution.simulate import assemble, residual
 
     work, state, *_ = simulation.scratch(options)
@@ -76,18 +76,18 @@ def systems(snaps: Sequence[Snapshot], options: Options) -> Iterator[tuple[NDArr
 
 
 def against(times: Times, once: dict[str, Once], count: int, per_iteration: NDArray[np.float64]) -> Dense:
-    """Compare with LAPACK.
+    """Compute the ratios of LAPACK's times to ours.
 
     Parameters
     ----------
     times : Times
         ``lapack`` factorises and solves `count` times, ``lapack solve`` solves.
     once : dict of str to Once
-        Parts in ``lanes`` and ``alone``.
+        Time of each part in ``lanes`` and ``alone``.
     count : int
-        How often.
+        Number of systems in a measurement of LAPACK.
     per_iteration : ndarray, shape (3,)
-        Residuals, tangents and solutions of a mean iteration of a joint.
+        Residuals, tangents and solutions per Newton iteration of a joint, mean.
 
     Returns
     -------

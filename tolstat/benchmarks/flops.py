@@ -1,8 +1,8 @@
-"""Operations of the kernel's parts, counted by running its Python source on numbers that count.
+"""Operations of the kernel's parts, counted by running its Python source with a number class that counts.
 
-``python -m tolstat.benchmarks.flops`` does it, in a process of its own without compilation: additions, subtractions,
-multiplications, divisions and square roots count as one each, as they stand in the source; sines, cosines, comparisons
-and signs are left out. A lane does the same for its joint, and more where a neighbour takes a branch that it does not.
+``python -m tolstat.benchmarks.flops`` counts in a process of its own without compilation: additions, subtractions,
+multiplications, divisions and square roots count as one each, as written in the source; sines, cosines, comparisons
+and signs do not count. A lane does the same operations, and more where another lane takes a branch that it does not.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 
 class Snapshot(NamedTuple):
-    """A joint at one instant.
+    """State of a joint at one instant.
 
     Attributes
     ----------
     params : ndarray of PARAM, shape (1,)
         The joint.
     t, cv, ca : float
-        Time, s; how velocity and acceleration follow the unknowns in a step, 1/s and 1/s^2.
+        Time, s; derivatives of velocity and acceleration by the unknowns in a step, 1/s and 1/s^2.
     q, v, a : ndarray, shape (55,)
         Unknowns and derivatives; m, rad and s.
     """
@@ -44,7 +44,7 @@ class Snapshot(NamedTuple):
 
 
 class Counting:
-    """A number that counts what is done with it, in `Counting.done`."""
+    """A number that counts the operations on it, in `Counting.done`."""
 
     done = 0
     __array_ufunc__ = None  # NumPy's numbers leave the operation to this class
@@ -95,7 +95,7 @@ for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
 
 
 def _counting_math() -> SimpleNamespace:
-    """``math`` whose results count what is done with them."""
+    """``math`` whose trigonometric functions and square root return `Counting`."""
     functions: dict[str, Any] = {name: getattr(math, name) for name in dir(math) if not name.startswith("_")}
     for name in ("sin", "cos", "tan", "atan2"):
         functions[name] = lambda *x, of=functions[name]: Counting(of(*map(float, x)))
@@ -104,7 +104,7 @@ def _counting_math() -> SimpleNamespace:
 
 
 def _counting(values: Any) -> Any:
-    """Array or number of counting numbers."""
+    """Convert an array or number to `Counting`."""
     array = np.asarray(values)
     if array.ndim == 0:
         return Counting(float(array))
@@ -115,7 +115,7 @@ def _counting(values: Any) -> Any:
 
 
 def count(snapshot: Snapshot) -> dict[str, int]:
-    """Operations of each part; to be called without compilation.
+    """Count the operations of each part; call it with compilation disabled only.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def count(snapshot: Snapshot) -> dict[str, int]:
 
 
 def count_apart(snapshots: Sequence[Snapshot]) -> list[dict[str, int]]:
-    """`count` of each, in a process without compilation."""
+    """Call `count` for each snapshot, in a process without compilation."""
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-m", "tolstat.benchmarks.flops"]
     told = io.BytesIO()

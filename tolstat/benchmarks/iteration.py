@@ -1,7 +1,7 @@
-"""Where a joint's time goes, and how fast its parts are against the core and against dense linear algebra.
+"""Split of a joint's time by part, and speed of the parts relative to the core's peak and to dense linear algebra.
 
-Parts are timed by themselves, many times at states of the recorded revolution, and multiplied by how often a joint
-does them; what they leave of the time of a whole joint is the rest: predictor, norms, records of grid points, results.
+Each part is timed separately, many times at states of the recorded revolution, and multiplied by its executions per
+joint. The rest is the time of a whole joint less these parts: predictor, norms, records of grid points, results.
 """
 
 from __future__ import annotations
@@ -26,30 +26,30 @@ if TYPE_CHECKING:
     from tolstat.kernel.lanes.batch import Batch
 
 TIMES = 1000
-"""How often a part is done in a measurement of one joint or of all lanes, some 1 to 10 ms."""
+"""Executions of a part in one measurement of one joint or of all lanes, some 1 to 10 ms."""
 PEAK_TIMES = 2_000_000
 STATES = 8
-"""Joints at whose states the parts are timed: they fill the lanes."""
+"""Number of joints at whose states the parts are timed: enough to fill the lanes."""
 
 
 @dataclass(frozen=True)
 class Iteration:
-    """Everything about parts.
+    """Times, operations and ratios of the parts of a simulation.
 
     Attributes
     ----------
     lanes, alone : Split
-        In lanes and one joint at a time.
+        Time of a joint by part, in lanes and one joint at a time.
     operations : dict of str to float
-        Floating-point operations of doing each part once, mean over joints; see `flops`.
+        Floating-point operations of one execution of each part, mean over joints; see `flops`.
     peak_gflops : float
-        Fused multiply-adds in lanes that the core does, counted as two operations, 1e9/s.
+        Measured peak rate of fused multiply-adds in lanes, counted as two operations, 1e9/s.
     width : int
-        Joints in lock-step.
+        Number of lanes.
     lanes_filled : float
-        Share of the lanes that have a joint, over the rounds of a block.
+        Share of the lanes that hold a joint, over the rounds of a block.
     dense : Dense
-        Against dense linear algebra.
+        Comparison with dense linear algebra.
     """
 
     lanes: Split
@@ -62,7 +62,7 @@ class Iteration:
 
 
 def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
-    """The last recorded states of the first joints."""
+    """Yield the last recorded state of each of the first n joints."""
     from tolstat.kernel.revolution.simulate import simulate_joint
 
     params, options = these
@@ -78,7 +78,7 @@ def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
 
 
 def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
-    """Lanes with a joint in each, the first again where there are fewer; their memory is their own."""
+    """Make lanes with a state in each, in memory of their own; states repeat where there are fewer than lanes."""
     from tolstat.kernel.lanes.batch import make_batch, put_joint
     from tolstat.kernel.simd.lane import WIDTH
 
@@ -95,7 +95,7 @@ def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
 
 
 def _tally(these: Sample) -> NDArray[np.int64]:
-    """Rounds, lanes with a joint in them and rounds with new tangents of all joints in lock-step."""
+    """Counts of all joints in lock-step: rounds, lanes with a joint summed over rounds, rounds with new tangents."""
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
@@ -111,7 +111,7 @@ def _tally(these: Sample) -> NDArray[np.int64]:
 
 
 def _start_counts(these: Sample, n: int) -> tuple[float, float]:
-    """Newton iterations and tangents of the start of a joint, mean."""
+    """Newton iterations and tangents of a joint's initial equilibrium, mean."""
     from tolstat.benchmarks.parts import start
     from tolstat.kernel.integrators.state import FACTORISATIONS, ITERATIONS
 
@@ -133,7 +133,7 @@ def measure(these: Sample, rounds: int) -> Iteration:
     these : Sample
         The joints.
     rounds : int
-        How often everything is timed.
+        Number of timings of each task.
 
     Returns
     -------
@@ -152,7 +152,7 @@ def measure(these: Sample, rounds: int) -> Iteration:
     start_iterations, start_tangents = _start_counts(these, len(params))
     iterations, tangents = mean["newton_iterations"] - start_iterations, mean["factorisations"] - start_tangents
     one = np.array([iterations + mean["steps"] + mean["halvings"], tangents, iterations])
-    # in lanes an equilibrium is found as a step is solved: its iterations, and the residual that ends them
+    # in lanes the initial equilibrium is solved like a step: its iterations, and the residual that ends them
     own = one + np.array([start_iterations + 1, start_tangents, start_iterations])
     lanes = WIDTH / len(params) * np.array([rounds_done, renewals, rounds_done])
     operations = _operations(snaps)
@@ -171,7 +171,7 @@ def measure(these: Sample, rounds: int) -> Iteration:
 
 
 def _tasks(these: Sample, snaps: list[Snapshot]) -> dict[str, Callable[[], object]]:
-    """What is timed, by name."""
+    """Functions to be timed, by name."""
     from scipy.linalg.lapack import dgetrf, dgetrs
 
     from tolstat.benchmarks import parts

@@ -1,4 +1,4 @@
-"""Joints of a study for the instruments, and what one of them takes: in lanes, alone, at which fidelity."""
+"""Joints of a study for the benchmarks, and CPU time of a joint: in lanes, one at a time, quasi-static."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ Table = NDArray[np.void]
 
 @dataclass(frozen=True)
 class Rates:
-    """What a joint takes on one core, and of what it consists.
+    """CPU time of a joint on one core, and counts of its numerical work.
 
     Attributes
     ----------
     joints : int
-        How many were simulated, in each way.
+        Number of joints simulated in each way.
     settled : int
-        How many of them settled.
+        Number of them that settled.
     lanes_ms, alone_ms, quasistatic_ms : float
         CPU time of a joint, ms: dynamic in lanes, dynamic one at a time, quasi-static.
     lanes_per_second, alone_per_second, quasistatic_per_second : float
@@ -40,7 +40,7 @@ class Rates:
     quasistatic_ratio, quasistatic_ratio_alone : float
         Time of a dynamic joint, in lanes and alone, over that of a quasi-static one.
     steps, iterations, factorisations, halvings, revolutions : float
-        Of a dynamic joint, mean.
+        Counts of a dynamic joint, mean.
     iterations_per_step : float
         Newton iterations a step.
     """
@@ -65,15 +65,15 @@ class Rates:
 
 
 class Sample(NamedTuple):
-    """The joints that the instruments look at.
+    """Joints of a benchmark, and their settings.
 
     Attributes
     ----------
     params : ndarray of PARAM, shape (n,)
-        They have one number of contact stations.
+        Joints, all with the same number of contact stations.
     options : Options
-        The study's settings, with BDF2 at fixed steps, dynamic fidelity and no refinement: the same work in lanes and
-        alone.
+        Settings of the study, with BDF2 at fixed steps, dynamic fidelity and no refinement: the same work in lanes and
+        one at a time.
     """
 
     params: Table
@@ -81,7 +81,7 @@ class Sample(NamedTuple):
 
 
 def sample(study: Study, n: int) -> Sample:
-    """The first random joints of a study, those with as many contact stations as the first."""
+    """Take the first n random joints of a study, and keep those with as many contact stations as the first."""
     first = int(study.sampling.nominal_first)
     rows = np.arange(first, min(first + n, study.rows))
     whole = study.sampling.method == "lhs"  # its joints cannot be drawn one by one
@@ -94,7 +94,7 @@ def sample(study: Study, n: int) -> Sample:
 
 
 def alone(params: Table, options: Options) -> NDArray[np.void]:
-    """Simulate joints one after the other, whatever they could do together; results, (n,) RESULT."""
+    """Simulate joints one after the other, without lanes; results, (n,) RESULT."""
     from tolstat.kernel.revolution.simulate import simulate_joint
 
     results = np.zeros(len(params), RESULT).view(np.recarray)
@@ -106,14 +106,14 @@ def alone(params: Table, options: Options) -> NDArray[np.void]:
 
 
 def rates(these: Sample, rounds: int) -> Rates:
-    """Measure what a joint takes.
+    """Measure the CPU time of a joint in each way, and its counts.
 
     Parameters
     ----------
     these : Sample
         The joints.
     rounds : int
-        How often all of them are simulated in each way, in turn.
+        Number of rounds; each simulates all joints once in each way.
 
     Returns
     -------

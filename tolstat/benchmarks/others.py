@@ -1,4 +1,4 @@
-"""Other integrators at the same error on the same joints, in the same run."""
+"""Compare tolstat with other integrators at the same error, on the same joints and in the same run."""
 
 from __future__ import annotations
 
@@ -24,28 +24,27 @@ if TYPE_CHECKING:
 ERROR = 1e-3
 """Error of the largest loads at which times are compared: of the worst joint, relative to its largest load."""
 STEPS = (24, 36, 60, 90, 180, 360)
-"""Steps a revolution from which the cheapest that meets it is taken."""
+"""Steps a revolution of tolstat; the cheapest that meets `ERROR` counts."""
 RTOL = (1e-2, 1e-3, 1e-4, 1e-5)
 FROM_REST = "from rest"
 
 
 @dataclass(frozen=True)
 class Contender:
-    """A way to solve the joints, at the cheapest of its settings that meets the error.
+    """An integrator at the cheapest of its settings that meets the error.
 
     Attributes
     ----------
     name : str
-        Which.
+        Name of the integrator.
     ours : bool
         Whether it is tolstat.
     setting : float or None
-        Steps a revolution, or relative tolerance.
+        Steps a revolution, or relative tolerance; None if no setting met the error.
     ms : float
-        CPU time of the median joint, ms; where no setting met the error that of the setting that took longest, which
-        to meet it would be exceeded.
+        CPU time of the median joint, ms; if no setting met the error, that of the slowest setting, a lower bound.
     error : float or None
-        Of the worst joint; None where no setting met the error.
+        Error of the worst joint; None if no setting met the error.
     ratio : float
         `ms` over that of tolstat in lanes at its cheapest setting.
     ratio_default : float
@@ -63,14 +62,14 @@ class Contender:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Who took how long.
+    """Times of all contenders at one error.
 
     Attributes
     ----------
     joints : int
-        How many joints the errors are of.
+        Number of joints compared, those with a truth.
     error : float
-        The error asked for.
+        Required error.
     contenders : list of Contender
         Tolstat's first.
     """
@@ -81,18 +80,18 @@ class Comparison:
 
 
 def compare(study: Study, joints: int, limit: float, say: Callable[[str], None]) -> Comparison:
-    """Solve some joints by tolstat and by others at several settings.
+    """Solve some joints by tolstat and by other integrators at several settings.
 
     Parameters
     ----------
     study : Study
-        Where they come from.
+        Study that the joints are drawn from.
     joints : int
-        Random ones, beside the nominal one if the study has it.
+        Number of random joints, beside the nominal one if the study has it.
     limit : float
         CPU time after which a run of another integrator is stopped, s.
     say : callable
-        Told how far it is.
+        Called with progress messages.
 
     Returns
     -------
@@ -126,7 +125,7 @@ def compare(study: Study, joints: int, limit: float, say: Callable[[str], None])
 
 
 def _from_rest(asked: Setup, options: Options, params: NDArray[np.void]) -> Iterator[OtherJob]:
-    """Radau as one would use it who has the equations only: from rest, with a torque that rises."""
+    """Jobs of Radau without tolstat's initial equilibrium: from rest, with a rising torque (`Start.RAMP`)."""
     ramp = options._replace(start=int(Start.RAMP))
     others = asked.others
     for jacobian in (False, True):
@@ -137,12 +136,12 @@ def _from_rest(asked: Setup, options: Options, params: NDArray[np.void]) -> Iter
 
 
 def contenders(points: pd.DataFrame, steps_per_rev: int) -> list[Contender]:
-    """Take of each contender the cheapest setting that meets the error.
+    """Select the cheapest setting of each contender that meets the error.
 
     Parameters
     ----------
     points : DataFrame
-        As `comparison.table.build` makes it.
+        As `work_precision.table.build` makes it.
     steps_per_rev : int
         The study's own setting.
 

@@ -1,4 +1,4 @@
-"""Parts of a joint's simulation over and over, for one joint or for lanes, so that they can be timed by themselves."""
+"""Parts of a joint's simulation, repeated for one joint or for all lanes so that each can be timed separately."""
 
 from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.mechanics.contact import contact_load
@@ -8,14 +8,14 @@ from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import fma
 
 RESIDUAL, CONTACT, ASSEMBLY, ELIMINATION, SUBSTITUTION = range(5)
-"""What `repeat` repeats: residual with contacts; contacts; tangent; tangent and its factors; a solution with them."""
+"""Parts for `repeat`: residual with contacts; contacts; tangent; tangent and its factors; a solution with them."""
 CHAINS = 10
-"""Sums that `multiply_add` carries side by side: as many as keep both units of today's cores busy."""
+"""Independent sums in `multiply_add`: as many as keep both multiply-add units of present cores busy."""
 
 
 @njit
 def repeat(part, times, t, cv, ca, motion, par, options, work):
-    """Do a part `times` times at the state ``motion.q``, ``v``, ``a`` of time `t`; cv, ca as `predict` returns them."""
+    """Execute a part `times` times at the state ``motion.q``, ``v``, ``a`` of time `t`; cv, ca as from `predict`."""
     residual(t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
     assemble(cv, ca, par, work)
     eliminate(work)
@@ -38,7 +38,7 @@ def repeat(part, times, t, cv, ca, motion, par, options, work):
 
 @njit
 def repeat_in_lanes(part, times, options, batch):
-    """`repeat` for all lanes at once, whose motion and control are those of `batch`."""
+    """Execute `repeat` for all lanes of `batch` at once, at their motion and control."""
     par, work, motion = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.motion)
     control = as_lanes(batch.control)
     repeat(part, times, control.t, control.cv, control.ca, motion, par, options, work)
@@ -46,7 +46,7 @@ def repeat_in_lanes(part, times, options, batch):
 
 @njit
 def start(rows, options, alone):
-    """Bring every joint of `rows` to its start."""
+    """Compute the initial state of every joint of `rows`."""
     work, state, ring, _ = alone
     for i in range(len(rows)):
         clear(rows[i], state, ring.samples, ring.notes)
@@ -55,7 +55,7 @@ def start(rows, options, alone):
 
 @njit
 def guess(rows, alone):
-    """Do what of the start of every joint of `rows` is not done in lanes."""
+    """Compute the rigid-body guess of every joint of `rows`, the part of the start that is not done in lanes."""
     work, state, ring, _ = alone
     for i in range(len(rows)):
         clear(rows[i], state, ring.samples, ring.notes)
@@ -64,7 +64,7 @@ def guess(rows, alone):
 
 @njit
 def multiply_add(times, batch):
-    """Add products to `CHAINS` lanes `times` times: what a core can do at most."""
+    """Do `times` fused multiply-adds in each of `CHAINS` independent lane registers: measures the core's peak rate."""
     motion = as_lanes(batch.motion)
     x, y = motion.q[0], motion.q[1]
     a, b, c, d, e = motion.v[0], motion.v[1], motion.v[2], motion.v[3], motion.v[4]

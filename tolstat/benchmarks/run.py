@@ -1,4 +1,4 @@
-"""All instruments on one study."""
+"""All benchmarks on one study."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ ROUNDS, QUICK_ROUNDS = 7, 2
 
 @dataclass(frozen=True)
 class Bench:
-    """What the instruments show.
+    """Results of all benchmarks.
 
     Attributes
     ----------
     study : str
-        Its name.
+        Name of the study.
     machine : dict of str to str
         Processor and versions.
     rates : Rates
         Joints a second.
     iteration : Iteration
-        Where the time goes.
+        Time of a joint by part.
     scaling : list of Scale
-        Over workers.
+        Joints a second for each number of workers.
     startup : Startup
-        Before the first joint.
+        Times before the first joint.
     others : Comparison or None
-        Against other integrators; None where that was left out.
+        Comparison with other integrators; None if left out.
     """
 
     study: str
@@ -46,7 +46,7 @@ class Bench:
     others: others.Comparison | None
 
     def plain(self) -> dict[str, Any]:
-        """As plain values, parts by their names; None where a ratio has no number."""
+        """Convert to plain values, parts by their names; numbers that are not finite become None."""
         facts = asdict(self)
         for name in ("lanes", "alone"):
             split = getattr(self.iteration, name)
@@ -55,7 +55,7 @@ class Bench:
 
 
 def _finite(value: Any) -> Any:
-    """None in place of numbers that JSON does not have."""
+    """Replace numbers that are not finite, which JSON lacks, by None."""
     if isinstance(value, dict):
         return {name: _finite(one) for name, one in value.items()}
     if isinstance(value, list):
@@ -64,20 +64,20 @@ def _finite(value: Any) -> Any:
 
 
 def bench(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], None]) -> Bench:
-    """Measure; two minutes, with `quick` half of one, with `cold` two more.
+    """Run all benchmarks: two minutes, half a minute with `quick`, two minutes more with `cold`.
 
     Parameters
     ----------
     path : Path
         Study file.
     n : int
-        Joints of a campaign.
+        Number of joints.
     quick : bool
-        Fewer of everything, and no other integrators: a look at the machinery, not at the figures.
+        Fewer joints and repetitions, and no other integrators: to check that the benchmarks run, not for the numbers.
     cold : bool
         Measure compilation too.
     say : callable
-        Told what is being measured.
+        Called with progress messages.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def bench(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], None
 
 
 def machine() -> dict[str, str]:
-    """Processor and versions of what computes."""
+    """Processor, system, and versions of the packages that compute."""
     import numba
     import numpy
     import scipy

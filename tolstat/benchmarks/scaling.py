@@ -19,29 +19,29 @@ from tolstat.common.tables import Options
 from tolstat.solver import simulation
 
 BLOCKS = 8
-"""Blocks that each worker is given."""
+"""Blocks per worker."""
 BLOCK = 128
-"""Joints a block."""
+"""Joints per block."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Some number of workers at work.
+    """Throughput of a number of workers.
 
     Attributes
     ----------
     workers : int
-        How many.
+        Number of workers.
     per_second : float
-        Joints a second of all together, by the clock, over the time in which all were busy.
+        Joints a second of all workers together, wall-clock time, over the time in which all were busy.
     efficiency : float
-        That over as many times the rate of one worker.
+        `per_second` over `workers` times the rate of one worker.
     cpu_efficiency : float
-        The same by processor time, which other programs on the machine do not take: what caches and memory cost.
+        The same by CPU time, which excludes other programs on the machine: shows the cost of shared caches and memory.
     worker_mb : float
         Memory of the largest worker after its last block, MB.
     growth_mb : float
-        How much it grew after the first block.
+        Growth of that memory after the first block, MB.
     """
 
     workers: int
@@ -53,7 +53,7 @@ class Scale:
 
 
 class Stint(NamedTuple):
-    """One block by one process: joints, clock when begun and done (s), processor time (s), memory then (MB)."""
+    """One block in one process: process id, joints, clock at begin and end (s), CPU time (s), peak memory (MB)."""
 
     process: int
     joints: int
@@ -77,7 +77,7 @@ def measure(these: Sample, workers: Sequence[int] | None = None) -> list[Scale]:
     these : Sample
         The joints.
     workers : sequence of int, optional
-        Numbers of processes, the first of them 1; without it up to one a core.
+        Numbers of processes, the first of them 1; by default 1, 2, 4 and so on, up to one a core.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def measure(these: Sample, workers: Sequence[int] | None = None) -> list[Scale]:
 
 
 def table(stints: dict[int, list[Stint]]) -> list[Scale]:
-    """Make the rates of each number of workers of what they did; the first is what the others are compared with."""
+    """Compute the rates of each number of workers from their blocks; the first number is the reference."""
     rates = {n: (_rate(done), _cpu_rate(done)) for n, done in stints.items()}
     first, (rate, cpu_rate) = next(iter(rates.items()))
     scales = []
@@ -113,7 +113,7 @@ def _rate(done: list[Stint]) -> float:
 
 
 def _cpu_rate(done: list[Stint]) -> float:
-    """Joints a second of processor time."""
+    """Joints per second of CPU time."""
     return sum(one.joints for one in done) / sum(one.cpu for one in done)
 
 
@@ -147,7 +147,7 @@ def _simulate(options: Options, block: NDArray[np.void]) -> Stint:
 
 
 def memory_mb() -> float:
-    """Largest memory of this process so far, MB; 0 where that is not known."""
+    """Peak memory of this process so far, MB; 0 where that is not known."""
     try:
         lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) * 1.024e-3

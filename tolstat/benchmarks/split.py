@@ -1,4 +1,4 @@
-"""A joint's time put together of its parts."""
+"""Time of a joint as the sum of its parts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class Once(NamedTuple):
-    """Seconds of doing each part once, for a joint; a lane's share of it in lanes."""
+    """Time of one execution of each part for a joint, s; in lanes, the time of all lanes over their number."""
 
     residual: float
     contact: float
@@ -20,24 +20,24 @@ class Once(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """Numbers by part: times, operations.
+    """One number per part of a simulation.
 
     Attributes
     ----------
     start : float
-        Equilibrium that a joint starts from; in lanes the guess only, from which on it is one of the lanes.
+        Initial equilibrium; in lanes its guess only, since the lanes do its iterations.
     contact : float
-        Contacts, once a residual.
+        Contacts, evaluated once per residual.
     bodies : float
         The rest of a residual: bushings and inertia.
     assembly : float
-        Tangent.
+        Assembly of the tangent.
     factor : float
-        Its elimination.
+        Elimination of the tangent.
     solve : float
         Forward and back substitution.
     rest : float
-        All else.
+        Everything else.
     """
 
     start: float
@@ -51,24 +51,24 @@ class Parts(NamedTuple):
 
 @dataclass(frozen=True)
 class Split:
-    """Where the time of a joint goes.
+    """Time of a joint by part, and rate of its operations.
 
     Attributes
     ----------
     joint_us : Parts
-        Of a joint, µs.
+        Time per joint, µs.
     once_us : Parts
-        Of doing each part once, µs; in lanes a lane's share. The rest is that of a joint.
+        Time of one execution of each part, µs; in lanes, of all lanes over their number. `rest` is per joint.
     iteration_us : float
         Time of a joint over its Newton iterations, µs.
     residuals, tangents, solutions : float
-        How often a joint has them done, in lanes with its start, alone after it; in lanes idle ones count too.
+        Executions per joint: in lanes including the start and idle lanes, alone without the start.
     flops : float
         Operations of a joint in the parts counted (not start and rest), idle lanes left out.
     gflops : float
-        Those operations over the time of those parts, 1e9/s.
+        `flops` over the time of the parts counted, 1e9/s.
     share_of_peak : float
-        That over what the core can do.
+        That rate over the core's peak rate.
     """
 
     joint_us: Parts
@@ -92,7 +92,27 @@ def split(
     operations: dict[str, float],
     peak: float,
 ) -> Split:
-    """Put a joint's time together; `counts` residuals, tangents and solutions are done for it, `own` of use."""
+    """Split the time of a joint into its parts.
+
+    Parameters
+    ----------
+    whole, start : float
+        Time of a joint, and of its start, s.
+    once : Once
+        Time of one execution of each part, s.
+    counts, own : ndarray, shape (3,)
+        Residuals, tangents and solutions executed per joint, and those of them not in idle lanes.
+    iterations : float
+        Newton iterations of a joint.
+    operations : dict of str to float
+        Floating-point operations of one execution of each part.
+    peak : float
+        Peak rate of the core, 1/s.
+
+    Returns
+    -------
+    Split
+    """
     residuals, tangents, solutions = map(float, counts)
     single = {
         "start": start,

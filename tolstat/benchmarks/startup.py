@@ -1,4 +1,4 @@
-"""What passes before the first joint: help, imports, kernels from the cache, kernels compiled anew."""
+"""Start-up times: ``--help``, time to the first joint with kernels from the cache, compilation of the kernels."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ COMPILE = "from tolstat.benchmarks.startup import compile_kernels; compile_kerne
 
 @dataclass(frozen=True)
 class Startup:
-    """Times from the start of a process, each the best of a few.
+    """Times from the start of a process; those without compilation are the shortest of a few.
 
     Attributes
     ----------
     help_s : float
-        ``tolstat --help``, by the clock.
+        ``tolstat --help``, wall-clock time.
     first_joint_s : float
-        Until the first joint of the study is simulated with kernels from the cache, by the clock.
+        Until the first joint of the study is simulated with kernels from the cache, wall-clock time.
     first_joint_cpu_s : float
-        The same in processor time.
+        CPU time of the same.
     cold_s, cold_cpu_s : float or None
-        Compiling what dynamic joints need, by the clock and in processor time; None where that was not asked for.
+        Compiling the kernels of dynamic joints, wall-clock and CPU time; None if not measured.
     cold_quasistatic_s, cold_quasistatic_cpu_s : float or None
-        Compiling what quasi-static joints need.
+        Compiling the kernels of quasi-static joints.
     """
 
     help_s: float
@@ -43,16 +43,16 @@ class Startup:
 
 
 def measure(study_path: str, cold: bool, repeats: int = 3) -> Startup:
-    """Start processes and wait for them.
+    """Measure start-up times of new processes.
 
     Parameters
     ----------
     study_path : str
         Study of which the first joint is simulated.
     cold : bool
-        Compile everything too, into an empty cache of its own: minutes.
+        Measure compilation too, into an empty cache of its own: minutes.
     repeats : int
-        How often what is short is done.
+        Repetitions of the measurements without compilation.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def measure(study_path: str, cold: bool, repeats: int = 3) -> Startup:
 
 
 def first_joint(study_path: str) -> None:
-    """Simulate the first joint of a study as a campaign does; what this process is started for."""
+    """Simulate the first joint of a study as a campaign does; `measure` calls this in a new process."""
     from tolstat import joint, sampling, study
     from tolstat.solver import simulation
     from tolstat.store.recorded import perturbed
@@ -88,7 +88,7 @@ def first_joint(study_path: str) -> None:
 
 
 def compile_kernels(fidelity: str) -> None:
-    """Compile what joints of a fidelity need; what this process is started for."""
+    """Compile the kernels for joints of a fidelity; `measure` calls this in a new process."""
     from tolstat.common.tables import Fidelity, Options
     from tolstat.solver import simulation
 
@@ -96,7 +96,7 @@ def compile_kernels(fidelity: str) -> None:
 
 
 def _run(arguments: list[str], environment: dict[str, str]) -> tuple[float, float]:
-    """Seconds that a Python takes, by the clock and in processor time."""
+    """Run a Python process; its wall-clock and CPU time, s."""
     before, begin = _children_s(), time.perf_counter()
     subprocess.run([sys.executable, *arguments], env=environment, stdout=subprocess.DEVNULL, check=True)
     return time.perf_counter() - begin, _children_s() - before

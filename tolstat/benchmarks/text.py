@@ -1,4 +1,4 @@
-"""Text of the instruments."""
+"""Text output of the benchmarks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tolstat.display.text import align
 
 
 def text(found: Bench) -> str:
-    """Text of all that was measured, section by section."""
+    """Text of all measurements, section by section."""
     machine = ", ".join(f"{name} {value}" for name, value in found.machine.items())
     sections = [
         (_rates_title(found.rates), _rates(found.rates)),

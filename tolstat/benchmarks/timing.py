@@ -1,4 +1,4 @@
-"""CPU times of things done in turn: what else the machine does falls on all of them, so that ratios hold."""
+"""CPU times of tasks run in turn: other load on the machine affects all of them alike, so that ratios stay valid."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Times(NamedTuple):
     Attributes
     ----------
     seconds : dict of str to ndarray, shape (rounds,)
-        What each took, s.
+        CPU time of each task, s.
     """
 
     seconds: dict[str, NDArray[np.float64]]
@@ -26,7 +26,7 @@ class Times(NamedTuple):
         return float(np.median(self.seconds[name]))
 
     def least(self, name: str) -> float:
-        """Least of the rounds, s: what else the machine does only adds to a time."""
+        """Minimum over the rounds, s: other load on the machine only adds to a time."""
         return float(self.seconds[name].min())
 
     def ratio(self, name: str, to: str) -> float:
@@ -37,16 +37,16 @@ class Times(NamedTuple):
 def in_turn(
     tasks: Mapping[str, Callable[[], object]], rounds: int, clock: Callable[[], float] = time.process_time
 ) -> Times:
-    """Do all tasks one after the other, then all again; a round before that is not counted.
+    """Time all tasks one after the other, round by round, after a warm-up round that is not counted.
 
     Parameters
     ----------
     tasks : dict of str to callable
         What to time, by name.
     rounds : int
-        How often.
+        Number of rounds.
     clock : callable, optional
-        Seconds; CPU time of this process without it.
+        Clock in seconds; by default the CPU time of this process.
 
     Returns
     -------

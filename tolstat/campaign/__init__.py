@@ -1,1 +1,1 @@
-"""Pending rows through executors into the result file."""
+"""Campaigns: simulate the pending rows of a result file; plan, verify, replay, extend and stop them."""

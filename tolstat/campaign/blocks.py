@@ -1,4 +1,4 @@
-"""The pending rows of a result file, in blocks, through the simulation, wherever that runs."""
+"""Simulate the pending rows of a result file in blocks, on any executor."""
 
 from __future__ import annotations
 
@@ -23,40 +23,41 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 FIRST_BLOCK, MAX_BLOCK = 256, 2048
-"""Largest default block, before and after it is known how long a joint takes: enough to keep lanes busy, and at most 90
-MB of histories."""
+"""Largest default number of joints in a block, before and after the time per joint is known: enough to keep the lanes
+busy, and at most 90 MB of histories."""
 BLOCKS_PER_WORKER = 4
-"""Least blocks a worker by default, so that none is long idle at the end."""
+"""Minimum number of blocks per worker by default, so that no worker is idle for long at the end."""
 LEAST_S, MOST_S = 1.0, 8.0
-"""How long a block shall take, in seconds: that is what a kill costs."""
+"""Smallest and largest target duration of a block, s: a kill loses the blocks in work."""
 WRITE_SHARE, PARENT_SHARE = 0.05, 0.25
-"""Most of a block's time that writing it may take, and most of the parent's time that writing may: beyond a quarter the
-workers begin to wait for it. A block waits twice for the disk, 5 to 50 ms together, however large it is."""
+"""Largest share of a block's simulation time that writing it may take, and largest share of the parent's time spent on
+writing: beyond a quarter the workers begin to wait for the parent. Writing a block waits twice for the disk, 5 to 50 ms
+together, whatever the block's size."""
 JOINT_TIMEOUT_S = 300.0
-"""Default of the longest time for a joint, in seconds: a thousand times what most take."""
+"""Default time limit of a joint, s: a thousand times what most joints take."""
 
 
 class Stages(NamedTuple):
-    """The functions that a campaign strings together; tests put simple ones in their place.
+    """Functions that a campaign calls in sequence; tests substitute simple ones.
 
     Attributes
     ----------
     draw : callable
-        Study, rows of the campaign (range) -> their errors, tables ERROR one after the other.
+        Study, rows of the campaign (range) -> their errors, consecutive tables ERROR.
     dimensions : callable
-        () -> dimension of the sequence by name of error.
+        () -> dimension of the sampling sequence, by name of the error.
     perturb : callable
         Joint, (m,) table ERROR -> (m,) table PARAM.
     history_specs : callable
-        Options, kind of histories, number of harmonics -> what each history holds for a joint.
+        Options, kind of histories, number of harmonics -> HistorySpec by name of the history.
     simulate : callable
-        (m,) table PARAM, Options, ``histories=``, ``n_harmonics=`` -> Simulation; goes to other processes.
+        (m,) table PARAM, Options, ``histories=``, ``n_harmonics=`` -> Simulation; pickled to other processes.
     warm_up : callable
-        Compiles what `simulate` needs. Done before there are workers: two processes that compile into one
-        cache can crash. Then done in each of them, to load it.
+        Compiles what `simulate` needs. Called before workers start, because two processes that compile into one
+        cache can crash; then called in each worker, to load the compiled code.
     origins : callable
-        Study, rows of the campaign (range) -> how they were drawn, tables one after the other, or None where the
-        sampling method has no such table (`origins.columns`).
+        Study, rows of the campaign (range) -> how they were drawn, consecutive tables, or None if the sampling
+        method has no such table (`draw_records.columns`).
     """
 
     draw: Callable[..., Iterable[NDArray[np.void]]]
@@ -70,21 +71,21 @@ class Stages(NamedTuple):
 
 @dataclass(frozen=True)
 class Execution:
-    """Where and how the joints are simulated, which changes no number.
+    """Where and how the joints are simulated; does not affect results.
 
     Attributes
     ----------
     kind : {"processes", "serial", "dask"}, optional
-        Supervised worker processes, this process, or a cluster; without it processes if there are several workers.
-        In this process nothing protects the campaign from a joint that crashes or hangs.
+        Supervised worker processes, this process, or a cluster; without it processes if there are several workers
+        and blocks. In this process nothing protects the campaign from a joint that crashes or hangs.
     workers : int, optional
-        Processes; without it as many as there are cores.
+        Number of processes; without it the number of cores.
     block : int, optional
-        Joints a block; without it seconds of work, see `Pace`.
+        Joints per block; without it as many as take some seconds, see `Pace`.
     joint_timeout : float
-        Longest time for a joint, in seconds. A block that takes longer is done again joint by joint.
+        Time limit of a joint, s. A block that takes longer is simulated again joint by joint.
     scheduler : str, optional
-        Address of a Dask scheduler, as ``tcp://host:8786``; without it a cluster of this machine.
+        Address of a Dask scheduler, such as ``tcp://host:8786``; without it a cluster is started on this machine.
     """
 
     kind: Literal["processes", "serial", "dask"] | None = None
@@ -95,35 +96,35 @@ class Execution:
 
 
 class Block(NamedTuple):
-    """Rows of a file that are simulated together, their parameters, and how."""
+    """File slots that are simulated together, their parameters and their solver options."""
 
     rows: NDArray[np.intp]
     params: NDArray[np.void]
     options: Options
 
     def split(self) -> list[Block]:
-        """Row by row."""
+        """Split into blocks of one joint each."""
         return [Block(self.rows[i : i + 1], self.params[i : i + 1], self.options) for i in range(len(self.rows))]
 
 
 class Timed(NamedTuple):
-    """What simulating a block gave, and the seconds that it took."""
+    """Result of simulating a block, and the time that it took, s."""
 
     simulation: Simulation
     seconds: float
 
 
 class Pace:
-    """How many joints make a block: at first a few, then by what the blocks so far took.
+    """Number of joints per block: small at first, then adapted to the time that finished blocks took.
 
     Parameters
     ----------
     n_pending : int
-        Joints to be done.
+        Number of joints to simulate.
     workers : int
-        Processes that do them.
+        Number of processes.
     fixed : int, optional
-        Number of joints asked for, which nothing changes.
+        Constant number of joints per block, if one was asked for.
     """
 
     def __init__(self, n_pending: int, workers: int, fixed: int | None) -> None:
@@ -133,22 +134,22 @@ class Pace:
         self._size = fixed or default_block(n_pending, workers)
 
     def take(self, available: int) -> int:
-        """Size of the next block, of which the joints count as handed out."""
-        last = max(self._left // (BLOCKS_PER_WORKER * self._workers), -(-self._size // 4))  # none is long idle
+        """Return the size of the next block, and count its joints as handed out."""
+        last = max(self._left // (BLOCKS_PER_WORKER * self._workers), -(-self._size // 4))  # no worker is idle for long
         size = min(available, self._fixed or min(self._size, last))
         self._left -= size
         return size
 
     def note(self, joints: int, simulating_s: float, writing_s: float) -> None:
-        """Take note of how long a worker took for a block, and the parent for writing it."""
+        """Adapt the size of blocks to the time a worker took for a block and the parent took to write it."""
         aim = writing_s * max(1 / WRITE_SHARE, self._workers / PARENT_SHARE)
         wanted = min(max(aim, LEAST_S), MOST_S) * joints / max(simulating_s, 1e-9)
-        step = min(max(wanted, 0.5 * self._size), 2.0 * self._size)  # one odd block shall not decide
+        step = min(max(wanted, 0.5 * self._size), 2.0 * self._size)  # limits the effect of one untypical block
         self._size = max(1, min(MAX_BLOCK, round(step)))
 
 
 class Finished(NamedTuple):
-    """Rows of a file, what simulating them gave, and why if they were given up."""
+    """File slots, their simulation, and the reason why they were given up, if they were; else empty."""
 
     rows: NDArray[np.intp]
     simulation: Simulation
@@ -156,7 +157,7 @@ class Finished(NamedTuple):
 
 
 def pending(store: ResultStore, last: int) -> Iterator[NDArray[np.intp]]:
-    """Pending rows of the file before its row `last`, in arrays as the store gives them."""
+    """Yield the pending file slots below `last`, in arrays as from `ResultStore.pending_blocks`."""
     for rows in store.pending_blocks():
         if rows[0] >= last:
             return
@@ -166,14 +167,14 @@ def pending(store: ResultStore, last: int) -> Iterator[NDArray[np.intp]]:
 def simulate_pending(
     study: Study, store: ResultStore, last: int, stages: Stages, execution: Execution, stop: Callable[[], bool]
 ) -> Generator[Finished, None, None]:
-    """Simulate the pending rows of a file before its row `last`.
+    """Simulate the joints in the pending file slots below `last`.
 
     Close the generator (`contextlib.closing`) when leaving it early.
 
     Raises
     ------
     WorkerDied
-        When worker processes die whatever they work at.
+        When worker processes die whichever block they work on.
     """
     todo = sum(len(rows) for rows in pending(store, last))
     workers = execution.workers or executor.available_workers()
@@ -211,12 +212,12 @@ def simulate_pending(
 
 
 def default_block(n_pending: int, workers: int) -> int:
-    """Return how many joints make the first blocks: a second of work or so, and several blocks a worker."""
+    """Return the number of joints in the first blocks: about a second of work, and several blocks per worker."""
     return max(1, min(FIRST_BLOCK, n_pending // (BLOCKS_PER_WORKER * workers)))
 
 
 def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec]) -> Simulation:
-    """Make what stands in the file for joints that have no results: NaN and a status, (n,)."""
+    """Return what the file stores for `n` joints that have no results: the given status and NaN."""
     return Simulation(without_results(n, status), {name: spec.blank(n) for name, spec in specs.items()})
 
 
@@ -254,7 +255,7 @@ def _simulate(
     specs: Mapping[str, HistorySpec],
     block: Block,
 ) -> Timed:
-    """Simulate a block and see how long it takes."""
+    """Simulate a block and measure the time that it takes."""
     begin = time.perf_counter()
     simulation = _simulate_finite(simulate, histories, n_harmonics, specs, block)
     return Timed(simulation, time.perf_counter() - begin)
@@ -267,7 +268,7 @@ def _simulate_finite(
     specs: Mapping[str, HistorySpec],
     block: Block,
 ) -> Simulation:
-    """Simulate the joints of a block whose parameters are finite numbers."""
+    """Simulate the joints of a block with finite parameters; the others get INVALID_INPUT."""
     good = _finite(block.params)
     whole = without_simulation(len(good), Status.INVALID_INPUT, specs)
     if not good.any():

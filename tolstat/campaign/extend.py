@@ -1,4 +1,4 @@
-"""Campaigns that grow, and campaigns computed in parts."""
+"""Extend a campaign by further joints; merge the slices of a campaign."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ CANNOT_GROW = {
 
 
 class Merged(NamedTuple):
-    """What a merge came to.
+    """Outcome of a merge.
 
     Attributes
     ----------
     counts : Counts
-        State of the joints of the campaign.
+        Numbers of joints of the campaign by status.
     twice : int
-        Rows that more than one file holds, all with the same results.
+        Number of surplus copies of rows that several files hold with the same results.
     """
 
     counts: Counts
@@ -48,19 +48,19 @@ class Merged(NamedTuple):
 
 
 def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
-    """Give a campaign further joints, pending: the next ones of its sequence.
+    """Add further joints to a campaign, pending: the next ones of its sampling sequence.
 
-    Nothing that the file holds changes. `campaign.run` with the study returned simulates the new joints; the datasets
-    are then those of a campaign that had `n` joints from the start.
+    Existing rows do not change. `campaign.run` with the returned study simulates the new joints; the datasets are then
+    equal to those of a campaign that had `n` joints from the start.
 
     Parameters
     ----------
     path : Path
-        Result file of a whole campaign; with histories, a complete one. It is replaced when the new one is complete.
+        Result file of a whole campaign; with histories, no row may be pending. A new file replaces it when complete.
     n : int
-        Number of joints that it shall have, the nominal one not counted.
+        New number of joints, without the nominal joint.
     study_path : Path, optional
-        The study file, where the text in the result file does not do any more.
+        The study file, if the study text in the result file can no longer be read.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
     Raises
     ------
     InputError
-        When the campaign cannot be extended to `n` joints, or its study not be read.
+        When the campaign cannot be extended to `n` joints, or its study cannot be read.
     StoreError
         When the file cannot be used or replaced.
     """
@@ -88,16 +88,16 @@ def grow(
     errors: Iterable[NDArray[np.void]],
     origin: Iterable[NDArray[np.void]] | None = None,
 ) -> None:
-    """Replace a result file by one with further rows, pending; nothing that it holds changes.
+    """Replace a result file by one with further pending rows; existing rows do not change.
 
     Parameters
     ----------
     store : ResultStore
-        The file, open for writing; of no use afterwards.
+        The file, open for writing; not usable afterwards.
     study : Study
         The study of the larger campaign.
     errors, origin : iterable of tables
-        Errors of the further rows, block after block; how they were drawn, where `origins.columns` has that.
+        Errors of the further rows in consecutive blocks; how they were drawn, for methods with `draw_records.columns`.
 
     Raises
     ------
@@ -115,10 +115,10 @@ def grow(
 
 
 def merge(paths: Sequence[Path], out: Path) -> Merged:
-    """Put the files of slices together to the file of the whole campaign, equal to that of one run.
+    """Merge the files of slices into the file of the whole campaign, equal to that of a single run.
 
-    Rows may be in several files if their results are the same to the last bit. Rows that are pending in all of
-    their files are pending in the new one; `campaign.run` goes on with them.
+    A row may be in several files if its results are the same to the last bit. Rows that are pending in all files
+    are pending in the new one; `campaign.run` resumes them.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
     InputError
         When the files are not of one campaign, made by one version of the code, or do not cover it; with all faults.
     StoreError
-        When a file cannot be used, or `out` not be made.
+        When a file cannot be used, or `out` cannot be created.
     """
     check_free(out)
     with ExitStack() as opened:
@@ -221,7 +221,7 @@ def _missing(stores: Sequence[ResultStore]) -> list[range]:
 
 
 def _shares(stores: Sequence[ResultStore]) -> Iterator[tuple[ResultStore, int]]:
-    """Files that add rows to those of the files before them, and from which of their rows on."""
+    """Yield each file that adds rows to those of the files before it, and the first file slot that does."""
     covered = 0
     for store in stores:
         if store.rows.stop > covered:

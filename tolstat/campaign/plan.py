@@ -1,4 +1,4 @@
-"""What a campaign will take and give, from a few of its joints."""
+"""Predict time, memory and precision of a campaign from a pilot of its joints."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 PILOT = 128
-"""Joints: fewer would not fill the lanes as a campaign does."""
+"""Default number of joints in the pilot: fewer would not fill the lanes as a campaign does."""
 SHARES = (0.5, 0.1, 0.01)
-"""Exceedances for which the width of the interval is told."""
+"""Exceedances for which the width of the interval is predicted."""
 QUANTILES = (0.95, 0.99, 0.999)
 ORDINARY = 600.0
-"""Newton iterations of a joint that does not rattle: of `studies/iso2768_f.toml` with the default settings."""
+"""Newton iterations of a joint that does not rattle, from `studies/iso2768_f.toml` with the default settings."""
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
 class LimitPlan:
-    """What is to be expected of one limit.
+    """Predicted precision for one limit.
 
     Attributes
     ----------
@@ -48,10 +48,10 @@ class LimitPlan:
     level : float
         The limit, SI.
     above, of : int
-        Joints of the pilot above it, and valid joints of the pilot.
+        Joints of the pilot above the limit, and valid joints of the pilot.
     width : float
-        Largest width that the interval of the campaign has for any exceedance that the pilot leaves possible (its
-        own interval, at the same confidence).
+        Largest width of the campaign's interval for any exceedance inside the pilot's own interval, both with the
+        same confidence.
     """
 
     load: str
@@ -68,12 +68,12 @@ class Reversals:
     Attributes
     ----------
     joints : int
-        Such joints.
+        Number of such joints.
     torque : float
-        Least torque at which none of them would, N m; None without any.
+        Smallest torque at which none of them would reverse, N m; None if none does.
     cost : float
-        Newton iterations of such a joint in those of one whose torque does not reverse; without any of these, in
-        `ORDINARY`.
+        Mean Newton iterations of such a joint relative to those of the pilot's other joints, or to `ORDINARY` if there
+        are no others; None if none reverses.
     """
 
     joints: int
@@ -83,38 +83,38 @@ class Reversals:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a campaign will take and give.
+    """Predicted cost and precision of a campaign.
 
     Attributes
     ----------
     rows : int
-        Joints, the nominal one included.
+        Number of joints, including the nominal joint.
     dimensions : int
-        Errors that scatter, a radial one as two.
+        Number of errors that scatter; a radial error counts as two.
     pilot : int
-        Joints simulated for this plan.
+        Number of joints simulated for this plan.
     failed, unsettled : int
-        Joints among them without a valid load.
+        Numbers of pilot joints without a valid load.
     fidelity : str
-        What ``solver.fidelity = "auto"`` chooses, and why; empty where the study says it.
+        What ``solver.fidelity = "auto"`` chooses, and why; empty if the study gives the fidelity.
     seconds_per_joint : float
         Mean processor time of a joint, s: its time in one process that has a core of its own.
     workers : int
-        Processes of the campaign.
+        Number of processes of the campaign.
     seconds : float
-        Time of the campaign if every process has a core of its own, s, without start and compilation.
+        Time of the campaign if every process has a core of its own, s, without start-up and compilation.
     process_bytes : int
-        Largest memory of this process so far; the campaign has one such for each worker, and itself.
+        Peak memory of this process so far; the campaign needs as much for each worker and for its parent process.
     file_bytes : int
-        Size of the result file. Histories are compressed; theirs is that of the pilot's.
+        Size of the result file; the compressed size of histories is extrapolated from the pilot.
     widths : dict of float to float
-        Exceedance to the width of its interval; empty where samples are not independent.
+        Width of the interval by exceedance; empty if samples are not independent.
     limits : list of LimitPlan
-        The study's limits; empty likewise.
+        Predictions for the study's limits; empty if samples are not independent.
     reversals : Reversals
         Joints that rattle.
     wilks : dict of float to int
-        Quantile to the joints that its one-sided bound needs at least.
+        Minimum number of joints for a one-sided bound, by quantile.
     """
 
     rows: int
@@ -135,16 +135,16 @@ class Plan:
 
 
 def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
-    """Simulate some joints of a study, spread over its rows, and say what all of them will take and give.
+    """Simulate a pilot of joints, spread over the study's rows, and predict cost and precision of the campaign.
 
     Parameters
     ----------
     study : Study
         The study.
     workers : int, optional
-        Processes of the campaign; without it as many as there are cores.
+        Number of processes of the campaign; without it the number of cores.
     pilot : int
-        Joints to simulate; the study's, if it has fewer.
+        Number of joints to simulate; at most all joints of the study.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def _errors(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:
 
 
 def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[Simulation, float]:
-    """Simulate each joint with its own settings; also tell the processor time of all together, s."""
+    """Simulate each joint with its own options; also return the total processor time, s, without compilation."""
     kinds = study.output.histories, study.output.harmonics
     specs = history_specs(options[0], *kinds)
     whole = Simulation(np.empty(len(params), RESULT), {name: spec.blank(len(params)) for name, spec in specs.items()})
@@ -232,7 +232,7 @@ def _limits(study: Study, results: NDArray[np.void]) -> list[LimitPlan]:
 def _file_bytes(
     study: Study, errors: NDArray[np.void], simulation: Simulation, options: Options, choice: Mapping[str, Any]
 ) -> int:
-    """Size of the result file, from one in memory with the pilot's joints."""
+    """Predict the size of the result file from one in memory with the pilot's joints."""
     specs = history_specs(options, study.output.histories, study.output.harmonics)
     n = len(errors)
     design = study.design[:n] if study.case_names else None

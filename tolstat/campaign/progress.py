@@ -1,4 +1,4 @@
-"""How far a campaign is, on stderr: a bar on a terminal, otherwise a line a minute."""
+"""Progress of a campaign on stderr: a bar on a terminal, otherwise one line a minute."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ LINE_S = 60.0
 
 
 class Reporter(Protocol):
-    """What a campaign tells its progress to; called once at the start, then after every block."""
+    """Callback for the progress of a campaign; called once at the start, then after every block."""
 
     def __call__(self, counts: Counts) -> None:
-        """Take note of `counts`."""
+        """Report the progress `counts`."""
 
 
 def text(counts: Counts, begun: int, seconds: float) -> str:
-    """One line about a campaign.
+    """Describe the progress of a campaign in one line.
 
     Parameters
     ----------
     counts : Counts
-        How far it is.
+        Current counts.
     begun : int
         Joints that were done at the start.
     seconds : float
@@ -50,7 +50,7 @@ def text(counts: Counts, begun: int, seconds: float) -> str:
 
 
 def note(text: str) -> None:
-    """Say on stderr what happened to a joint."""
+    """Print a message on stderr."""
     print(f"tolstat: {text}", file=sys.stderr, flush=True)
 
 
@@ -61,14 +61,14 @@ def _clock(seconds: float) -> str:
 
 
 class Lines:
-    """Progress as a line a minute, and one when the campaign ends.
+    """Progress as one line a minute, and one at the end of the campaign.
 
     Parameters
     ----------
     stream : file, optional
         Where the lines go; stderr without it.
     clock : callable, optional
-        Time in seconds.
+        () -> time, s.
     """
 
     def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
@@ -88,7 +88,7 @@ class Lines:
             self._print()
 
     def __call__(self, counts: Counts) -> None:
-        """Take note of `counts`, and say them if a minute has passed."""
+        """Record `counts`, and print them if a minute has passed."""
         now = self._clock()
         if self._start is None:
             self._start = counts.done, now
@@ -99,7 +99,7 @@ class Lines:
             self._print()
 
     def note(self, text: str) -> None:
-        """Say what happened to a joint."""
+        """Print a message."""
         print(f"tolstat: {text}", file=self._stream or sys.stderr, flush=True)
 
     def _print(self) -> None:
@@ -141,11 +141,11 @@ class Bar:
         self._bar.update(self._bar.task_ids[0], completed=counts.done, description=words)
 
     def note(self, text: str) -> None:
-        """Say above the bar what happened to a joint."""
+        """Print a message above the bar."""
         if self._bar is not None:
             self._bar.console.print(f"tolstat: {text}", markup=False, highlight=False)
 
 
 def reporter() -> Bar | Lines:
-    """Return the progress for this stderr: a context manager to give to `campaign.run`."""
+    """Return the progress display that suits stderr: a context manager to pass to `campaign.run`."""
     return Bar() if sys.stderr.isatty() else Lines()

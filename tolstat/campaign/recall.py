@@ -1,4 +1,4 @@
-"""The study of a campaign, from its result file."""
+"""Restore the study of a campaign from its result file."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -
     Parameters
     ----------
     store : ResultStore
-        The file. It keeps the text of its study; a joint file or measured data that the text names by a path are
-        looked for from the result file's folder.
+        The file, which holds the text of its study. Relative paths in the text, of a joint file or of measured data,
+        are resolved from the result file's folder.
     n : int, optional
         Number of joints instead of the campaign's.
     path : Path, optional
-        The study file to take instead of the text.
+        The study file to read instead of the text.
 
     Returns
     -------
@@ -33,9 +33,9 @@ def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -
     Raises
     ------
     InputError
-        When the study cannot be read any more.
+        When the study can no longer be read.
     StoreError
-        When it gives another campaign than the one in the file.
+        When the study does not have the identity of the campaign in the file.
     """
     held = store.sampling["n"]
     source = path if path is not None else store.path.parent / f"{store.study_name}.toml"
@@ -55,7 +55,7 @@ def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -
 
 
 def _solver(store: ResultStore, study: Study) -> Solver:
-    """Settings that the file was made with: those of its study, but for the files of two fidelities."""
+    """Solver settings of the file; they differ from those in the study's text in campaigns at two fidelities."""
     held = {key.removeprefix("solver."): value for key, value in store.identity.items() if key.startswith("solver.")}
     own = study.solver.model_dump()
     changed = {key: value for key, value in held.items() if key in own and own[key] != value}

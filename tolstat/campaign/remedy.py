@@ -15,14 +15,14 @@ ALLOWED_REVS, ALLOWED_STEPS = 1000, 20_000
 
 
 def remedy(row: np.void, options: Mapping[str, Any]) -> str:
-    """Say which setting solves it, or what the results are good for.
+    """Return which setting may help, or what the results can be used for.
 
     Parameters
     ----------
     row : record of RESULT
         The joint.
     options : mapping
-        Settings that it was simulated with, a key for each field of `Options`.
+        Solver options of the joint, one key for each field of `Options`.
 
     Returns
     -------

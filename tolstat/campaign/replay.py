@@ -1,4 +1,4 @@
-"""One joint of a campaign again, from its result file alone, and whether it comes out as it is stored."""
+"""Simulate one joint of a campaign again from its result file alone, and compare with the stored results."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from tolstat.store.recorded import options_of, parameters
 
 
 class Difference(NamedTuple):
-    """A value that did not come out as it is stored.
+    """A value that differs from the stored one.
 
     Attributes
     ----------
     name : str
         Column of the results, or ``histories/`` and the name of a history.
     stored, now : float
-        The value; for a history the two values that are furthest apart.
+        Stored and new value; for a history those of the sample with the largest difference.
     """
 
     name: str
@@ -35,14 +35,14 @@ class Difference(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """Difference relative to the larger of both; infinite where one is not finite."""
+        """Difference relative to the larger magnitude of the two; infinite if one is not finite."""
         if not np.isfinite([self.stored, self.now]).all():
             return np.inf
         return abs(self.now - self.stored) / max(abs(self.now), abs(self.stored))
 
 
 class Replay(NamedTuple):
-    """A joint computed again.
+    """A joint simulated again.
 
     Attributes
     ----------
@@ -51,11 +51,11 @@ class Replay(NamedTuple):
     result : CaseResult
         The joint, with full histories.
     stored : Status
-        What became of it in the campaign.
+        Status of the joint in the campaign.
     differences : list of Difference
         Values that are not the same to the last bit.
     code : list of str
-        What of the code is another than that which made the file: ``"numpy: 2.1.0 then, 2.4.6 now"``.
+        Software versions that differ from those that made the file: ``"numpy: 2.1.0 then, 2.4.6 now"``.
     """
 
     row: int
@@ -66,7 +66,7 @@ class Replay(NamedTuple):
 
 
 def replay(store: ResultStore, row: int) -> Replay:
-    """Compute a joint of a campaign again.
+    """Simulate a joint of a campaign again and compare with the stored results.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def replay(store: ResultStore, row: int) -> Replay:
     Raises
     ------
     InputError
-        When the file has no such row, it is pending, or the file's joint or options mean nothing to this version.
+        When the file has no such row, the row is pending, or this version cannot read the file's joint or options.
     """
     place = str(store.path)
     if row not in store.rows:

@@ -1,4 +1,4 @@
-"""Joints that ended in some states, once more: with other settings of the solver, or as they were."""
+"""Simulate joints with a given status again, with other solver settings or with the same."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Retry(NamedTuple):
     Attributes
     ----------
     status : tuple of Status
-        States of the joints.
+        Status of the joints that are simulated again.
     settings : dict
-        Settings other than the study's, ``{"solver.steps_per_rev": 360}``.
+        Settings that replace the study's, ``{"solver.steps_per_rev": 360}``.
     options : Options
-        All settings.
+        Complete solver options.
     auto : bool
         Whether fidelity and steps a revolution are those that ``solver.fidelity = "auto"`` chose for the campaign.
     """
@@ -40,17 +40,17 @@ class Retry(NamedTuple):
     auto: bool = False
 
     def chosen(self, record: Mapping[str, Any]) -> Retry:
-        """Take over what ``auto`` chose for a campaign, where nothing else is asked for."""
+        """Return the retry with the fidelity and steps that ``auto`` chose for the campaign, if `auto` is true."""
         return self._replace(options=fidelity.apply(self.options, record)) if self.auto else self
 
     def entry(self) -> dict[str, Any]:
-        """What the result file keeps of it."""
+        """Return the entry for `retries` of the result file."""
         status = [state.label for state in self.status]
         return {"status": status, "settings": self.settings, "options": self.options._asdict()}
 
 
 def parse(states: str, settings: Sequence[str], study: Study) -> Retry:
-    """Read what a user has asked for.
+    """Parse a retry from the arguments of the command line.
 
     Parameters
     ----------
@@ -94,11 +94,11 @@ def _setting(text: str) -> tuple[str, Any]:
     try:
         return key.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
-        return key.strip(), value.strip()  # a word, which a shell has taken the quotes from
+        return key.strip(), value.strip()  # a string whose quotes the shell has removed
 
 
 def begin(store: ResultStore, retry: Retry, specs: Mapping[str, HistorySpec], tell: Callable[[str], None]) -> None:
-    """Make the joints pending that are to be simulated again, unless this very retry is under way in the file.
+    """Mark the joints of a retry as pending, unless the same retry is already under way in the file.
 
     Parameters
     ----------
@@ -107,9 +107,9 @@ def begin(store: ResultStore, retry: Retry, specs: Mapping[str, HistorySpec], te
     retry : Retry
         Which joints, and how.
     specs : mapping of str to HistorySpec
-        Histories that joints simulated so would have.
+        Histories that joints would have with the settings of the retry.
     tell : callable
-        Told how many joints there are.
+        Called with a message that gives the number of joints.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A campaign: the pending rows of a result file through the simulation and back into the file."""
+"""Run a campaign: simulate the pending rows of a result file and write their results to it."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class Interrupted(Exception):
     path : Path
         The result file.
     counts : Counts
-        How far the campaign is.
+        Numbers of joints by status.
     exit_code : int
-        128 and the number of the signal: 130 after Ctrl-C, 143 after SIGTERM.
+        128 plus the number of the signal: 130 after Ctrl-C, 143 after SIGTERM.
     """
 
     def __init__(self, path: Path, counts: Counts, number: int = signal.SIGINT) -> None:
@@ -65,51 +65,51 @@ def run(
     tell: Callable[[str], None] = note,
     check: bool = True,
 ) -> Counts:
-    """Simulate the joints of a study that its result file does not hold yet.
+    """Simulate the joints of a study whose results its result file does not hold yet.
 
-    Neither workers nor blocks nor interruptions change a number in the file.
+    The number of workers, the block size and interruptions do not affect the results.
 
     Parameters
     ----------
     study : Study
         The study.
     out : str or Path
-        Result file; made if it does not exist, otherwise its pending rows are done, and limits, text and name of the
-        study taken over.
+        Result file; created if it does not exist. Otherwise its pending rows are simulated, and its limits, study
+        text and study name are updated from `study`.
     workers, block : int, optional
-        Short for an `Execution` of these.
+        Shorthand for an `Execution` with these; ignored if `execution` is given.
     progress : Reporter, optional
-        Told how far the campaign is, at the start and after every block.
+        Called with the counts at the start and after every block.
     stages : Stages, optional
-        Other functions than tolstat's own.
+        Functions that replace tolstat's own.
     rows : range, optional
-        Rows of the campaign that the file holds, a slice of it; all without it.
+        Rows of the campaign that the file holds, if a slice; all without it.
     until_row : int, optional
         Rows of the campaign from this one on are left pending.
     execution : Execution, optional
         Where and how to simulate.
     retry : Retry, optional
-        Joints that are simulated once more, and how.
+        Joints that are simulated again, and how.
     tell : callable, optional
-        Told which fidelity ``auto`` has chosen, why a joint was given up, and how many are simulated once more.
+        Called with messages: fidelity that ``auto`` chose, why a joint was given up, how many are simulated again.
     check : bool
-        Simulate a few of the joints in other ways at the end, to know the numerical error; see `verify.small`.
+        Whether to verify a few joints at the end, to estimate the numerical error; see `verify.small`.
 
     Returns
     -------
     Counts
-        How the joints ended.
+        Numbers of joints by status.
 
     Raises
     ------
     InputError
-        When workers, block or time limit cannot be, or `rows` are none of the study's.
+        When workers, block size or time limit are not positive, or `rows` are not rows of the study.
     StoreError
-        When the file is of another study or was begun by other code (it names what differs), or cannot be used.
+        When the file is of another study or other code (the message names the differences), or cannot be used.
     Interrupted
         When Ctrl-C was pressed or the process was asked to end.
     WorkerDied
-        When worker processes die whatever they work at; the file holds all finished blocks.
+        When worker processes die whichever block they work on; the file holds all finished blocks.
     """
     execution = execution or Execution(workers=workers, block=block)
     _check_positive(workers=execution.workers, block=execution.block, joint_timeout=execution.joint_timeout)
@@ -210,13 +210,13 @@ def _create_or_resume(
 
 
 def _rows_of(study: Study, store: ResultStore, stages: Stages, rows: NDArray[np.intp]) -> NDArray[np.void]:
-    """Parameters of rows of the file, (m,) table PARAM."""
+    """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
     errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
     return perturbed(study, rows + store.rows.start, errors, stages.perturb)
 
 
 def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any]:
-    """Choose the fidelity of a new campaign by a pilot of its joints.
+    """Choose the fidelity of a new campaign from a pilot of its joints.
 
     Returns
     -------
@@ -234,7 +234,7 @@ def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any
 
 
 def _least_steps(histories: str, n_harmonics: int) -> int:
-    """Fewest steps a revolution that the histories kept can be made from."""
+    """Minimum steps per revolution from which the kept histories can be computed."""
     harmonics = 2 * n_harmonics + 1 if "harmonics" in histories else 0
     return max(harmonics, rainflow.LEAST_SAMPLES if "cycles" in histories else 0)
 

@@ -1,4 +1,4 @@
-"""Ctrl-C, termination and hang-up as requests: finish what is in work, then stop."""
+"""Handle Ctrl-C, termination and hang-up as requests to stop once the work in progress is finished."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ CAUGHT = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class Stop:
-    """Whether a signal has asked to stop, and which one.
+    """Whether a signal has requested a stop, and which one.
 
     Attributes
     ----------
     number : signal.Signals
-        The signal; SIGINT until one has come.
+        The last signal received; SIGINT before any.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class Stop:
 
     @contextmanager
     def patiently(self) -> Iterator[None]:
-        """Have the first signal inside only ask; so none lands in the middle of writing. The second interrupts."""
+        """Inside, the first signal only sets the request, so that no write is interrupted; a second one interrupts."""
         self._patient = True
         try:
             yield
@@ -42,7 +42,7 @@ class Stop:
     def take(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal."""
         again, self._asked, self.number = self._asked, True, signal.Signals(number)
-        if again:  # nothing shall hinder the clearing up that follows
+        if again:  # no signal may interrupt the cleanup that follows
             for caught in CAUGHT:
                 signal.signal(caught, signal.SIG_IGN)
         if again or not self._patient:
@@ -51,10 +51,10 @@ class Stop:
 
 @contextmanager
 def caught() -> Iterator[Stop]:
-    """Catch SIGINT, SIGTERM and SIGHUP; the handlers that were there before come back at the end.
+    """Catch SIGINT, SIGTERM and SIGHUP; the previous handlers are restored at the end.
 
-    A hang-up that is ignored already (nohup) stays so. Only the main thread can catch signals; elsewhere they are the
-    caller's affair.
+    A SIGHUP that is already ignored (nohup) stays ignored. Only the main thread can catch signals; in other threads
+    the caller has to handle them.
     """
     stop = Stop()
     before: dict[int, Any] = {}

@@ -1,10 +1,11 @@
-"""Campaigns that stop when an exceedance is known well enough.
+"""Stop rule: end a campaign when the interval of an exceedance is narrow enough.
 
-Whoever looks at an interval again and again and stops when it pleases has an interval that covers less often than it
-says. Here the looks are few, at numbers of joints fixed beforehand, and each interval has the confidence
-1 - (1 - confidence) / looks (Bonferroni): the probability that any of them misses is at most 1 - confidence, so the one
-that the campaign stops with covers, whenever that is. The looks depend on neither workers nor time, only on the rule
-and the number of joints: it is the first joints of the sequence that are looked at, all of them done.
+Inspecting an interval repeatedly and stopping as soon as it is narrow lowers its coverage below its confidence. Here
+the looks (interim analyses) are few, at numbers of joints fixed beforehand, and each interval has the confidence
+1 - (1 - confidence) / looks (Bonferroni). The probability that any of the intervals misses the true exceedance is at
+most 1 - confidence, so the interval of the last look has the required coverage, whenever the campaign stops. The looks
+depend only on the rule and the number of joints, not on workers or time: each look evaluates the first joints of the
+sequence, all of them done.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ class Rule(NamedTuple):
     text : str
         The rule as it was written.
     load : str
-        Name of the load, as a limit has it.
+        Name of the load, such as ``cross1.F``.
     level : float
-        In SI units.
+        Level of the load, SI.
     width : float
-        Between 0 and 1.
+        Width of the interval, between 0 and 1.
     """
 
     text: str
@@ -51,19 +52,19 @@ class Rule(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What a look at the first joints showed.
+    """Result of a look at the first joints.
 
     Attributes
     ----------
     joints : int
-        How many were looked at, the nominal one not among them.
+        Number of joints evaluated, without the nominal joint.
     n_unresolved : int
-        Joints among them that failed or did not settle: they count below the level at the interval's lower end and
-        above it at its upper end.
+        Joints among them that failed or did not settle: counted as below the level for the lower end of the interval
+        and as above it for the upper end.
     above : int
         Valid joints above the level.
     lower, upper : float
-        Interval with the confidence of one look.
+        Interval with the confidence of one look, see `each`.
     """
 
     joints: int
@@ -83,7 +84,7 @@ class Outcome(NamedTuple):
     look : Look
         The last look.
     looks : list of int
-        Numbers of joints at which it was planned to look.
+        Numbers of joints of the planned looks.
     """
 
     reached: bool
@@ -91,7 +92,7 @@ class Outcome(NamedTuple):
     looks: list[int]
 
     def record(self, rule: Rule) -> dict[str, Any]:
-        """What the result file keeps of it."""
+        """Return the attribute ``stop`` of the result file."""
         planned = {"confidence": CONFIDENCE, "confidence_of_a_look": each(len(self.looks)), "looks": self.looks}
         return {"rule": rule.text} | self.look._asdict() | planned
 
@@ -111,11 +112,11 @@ def parse(text: str) -> Rule:
 
 
 def looks(width: float, n: int) -> list[int]:
-    """Numbers of joints at which to look: doubled from the least that can be enough, `n` the last.
+    """Numbers of joints at which to look: doubled from the smallest that can suffice; the last is `n`.
 
-    Fewer joints than the first cannot do: with none of them above the level the interval ends at
-    1 - ((1 - confidence) / 2)^(1 / joints). Before `n` there is none after the first that is enough whatever the share
-    above the level (one half is the worst) with room for unresolved joints, half the width.
+    Fewer joints than the first number cannot suffice: even with none of them above the level, the interval ends at
+    1 - ((1 - confidence) / 2)^(1 / joints). Doubling ends at the first number that suffices for any share above the
+    level (one half is the worst), with half of the width reserved for unresolved joints.
     """
     joints = math.ceil(math.log(0.5 * (1.0 - CONFIDENCE)) / math.log1p(-width))
     planned: list[int] = []
@@ -129,30 +130,30 @@ def looks(width: float, n: int) -> list[int]:
 
 
 def each(n_looks: int) -> float:
-    """Confidence of one look, so that all hold together with `CONFIDENCE` (Bonferroni)."""
+    """Confidence of one look, such that all looks together have the confidence `CONFIDENCE` (Bonferroni)."""
     return 1.0 - (1.0 - CONFIDENCE) / n_looks
 
 
 def interval(count: int, n_unresolved: int, n: int, n_looks: int) -> tuple[float, float]:
-    """Interval of one look at `n` joints: unresolved ones below the level at its lower end, above it at its upper."""
+    """Interval of one look at `n` joints; unresolved ones count as below the level for its lower end, else above."""
     lower, _ = exceedance.clopper_pearson(count, n, each(n_looks))
     _, upper = exceedance.clopper_pearson(count + n_unresolved, n, each(n_looks))
     return float(lower), float(upper)
 
 
 def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object]) -> Outcome:
-    """Run a campaign as far as a rule asks for.
+    """Run a campaign until a stop rule is satisfied or all joints are simulated.
 
     Parameters
     ----------
     study : Study
         The study.
     out : Path
-        Its result file. Rows beyond the stop stay pending, and why it stopped is noted in it.
+        Its result file. Rows after the stop stay pending, and the reason for the stop is recorded in the file.
     rule : Rule
-        When to stop.
+        Rule that says when to stop.
     run : callable
-        Simulates the rows of the campaign before the one that it is given.
+        Row of the campaign -> simulates all rows below it.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""One joint in full: what ``tolstat simulate`` shows."""
+"""Simulate one joint with full histories, for ``tolstat simulate``."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class CaseResult(NamedTuple):
     wall_s : float
         Time that the simulation took, without compilation, s.
     options : Options
-        Settings that it was simulated with.
+        Solver options of the simulation.
     """
 
     simulation: Simulation
@@ -42,7 +42,7 @@ class CaseResult(NamedTuple):
     options: Options
 
     def summary(self) -> dict[str, Any]:
-        """Figures of the joint as plain values; None where a failed joint has none.
+        """Return key results as plain Python values; None for those that a failed joint does not have.
 
         ``max`` holds the largest moduli of each bushing's force (N) and torque (N m) over the last revolution.
         """
@@ -66,7 +66,7 @@ class CaseResult(NamedTuple):
         }
 
     def remedy(self) -> str:
-        """What to do about a joint that did not settle; empty for one that did."""
+        """Return what to do about a joint that is not ok; empty for one that is."""
         return remedy(self.simulation.results[0], self.options._asdict())
 
     def to_pandas(self) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Numerical error of a campaign: some of its joints, simulated again in other ways."""
+"""Estimate the numerical error of a campaign: simulate some joints again with other settings or another solver."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 SMALL = ("half_step", "newton", "settling")
-"""Checks at the end of every run: they need no other code than the run did."""
+"""Checks at the end of every run; they need no code beyond that of the run."""
 FULL = (*SMALL, "method", "reference")
 LEAST_STEPS = 180
-"""Steps a revolution, at least, of the dynamic joint beside one of lower fidelity."""
+"""Minimum steps per revolution of the dynamic simulation that checks one of lower fidelity."""
 DESCRIPTION = {
     "half_step": "twice as many steps a revolution",
     "newton": "Newton stops at a hundredth of solver.newton_tol",
@@ -43,16 +43,16 @@ Progress = Callable[[Counts], None]
 
 
 def silent(counts: Counts) -> None:
-    """Tell nobody how far it is."""
+    """Report no progress."""
 
 
 def changed(options: Options, check: str) -> Options:
-    """Return the settings of a check.
+    """Return the solver options of a check.
 
     Parameters
     ----------
     options : Options
-        Settings of the campaign.
+        Solver options of the campaign.
     check : str
         One of `FULL`, or ``fidelity``.
     """
@@ -73,10 +73,10 @@ def changed(options: Options, check: str) -> Options:
 
 
 def choose(rows: NDArray[np.intp], joints: int | None, seed: int) -> NDArray[np.intp]:
-    """Choose `joints` of the `rows` at random, all if there are fewer or it is None; ascending."""
+    """Choose `joints` of the `rows` at random, ascending; all if there are fewer, or if `joints` is None."""
     if joints is None:
         return rows
-    rng = np.random.default_rng([seed, 4])  # 4: not the numbers that errors were drawn with
+    rng = np.random.default_rng([seed, 4])  # 4: another random stream than that of the errors
     return np.sort(rng.choice(rows, min(joints, len(rows)), replace=False))
 
 
@@ -88,22 +88,22 @@ def run_checks(
     workers: int = 1,
     progress: Progress = silent,
 ) -> dict[str, Check]:
-    """Simulate joints in other ways.
+    """Simulate joints again, once for each check.
 
     Parameters
     ----------
     params : ndarray of PARAM, shape (m,)
-        The joints.
+        Parameters of the joints.
     options : sequence of Options
-        Settings that the campaign has for each of them.
+        Solver options of each joint in the campaign.
     names : iterable of str
-        Which of `FULL`; ``fidelity`` is added where a joint is below dynamic fidelity.
+        Names from `FULL`; ``fidelity`` is added if a joint is below dynamic fidelity.
     simulate : callable, optional
-        In place of `simulation.simulate_rows`.
+        Replaces `simulation.simulate_rows`.
     workers : int
-        Processes that share the references, each of which takes seconds; they are the same to their tolerance.
+        Processes that compute the references, seconds each; their number changes results within the tolerance only.
     progress : callable
-        Told of the joints that have their reference.
+        Called with the counts of joints whose reference is computed.
 
     Returns
     -------
@@ -122,13 +122,13 @@ def run_checks(
 
 
 Single = tuple[int, NDArray[np.void], Options]
-"""A joint: its place, its row of PARAM, its settings."""
+"""A joint: its index, its row of PARAM, shape (1,), and its solver options."""
 
 
 def _references(
     params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
 ) -> NDArray[np.void]:
-    """Reference of each joint, (m,) table RESULT, one after the other in each process."""
+    """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
     blocks: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
     work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
     done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
@@ -163,7 +163,7 @@ def by_options(
     params: NDArray[np.void],
     options: Sequence[Options],
 ) -> NDArray[np.void]:
-    """Results of joints that have settings of their own, (m,) table RESULT, in as few calls as there are settings."""
+    """Results of joints with individual options, (m,) table RESULT; one call of `solve` per distinct option set."""
     results = np.empty(len(params), RESULT)
     for one in dict.fromkeys(options):
         here = np.array([own == one for own in options])
@@ -186,15 +186,15 @@ def of_campaign(
     Parameters
     ----------
     store : ResultStore
-        Its file.
+        Result file of the campaign.
     parameters : callable
-        Rows (m,) -> their parameters, (m,) table PARAM.
+        File slots (m,) -> their parameters, (m,) table PARAM.
     names, simulate, workers, progress
         As in `run_checks`.
     joints : int or None
-        How many joints; None for all, the one without errors included.
+        Number of joints; None for all, including the nominal joint.
     seed : int
-        What they are chosen by.
+        Seed of the random choice.
 
     Returns
     -------
@@ -203,7 +203,7 @@ def of_campaign(
     """
     settled = np.flatnonzero(store.status() == Status.OK)
     if joints is not None and store.sampling["nominal_first"] and len(settled) > 1:
-        settled = settled[settled > 0]  # the joint without errors is not in the statistics either
+        settled = settled[settled > 0]  # the nominal joint is not in the statistics either
     rows = choose(settled, joints, seed)
     if not rows.size:
         return None
@@ -216,7 +216,7 @@ def of_campaign(
 
 
 def small(store: ResultStore, parameters: Callable[..., NDArray[np.void]], simulate: Simulate) -> None:
-    """Check a few joints of a complete campaign and keep that in its file, unless it is a slice or has them already."""
+    """Check a few joints of a complete campaign and store the checks, unless the file is a slice or has checks."""
     if not (store.complete and store.whole) or verification.read(store) is not None:
         return
     joints = min(max(store.n // SMALL_SHARE, 1), SMALL_MOST)
@@ -235,7 +235,7 @@ def check(
 ) -> Verification:
     """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
 
-    `on_start` is called when the input is known to be good, before the work.
+    `on_start` is called after the input has been validated, before the simulations.
     """
     from tolstat.study import load
 
@@ -261,20 +261,20 @@ def check_file(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Verification:
-    """Check joints of a result file and keep that in it, in place of an earlier verification.
+    """Check joints of a result file and store the checks in it, replacing an earlier verification.
 
     Parameters
     ----------
     path : Path
         The file; its campaign may be unfinished.
     joints : int or "all"
-        Number of joints; all are those that settled, the one without errors included.
+        Number of joints; ``"all"`` for all settled joints, including the nominal joint.
     seed : int, optional
-        What they are chosen by; the campaign's own seed without it.
+        Seed of the random choice; the campaign's own seed without it.
     names : iterable of str
-        Which of `FULL`.
+        Names from `FULL`.
     on_start : callable
-        Called when the file is known to be good, before the work.
+        Called after the file has been validated, before the simulations.
     workers, progress
         As in `run_checks`.
 
@@ -287,7 +287,7 @@ def check_file(
     StoreError
         When the file cannot be used, was made by other code, or has no settled joint.
     InputError
-        When `joints` is something else.
+        When `joints` is neither a positive integer nor ``"all"``.
     """
     number = number_of(joints)
     with ResultStore.open(path, "r+") as store:
@@ -313,9 +313,9 @@ def check_study(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Verification:
-    """Check joints of a study that has not been run: they are simulated as it would, and in other ways.
+    """Check joints of a study that has not been run: simulate them with its own settings and for each check.
 
-    Parameters, returns and raises as `check_file`; joints that do not settle are among those returned.
+    Parameters, returns and raises as `check_file`; the joints returned include those that do not settle.
     """
     from tolstat.joint import perturb
     from tolstat.sampling import draw
@@ -337,12 +337,12 @@ def check_study(
 
 
 def number_of(joints: int | str) -> int | None:
-    """Return how many joints are meant; None for ``"all"``.
+    """Parse a number of joints; None for ``"all"``.
 
     Raises
     ------
     InputError
-        When it is no whole number of 1 or more.
+        When it is neither a positive integer nor ``"all"``.
     """
     if joints == "all":
         return None

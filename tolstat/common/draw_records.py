@@ -1,6 +1,6 @@
-"""How each joint of a campaign was drawn, where that is more than its number: tables by sampling method.
+"""Tables of how each joint was drawn, for the sampling methods that need one (`importance`, `subset`).
 
-They lie in the group ``origin`` of the result file. Row i is joint i there, too.
+The result file keeps them in the group ``origin``; row i is joint i.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SUBSET_FIELDS = (
     Field("parent", "1", "row of the joint whose errors were moved to give these; -1 at level 0", "i8"),
 )
 FIELDS: dict[str, tuple[Field, ...]] = {"importance": IMPORTANCE_FIELDS, "subset": SUBSET_FIELDS}
-"""Columns by sampling method; methods that are not here have no such table."""
+"""Columns of the table by sampling method; other methods have no such table."""
 IMPORTANCE, SUBSET = dtype_of(IMPORTANCE_FIELDS), dtype_of(SUBSET_FIELDS)
 
 
@@ -46,7 +46,7 @@ def dtype(sampling: Mapping[str, Any]) -> np.dtype[np.void]:
 
 
 def check_counted(sampling: Mapping[str, Any], path: Path, weighted: bool = False) -> None:
-    """Refuse a file whose joints were not drawn from the tolerances alone, where they would be counted alike.
+    """Refuse a file whose joints must not be counted equally, for a statistic that does so.
 
     Parameters
     ----------
@@ -55,12 +55,12 @@ def check_counted(sampling: Mapping[str, Any], path: Path, weighted: bool = Fals
     path : Path
         The file.
     weighted : bool
-        Whether joints are counted by their weights.
+        Whether the statistic applies the weights of importance sampling.
 
     Raises
     ------
     StoreError
-        With what can be asked of such a file.
+        For a subset simulation, and for importance sampling unless `weighted`; the hint names what can be used.
     """
     if sampling["method"] == "subset":
         remedy = f"ask for its probability with: tolstat rare {path}"

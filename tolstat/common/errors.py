@@ -30,7 +30,7 @@ class Fault:
 
 
 class TolstatError(Exception):
-    """Base of the errors that a user can mend; the command line ends with exit code 2."""
+    """Base of the errors that a user can correct; the command line ends with exit code 2."""
 
 
 class InputError(TolstatError):
@@ -49,7 +49,7 @@ class InputError(TolstatError):
 
 @contextmanager
 def gather(faults: list[Fault]) -> Iterator[None]:
-    """Add the faults of an `InputError` raised inside to `faults` and go on, so that all are told at once."""
+    """Add the faults of an `InputError` raised inside to `faults` and continue, so that all are reported at once."""
     try:
         yield
     except InputError as error:
@@ -57,4 +57,4 @@ def gather(faults: list[Fault]) -> Iterator[None]:
 
 
 class StoreError(TolstatError):
-    """A result file that cannot be used as asked: not ours, too new, of another study, or locked."""
+    """A result file that cannot be used as requested: not a tolstat file, too new, of another study, or locked."""

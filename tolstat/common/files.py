@@ -1,4 +1,4 @@
-"""Where the package keeps its data, and files that are whole or not there."""
+"""Directory of the package's data, and atomic writing of files."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tolstat.common.errors import Fault, InputError
 
 
 def data_dir() -> Path:
-    """Directory of the data that comes with the package: in an installed wheel, or beside a checkout's."""
+    """Directory of the data that comes with the package: inside it in an installed wheel, beside it in a checkout."""
     package = Path(__file__).parent.parent
     inside = package / "data"
     return inside if inside.is_dir() else package.parent / "data"
 
 
 def check_target(path: Path, *inputs: Path) -> None:
-    """Check, before the work whose result it shall hold, that a file can be written.
+    """Check that a result file can be written, before the work that produces the result.
 
     Raises
     ------
     InputError
-        When `path` is a folder, its folder is not there, or it is one of `inputs`.
+        When `path` is a folder, its parent folder does not exist, or it is one of `inputs`.
     """
     place = str(path)
     if path.is_dir():
@@ -37,19 +37,19 @@ def check_target(path: Path, *inputs: Path) -> None:
 
 @contextmanager
 def writing(path: Path, overwrite: bool = True) -> Iterator[Path]:
-    """Yield a temporary name beside `path`; what is written there becomes `path` if all went well.
+    """Yield a temporary path beside `path`, and rename the file written there to `path` if no exception occurs.
 
     Parameters
     ----------
     path : Path
-        The name that the file shall have. It never names half a file.
+        Final name of the file. A file of this name is always complete.
     overwrite : bool
         Whether a file of that name is replaced.
 
     Raises
     ------
     FileExistsError
-        When `overwrite` is false and `path` exists, even if it came to exist in the meantime.
+        When `overwrite` is false and `path` exists, even if it was created in the meantime.
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
@@ -65,14 +65,14 @@ def writing(path: Path, overwrite: bool = True) -> Iterator[Path]:
 
 
 def check_room(path: Path, size: int) -> None:
-    """Check that a file of `size` bytes can be written beside `path`, by taking the room for a moment.
+    """Check that a file of `size` bytes can be written beside `path`, by allocating the space temporarily.
 
-    HDF5 does not survive a full disk: a file that cannot be closed stays open, and complains of it to the end.
+    HDF5 does not recover from a full disk: a file that cannot be closed stays open and reports errors until exit.
 
     Raises
     ------
     OSError
-        When there is no room.
+        When there is not enough space.
     """
     if not hasattr(os, "posix_fallocate"):
         return
@@ -86,7 +86,7 @@ def check_room(path: Path, size: int) -> None:
 
 
 def sync(path: Path) -> None:
-    """Wait until a file, or the names in a folder, are on the disk."""
+    """Flush a file, or the entries of a folder, to the disk."""
     folder = path.is_dir()
     if folder and os.name != "posix":  # other systems do not open folders
         return
@@ -98,7 +98,7 @@ def sync(path: Path) -> None:
 
 
 def _rename_new(source: Path, target: Path) -> None:
-    """Give `source` another name without replacing a file, which a rename would do silently."""
+    """Rename `source` to `target` and raise if `target` exists; ``os.rename`` would replace it silently."""
     try:
         os.link(source, target)
     except FileExistsError:

@@ -1,6 +1,7 @@
 """Which results a campaign keeps: all of them, or those that ``[output] results`` of its study selects.
 
-How the simulation of a joint went (status, closure, motion, counts) is always kept: no result means anything without.
+Columns on the course of a simulation (status, closure, motion, counts) are always kept: results are meaningless
+without them.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from tolstat.common.columns import RESULT_COLUMNS, Column
 from tolstat.common.tables import CONTACTS
 
 KEY = "output.results"
-"""Key in the identity of a study: names of the columns selected; not there where all are kept."""
+"""Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
 CHOSEN_FROM = ("F_max", "F_mean", "F_range", "T_max", "T_mean", "T_range", "contact_max", "mode_share", "psi_max")
-"""Fields of the results that a study can do without."""
+"""Fields of the results that a study may leave out."""
 NAMES = tuple(c.name for c in RESULT_COLUMNS)
 
 
 def chosen(names: Iterable[str]) -> list[str] | None:
-    """Those of the columns `names` that are not kept anyway, in the order of the table; None if nothing is left out."""
+    """Optional columns among `names`, in the order of the table; None if no optional column is left out."""
     optional = [c.name for c in RESULT_COLUMNS if c.field in CHOSEN_FROM]
     found = [name for name in optional if name in set(names)]
     return None if found == optional else found
@@ -34,12 +35,12 @@ def columns(identity: Mapping[str, Any]) -> tuple[Column, ...]:
     Parameters
     ----------
     identity : mapping
-        Of its study, by dotted key.
+        Identity of the campaign's study, by dotted key.
 
     Raises
     ------
     ValueError
-        When the identity names what is no column.
+        When the identity holds anything but a list of column names.
     """
     names = identity.get(KEY)
     if names is None:
@@ -50,7 +51,7 @@ def columns(identity: Mapping[str, Any]) -> tuple[Column, ...]:
 
 
 def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
-    """Write NaN to the columns of a table RESULT that are not kept: numbers of type f8, all of them."""
+    """Write NaN to the columns of a table RESULT that are not in `kept`; all of these have type f8."""
     names = {c.name for c in kept}
     for c in RESULT_COLUMNS:
         if c.name not in names:

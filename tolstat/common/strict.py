@@ -68,13 +68,13 @@ def validate(
     model : type
         A `Strict` model.
     data : object
-        Parsed TOML, a mapping if it is right.
+        Parsed TOML; anything but a mapping is a fault.
     place : str
         What to put before each key path, usually the file's name.
     prefix : tuple
-        Key path of `data` in its file; the faults name it.
+        Key path of `data` in its file, shown in the faults.
     context : mapping, optional
-        Handed to the model's validators.
+        Passed to the model's validators.
 
     Returns
     -------
@@ -139,7 +139,7 @@ def did_you_mean(word: str, allowed: Sequence[str]) -> str:
 
 
 def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
-    """Names of the keys that `model` allows at a key path, as far as the models tell."""
+    """Names of the keys that `model` allows at a key path; empty where they are not known."""
     current: Any = model
     for part in location:
         fields = getattr(current, "model_fields", None)

@@ -20,19 +20,19 @@ CHANNELS = {
     for bushing in BUSHINGS
     for load in ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z", "F", "T")
 }
-"""Unit of every load that cycles are counted of: components of a bushing's force and torque, and their moduli."""
+"""Unit of every load whose cycles are counted: components of a bushing's force and torque, and their moduli."""
 CONTACTS = ("outer", "inner", "resultant")
 """Contact forces of a pin: normal force of its outermost and of its innermost station, and the resultant of all."""
 OUTER, INNER, RESULTANT = range(3)
 MAX_STATIONS = 16
-"""Most contact stations that one pin can have."""
+"""Maximum number of contact stations of a pin."""
 MAX_ITERATIONS = 40
-"""Bound on the work of a joint, in Newton iterations per step of the longest run allowed: no joint can hang a campaign.
+"""Upper bound on a joint's Newton iterations per step of the longest run allowed, so that no joint blocks a campaign.
 Joints that never settle take some 8 to 10."""
 
 
 class Status(IntEnum):
-    """What became of a joint. ``PENDING`` is the fill value of a new file: the file is the to-do list."""
+    """Outcome of a joint's simulation. ``PENDING`` is the fill value of a new file and marks the rows still to run."""
 
     PENDING = 0
     OK = 1
@@ -54,10 +54,10 @@ class Status(IntEnum):
 
 
 UNSETTLED = (Status.NOT_SETTLED, Status.NOT_PERIODIC, Status.NOT_RESOLVED)
-"""States of a joint whose results others would not repeat: other revolutions, or finer steps."""
+"""States of a joint whose results would change with other revolutions or with finer steps."""
 
 VALID = (Status.OK, Status.STATIONARY)
-"""States of a joint whose largest loads count; of a stationary one they have an interval."""
+"""States of a joint whose largest loads count in statistics; those of a stationary joint have an interval."""
 
 SIMULATED = (*VALID, *UNSETTLED)
 """States of a joint that has results."""
@@ -103,7 +103,7 @@ class Start(IntEnum):
 
 
 class Fidelity(IntEnum):
-    """What of the joint's mechanics is solved; the ladder that ``solver.fidelity = "auto"`` chooses from."""
+    """Mechanical model that is solved: integration, equilibrium at each angle, or closed forms; ``auto`` chooses."""
 
     DYNAMIC = 0
     QUASISTATIC = 1
@@ -111,7 +111,7 @@ class Fidelity(IntEnum):
 
 
 FINEST_STEPS = 360
-"""Most steps a revolution that ``solver.fidelity = "auto"`` chooses."""
+"""Largest number of steps per revolution that ``solver.fidelity = "auto"`` chooses."""
 
 
 class Mode(IntEnum):
@@ -124,7 +124,7 @@ class Mode(IntEnum):
 
 
 class Motion(IntEnum):
-    """What kind of motion a joint came to, in revolutions of the input shaft."""
+    """Class of a joint's motion; its period is counted in revolutions of the input shaft."""
 
     UNKNOWN = 0
     PERIODIC = 1
@@ -206,7 +206,7 @@ class HistorySpec(NamedTuple):
     axes: tuple[str, ...] = ()
 
     def blank(self, n: int) -> NDArray[Any]:
-        """Make the history of `n` joints that have none, (n, ...): NaN (0 for integers) throughout."""
+        """Return a placeholder for `n` joints without history, (n, ...): NaN (0 for integers) throughout."""
         dtype = np.dtype(self.dtype)
         return np.full((n, *self.shape), np.nan if dtype.kind == "f" else 0, dtype)
 
@@ -219,11 +219,11 @@ class Variant(NamedTuple):
     family : str
         Name under which the study lists it; other variants may share it.
     values : dict
-        What makes it this joint, by dotted key of a joint file: keys that the study writes for it, and all others in
-        which it differs from the study's joint; ``operation.`` and ``solver.`` before keys of these sections that the
-        study writes for it. SI floats, words for choices.
+        Values that define it, by dotted key of a joint file: keys that the study writes for it, and all others in
+        which it differs from the study's joint. Keys that the study writes for it in the sections operation and solver
+        start with ``operation.`` and ``solver.``. SI floats, strings for choices.
     note : str
-        What the study says of it.
+        Note of the study on it.
     """
 
     family: str
@@ -232,7 +232,7 @@ class Variant(NamedTuple):
 
 
 class Simulation(NamedTuple):
-    """What simulating n joints gives: RESULT rows, and the histories asked for by name, each with leading axis n."""
+    """Output of simulating n joints: RESULT rows, and the requested histories by name, each with leading axis n."""
 
     results: np.ndarray[tuple[int], np.dtype[np.void]]
     histories: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
@@ -306,7 +306,7 @@ PARAM_FIELDS = (
     ),
     Field("hole_axis", "1", "direction of the hole axis, in axes of the arm's frame", shape=(4, 3)),
 )
-"""What the kernel needs of one joint. Pin fields are indexed by pin, hole fields by arm (hole k: arm k)."""
+"""Parameters of one joint for the kernel. Pin fields are indexed by pin, hole fields by arm (hole k: arm k)."""
 
 
 LARGEST = {"F": "bushing force", "T": "bushing torque", "contact": "contact force", "psi": "|Psi|"}
@@ -369,14 +369,14 @@ DESIGN_FIELDS = (
     Field("case", "1", "index of the joint's errors among the cases of the attribute design; 0 has none", "i4"),
     Field("group", "1", "joints of one group differ in their case only; the one without errors comes first", "i4"),
 )
-"""What each joint of a study that lists its joints is (``sampling.method = "cases"``)."""
+"""Variant, case and group of each joint of a study that lists its joints (``sampling.method = "cases"``)."""
 
 LEDGER_FIELDS = (
     Field("attempt", "1", "what gave the results: 0 the study's settings, k those of entry k - 1 of `retries`", "i4"),
     Field("errors_check", "1", "checksum of the joint's row, errors and design", "u8"),
     Field("results_check", "1", "checksum of `errors_check`, `attempt` and the joint's results, status included", "u8"),
 )
-"""What is kept of each joint so that its rows can be trusted."""
+"""Origin of each joint's results, and checksums of its rows."""
 
 DESIGN = dtype_of(DESIGN_FIELDS)
 ERROR = dtype_of(ERROR_FIELDS)
@@ -385,7 +385,7 @@ RESULT = dtype_of(RESULT_FIELDS)
 
 
 def without_results(n: int, status: Status) -> NDArray[np.void]:
-    """Make what stands for joints that have no results, (n,) table RESULT: NaN, and a status."""
+    """Return the rows of `n` joints without results, (n,), dtype RESULT: NaN, and `status`."""
     results = np.zeros(n, RESULT)
     for field in RESULT_FIELDS:
         if np.dtype(field.dtype).kind == "f":

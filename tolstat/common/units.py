@@ -1,7 +1,7 @@
-"""Unit strings at the border: ``"0.1 mm"`` in a file is ``1e-4`` (m) inside.
+"""Unit strings of input files: ``"0.1 mm"`` in a file becomes the SI float ``1e-4`` (m).
 
 Every quantity of an input file is a string with its unit; `Quantity` turns it into an SI float while
-pydantic validates, so that a wrong or missing unit is one fault among the others of the file.
+pydantic validates, so that a wrong or missing unit is reported with the other faults of the file.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ EXAMPLES = {
 
 @cache
 def registry() -> pint.UnitRegistry[float]:
-    """Return the one unit registry (made on first use: it costs some 0.3 s)."""
+    """Return the only unit registry (created on first use, which takes some 0.3 s)."""
     import pint
 
     units: pint.UnitRegistry[float] = pint.UnitRegistry()
@@ -61,7 +61,7 @@ _QUANTITY = re.compile(
 
 @lru_cache(maxsize=1024)
 def _parsed(text: str) -> Any:
-    """Read a text as a quantity, None if it is none; remembered, as variants of a joint have most values in common."""
+    """Parse a text as a quantity, None if it is not one; cached, because variants of a joint share most values."""
     found = _QUANTITY.fullmatch(text)
     if found is None:
         return None
@@ -75,7 +75,7 @@ _NOT_PARSED = (
     *(ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError, AssertionError, LookupError),
     tokenize.TokenError,
 )
-"""What pint's parser raises for a text that is no unit, besides its own errors."""
+"""Exceptions besides pint's own that its parser raises for a text that is not a unit."""
 
 
 def _fault(found: str, unit: str) -> PydanticCustomError:
@@ -160,18 +160,18 @@ def written(value: float, unit: str, like: object, digits: int = 12) -> str | fl
     Parameters
     ----------
     value : float
-        In `unit`.
+        Value in `unit`.
     unit : str
         SI unit.
     like : object
-        Quantity that can be converted to `unit`, as a file has it, whose unit is taken.
+        Quantity as written in a file, convertible to `unit`; the result has its unit.
     digits : int
         Significant digits to round to.
 
     Returns
     -------
     str or float
-        ``"0.08 mm"``, or a number where `like` is one.
+        ``"0.08 mm"``, or a number where `like` has no unit.
     """
     number, name = value, ""
     if isinstance(like, str) and (found := _QUANTITY.fullmatch(like)) is not None:
@@ -209,7 +209,7 @@ class Quantity:
 
 
 def _sign(must: str, remedy: str) -> PydanticCustomError:
-    # `schema` puts the value as it was written before the sentence
+    # `strict` replaces {input} by the value as written
     return PydanticCustomError("sign", "{found}", {"found": f"{{input}} {must}", "remedy": remedy})
 
 

@@ -1,4 +1,4 @@
-"""What a report page is made of."""
+"""Blocks that a report page is composed of: text, cards, tables, pictures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph; `small` for what is to be read after the rest."""
+    """A paragraph; `small` sets secondary information in small print."""
 
     kind: ClassVar[str] = "text"
     text: str
@@ -20,14 +20,14 @@ class Text:
 
 @dataclass(frozen=True)
 class Card:
-    """One figure of the headline.
+    """One number of the headline.
 
     Attributes
     ----------
     value, label, note : str
-        The number, what it is of, and its interval.
+        The number, its meaning, and a note, such as its interval.
     verdict : str
-        ``yes``, ``no``, ``open``, or empty where nothing is judged.
+        ``yes``, ``no``, ``open``, or empty if there is no verdict.
     """
 
     value: str
@@ -38,7 +38,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Cards:
-    """The figures that the reader came for."""
+    """The headline: the most important numbers of the page."""
 
     kind: ClassVar[str] = "cards"
     cards: Sequence[Card]
@@ -46,7 +46,7 @@ class Cards:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts.
+    """A table with cells of text.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class Table:
     rows : sequence of sequence of str
         Cells; the first column names the row.
     words : frozenset of int
-        Columns of words, which are aligned to the left.
+        Indices of columns of words, which are aligned to the left.
     verdicts : sequence of str
-        For each row ``yes``, ``no``, ``open`` or nothing: how its last cell is set off. Empty where nothing is judged.
+        Verdict of each row, ``yes``, ``no``, ``open`` or empty, which styles its last cell. Empty if nothing is judged.
     """
 
     kind: ClassVar[str] = "table"
@@ -77,19 +77,19 @@ class Panel:
     Attributes
     ----------
     key : str
-        Short name, the only one of its kind on the page.
+        Short name, unique on the page.
     title : str
         What it shows.
     description : str
-        What it says to somebody who cannot see it.
+        Text alternative for readers who cannot see the picture.
     draw : callable
-        Draws into axes that it is given.
+        Function that draws the picture into given axes.
     size : tuple of float
         Width and height in inches at its natural scale.
     left : float
         Room for the labels of the y axis, inches.
     reads : tuple of str
-        Loads whose exceedance it shows, for the cursor.
+        Loads whose exceedance the picture shows, for the cursor.
     """
 
     key: str
@@ -103,7 +103,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Panels:
-    """Pictures beside each other."""
+    """Pictures side by side."""
 
     kind: ClassVar[str] = "panels"
     panels: Sequence[Panel]
@@ -111,7 +111,7 @@ class Panels:
 
 @dataclass(frozen=True)
 class Reader:
-    """Tool that reads exceedances at a load; `curves` as `loads.readings` gives them."""
+    """Interactive tool that shows the exceedance at a chosen load; `curves` as `loads.readings` returns them."""
 
     kind: ClassVar[str] = "reader"
     curves: Mapping[str, Any]
@@ -127,7 +127,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class Listing:
-    """A text as it stands in a file; folded until asked for."""
+    """Verbatim text of a file, collapsed until the reader opens it."""
 
     kind: ClassVar[str] = "listing"
     title: str
@@ -153,9 +153,9 @@ class Page:
     Attributes
     ----------
     title, subtitle : str
-        Name of the study, and what the page stands on.
+        Name of the study, and a sentence on the number of joints.
     sections : sequence of Section
-        In the order of reading; none is empty.
+        In reading order; none is empty.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""Looks of the page's pictures: one panel each, legible on a telephone and in print."""
+"""Style of the page's pictures: one panel each, legible on a telephone and in print."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from tolstat.display import style
 from tolstat.display.blocks import Panel
 
 BOTTOM, RIGHT, TOP = 0.5, 0.12, 0.26
-"""Room around the axes, inches; that on the left is the panel's."""
+"""Margins around the axes, inches; `Panel.left` is the left margin."""
 GREY = "#B8B8B8"
 
 
 class Frame(NamedTuple):
-    """Where in a picture the axes lie (points from the left and from the top), and which loads their ends are."""
+    """Edges of the axes (points from the left and the top of the picture), and the loads at both ends of the x axis."""
 
     left: float
     right: float
@@ -35,7 +35,7 @@ class Frame(NamedTuple):
 
 @contextmanager
 def settings() -> Iterator[None]:
-    """House settings with sizes for one panel."""
+    """Apply the common style with font and line sizes for a single panel."""
     given: dict[Any, Any] = {
         "font.size": 9.2,
         "axes.labelsize": 9.0,
@@ -52,12 +52,12 @@ def settings() -> Iterator[None]:
         "legend.edgecolor": "none",
     }
     with style.settings(), mpl.rc_context(given):
-        mpl.rcParams["svg.fonttype"] = "none"  # text stays text: small, sharp, to be searched and read aloud
+        mpl.rcParams["svg.fonttype"] = "none"  # keep text as text: small, sharp, searchable, readable aloud
         yield
 
 
 def _place(panel: Panel) -> tuple[float, float, float, float]:
-    """Axes of a panel in parts of its width and height: left, bottom, width, height."""
+    """Position of the axes as fractions of the panel's size: left, bottom, width, height."""
     width, height = panel.size
     return (
         panel.left / width,
@@ -68,7 +68,7 @@ def _place(panel: Panel) -> tuple[float, float, float, float]:
 
 
 def svg(panel: Panel) -> tuple[str, Frame]:
-    """Draw a panel as SVG to stand inside a page: the same bytes for the same panel, no name used twice on the page."""
+    """Draw a panel as inline SVG: the same panel gives the same bytes, and all ids are unique on the page."""
     with settings():
         figure = Figure(figsize=panel.size, dpi=72)
         ax = figure.add_axes(_place(panel))
@@ -98,7 +98,7 @@ def _inline(text: str, panel: Panel) -> str:
 
 
 def rows(ax: Axes, labels: list[str]) -> None:
-    """Give a panel of horizontal rows its labels, the first row on top."""
+    """Label the horizontal rows of a panel, the first row on top."""
     ax.set_yticks(range(len(labels)), labels)
     ax.set_ylim(len(labels) - 0.4, -0.6)
     ax.tick_params(axis="y", length=0)
@@ -107,7 +107,7 @@ def rows(ax: Axes, labels: list[str]) -> None:
 
 
 def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    """Put a legend in one row above the axes, where rows leave no room inside."""
+    """Put a legend in one row above the axes, for panels without free space inside."""
     where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0}
     ax.legend(handles, labels, ncols=len(labels), handlelength=1.2, columnspacing=1.2, **where)
 

@@ -1,4 +1,4 @@
-"""A part of a Markdown file that a command writes: what stands between two comments."""
+"""Generated part of a Markdown file: the text between two comments, which a command replaces."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from tolstat.common.files import writing
 
 
 def split(path: Path, name: str) -> tuple[str, str]:
-    """Read a file: what stands before its part `name`, opening comment included, and after it.
+    """Return the text up to the opening comment of part `name`, and the text from its closing comment on.
 
     Raises
     ------
     InputError
-        When it cannot be read or lacks the two comments.
+        When the file cannot be read or lacks the two comments.
     """
     begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
     try:
@@ -29,7 +29,7 @@ def split(path: Path, name: str) -> tuple[str, str]:
 
 
 def insert(path: Path, name: str, part: str) -> None:
-    """Put `part` in the place `name` of a file; raises as `split` does."""
+    """Replace part `name` of a file by the text `part`; raises as `split` does."""
     head, tail = split(path, name)
     with writing(path) as temporary:
         temporary.write_text(f"{head}\n\n{part}\n\n{tail}", encoding="utf-8")

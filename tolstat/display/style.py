@@ -1,4 +1,4 @@
-"""Looks of every figure: colours that colour-blind readers can tell apart, and how a file is written."""
+"""Common style of all figures, with colours that colour-blind readers can tell apart; writing of figure files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from tolstat.common.files import writing
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
-"""Bushing 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
+"""Colours of bushings 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
 Dash = str | tuple[float, tuple[float, ...]]
 DASHES: tuple[Dash, ...] = (
     "-",
@@ -24,7 +24,7 @@ DASHES: tuple[Dash, ...] = (
     (0.0, (3.0, 1.5)),
     (0.0, (1.2, 0.9)),
 )
-"""Bushing 1 to 4: where curves lie on each other, the dashes let the lower one show."""
+"""Dashes of bushings 1 to 4: where curves coincide, the lower one shows through the gaps."""
 INK, FAINT = "#222222", "#777777"
 
 _SETTINGS: Any = {
@@ -48,14 +48,14 @@ _SETTINGS: Any = {
     "lines.linewidth": 1.8,
     "legend.frameon": False,
     "svg.hashsalt": "tolstat",
-    "text.parse_math": False,  # a study may have any name
+    "text.parse_math": False,  # the name of a study may contain a dollar sign
 }
 _PANELS = (("cross", "F"), ("cross", "T"), ("fork", "F"), ("fork", "T"))
 
 
 @contextmanager
 def settings() -> Iterator[None]:
-    """House settings while a figure is drawn; the caller's own are untouched afterwards."""
+    """Apply the common style inside the context; the caller's settings are restored afterwards."""
     with mpl.rc_context(_SETTINGS):
         yield
 
@@ -71,7 +71,7 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, str, Axes
     Returns
     -------
     figure : Figure
-        The page; leave its lowest strip to a legend, see `legend`.
+        The page; the strip at its foot is reserved for `legend`.
     panels : list of (group, letter, Axes)
         ``("cross", "F", axes)`` and so on.
     """
@@ -88,7 +88,7 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, str, Axes
 
 
 def share_axis(ax: Axes, low: float, which: str = "y") -> None:
-    """Logarithmic axis in per cent, from `low` to a little above 100 % so that a curve there can be seen."""
+    """Make an axis logarithmic, in per cent, from `low` to slightly above 100 % so that a curve at 100 % is visible."""
     upright = which == "y"
     (ax.set_yscale if upright else ax.set_xscale)("log")
     (ax.set_ylim if upright else ax.set_xlim)(low, low**-0.04)
@@ -116,7 +116,7 @@ def note(ax: Axes, text: str, y: float) -> None:
 
 
 def legend(figure: Figure, handles: list[Artist], labels: list[str]) -> None:
-    """Put one legend for all panels at the foot of the page, in a row or two."""
+    """Put one legend for all panels at the foot of the page, in one or two rows."""
     letters = sum(len(label) + 7 for label in labels)
     figure.legend(
         handles,
@@ -131,7 +131,7 @@ def legend(figure: Figure, handles: list[Artist], labels: list[str]) -> None:
 
 
 def save(figure: Figure, stem: Path, suffixes: tuple[str, ...] = (".png", ".svg")) -> list[Path]:
-    """Write a figure in each format, the same bytes for the same figure.
+    """Write a figure in each format; the same figure gives the same bytes.
 
     Returns
     -------

@@ -25,9 +25,10 @@ def limits(table: pd.DataFrame) -> str:
     Returns
     -------
     str
-        One line a limit. A column that counts joints that failed or did not settle below and above the limit (and, for
-        independent samples, adds the interval) is there only when there are such joints. The last two, there only
-        when the numerical error is known, move every load by it, then add all that the columns before have.
+        One line per limit. If joints failed or did not settle, a further column gives the share with all of them
+        counted below, then above the limit (for independent samples with the interval). If the numerical error is
+        known, two more columns give the share with every load shifted by it down and up, and the range that covers
+        numerical error, unresolved joints and sampling.
     """
     unresolved = bool((table["n_failed"] + table["n_unsettled"]).any())
     rows = [["load", "nominal", "limit", "joints", "above", "share", "95 % interval"]]
@@ -50,12 +51,12 @@ def limits(table: pd.DataFrame) -> str:
 
 
 def quantiles(table: pd.DataFrame) -> str:
-    """Text of `exceedance.quantiles`: one line a load, one column a share.
+    """Text of `exceedance.quantiles`: one line per load, one column per share.
 
     Returns
     -------
     str
-        The interval is that of the highest share; ``inf`` where the joints are too few for an end.
+        The interval is that of the highest share; ``inf`` if there are too few joints for its upper end.
     """
     shares = sorted(table["share"].unique())
     heads = [f"{100.0 * share:g} %" for share in shares]
@@ -76,7 +77,7 @@ def quantiles(table: pd.DataFrame) -> str:
 
 
 def accuracy(table: pd.DataFrame) -> str:
-    """Text of `accuracy.distribution`: one line a kind of load and check."""
+    """Text of `accuracy.distribution`: one line per kind of load and check."""
     rows = [["load", "error", "joints", "median", "95 % below", "worst"]]
     for row in table.itertuples(index=False):
         rows.append([str(row.load), str(row.error), str(row.joints), *(_small(x) for x in row[3:])])
@@ -92,7 +93,7 @@ def plain(table: pd.DataFrame) -> str:
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Rows of a frame for JSON, which has no NaN and no infinity: they are null."""
+    """Rows of a frame for JSON; NaN and infinity, which JSON lacks, become None."""
 
     def plain_number(x: Any) -> Any:
         x = x.item() if hasattr(x, "item") else x
@@ -102,7 +103,7 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
-    """Write a frame as ``STEM_what.csv``; returns its path."""
+    """Write a frame as ``STEM_what.csv``; return its path."""
     path = stem.with_name(f"{stem.name}_{what}.csv")
     with writing(path) as temporary:
         table.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
@@ -110,7 +111,7 @@ def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
 
 
 def align(rows: list[list[str]], text_last: bool = False) -> str:
-    """Align rows of text in columns: the first to the left, the others to the right; the last to the left if wanted."""
+    """Align rows of text in columns: the first to the left, the others to the right; with `text_last` the last left."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for row in rows:
@@ -122,25 +123,25 @@ def align(rows: list[list[str]], text_last: bool = False) -> str:
 
 
 def value(x: float, unit: str) -> str:
-    """A load with its unit, four digits; a dash where there is none."""
+    """Format a load with its unit, four digits; NaN gives a dash."""
     return f"{number(x)} {UNITS.get(unit, unit)}".strip() if not math.isnan(x) else "-"
 
 
 def number(x: float) -> str:
-    """Four digits, without an exponent as far as one reads it more easily so: ``13030``, not ``1.303e+04``."""
+    """Format to four digits; numbers below 1e7 have no positive exponent: ``13030``, not ``1.303e+04``."""
     short = f"{x:.4g}"
     return f"{float(short):.0f}" if "e+" in short and abs(x) < 1e7 else short
 
 
 def span_of(low: float, high: float, unit: str) -> str:
-    """An interval of loads with its unit; a dash where there is none."""
+    """Format an interval of loads with its unit; NaN gives a dash."""
     if math.isnan(low):
         return "-"
     return f"{number(low)} .. {'needs more joints' if math.isinf(high) else value(high, unit)}"
 
 
 def sentence(words: str) -> str:
-    """Words as a sentence; a load's name at their beginning stays as it is."""
+    """Make words a sentence: capital letter (unless the first word has a digit, as names of loads) and full stop."""
     first = words.partition(" ")[0]
     return (words if any(letter.isdigit() for letter in first) else words[:1].upper() + words[1:]) + "."
 
@@ -150,10 +151,10 @@ def _small(x: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in per cent, three digits; a dash where there is none."""
+    """Format a share in per cent, three digits; NaN gives a dash."""
     return "-" if math.isnan(share) else f"{100.0 * share:.3g} %"
 
 
 def span(low: float, high: float) -> str:
-    """An interval of shares in per cent; a dash where there is none."""
+    """Format an interval of shares in per cent; NaN gives a dash."""
     return "-" if math.isnan(low) else f"{100.0 * low:.3g} .. {percent(high)}"

@@ -1,7 +1,7 @@
-"""The contact section of a joint file: damping and stations of a pin in its hole, as the contact law has them.
+"""The contact section of a joint file: damping of a pin in its hole, and the stations of the contact law.
 
-A contact law is a set of stations (model, section 5): places along the pin, each with a force
-f(delta) = k1 delta^2 + k2 delta of its own and a weight of damping and film.
+A contact law is a set of stations (model, section 5): places along the pin, each with its own force
+f(delta) = k1 delta^2 + k2 delta and its own weight of damping and film.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
 Damping = Annotated[units.Damping, NOT_NEGATIVE]
 Force = Annotated[float, units.Quantity("N"), POSITIVE]
 OPTIONAL = Field(default=None, validate_default=True)
-"""Default of a key that may be left out where another one does not ask for it."""
+"""Default of a key that is optional unless another key requires it."""
 
 NEEDED = {
     "n_stations": ("law", "sliced", "mode"),
@@ -45,11 +45,11 @@ NEEDED = {
     "c_d": ("damping", "given", "beam"),
     "xi": ("damping", "beam", "given"),
 }
-"""Keys that a selector asks for: the selector, the word that needs the key, the word that does without."""
+"""Keys required by a selector: the selector, its value that requires the key, its value that does not."""
 
 
 COEFFICIENTS = ("coefficients", "k1u", "k2u", "k1p", "k2p", "H", "fit_load", "n_stations")
-"""Keys that all laws but ``"stations"`` take their stations from."""
+"""Keys that define the stations of all laws but ``"stations"``."""
 
 
 class Stations(NamedTuple):
@@ -95,7 +95,7 @@ def _carries(stations: tuple[Station, ...] | None) -> tuple[Station, ...] | None
 
 
 def of_its_law(contact: Mapping[str, Any], law: object) -> dict[str, Any]:
-    """Keys of a contact section that have a meaning with another `law`: what is left when an override sets it."""
+    """Keys of a contact section that remain valid when an override sets `law`."""
     other = COEFFICIENTS if law == "stations" else ("stations",)
     return {key: value for key, value in contact.items() if key not in other}
 
@@ -103,7 +103,7 @@ def of_its_law(contact: Mapping[str, Any], law: object) -> dict[str, Any]:
 class Contact(Strict):
     """Contact of the pins in their holes.
 
-    Which of the keys that may be ``None`` are needed is validated; methods assert it for the type checker.
+    Validators require keys that may be ``None`` where they are needed; methods assert it for the type checker.
     """
 
     law: Literal["mode", "uniform", "point", "sliced", "stations"]
@@ -143,7 +143,7 @@ class Contact(Strict):
     @field_validator("stations")
     @classmethod
     def _of_their_law(cls, value: object, info: ValidationInfo) -> object:
-        law = info.data.get("law", "stations")  # a law that is none has its own fault
+        law = info.data.get("law", "stations")  # an invalid law has a fault of its own
         if value is not None and law != "stations":
             raise refuse(f'has no meaning with law = "{law}"', 'write law = "stations"')
         return value
@@ -166,7 +166,7 @@ class Contact(Strict):
     @field_validator("k1p", "k2p")
     @classmethod
     def _leaves_a_middle(cls, value: float | None, info: ValidationInfo) -> float | None:
-        """The law ``"mode"`` has 2 point coefficients at the ends and the rest of the uniform one in the middle."""
+        """Refuse a negative middle station of the law ``"mode"``: uniform less twice the point coefficient."""
         name = str(info.field_name)
         uniform = info.data.get(name.replace("p", "u"))
         in_use = info.data.get("law") == "mode" and info.data.get("coefficients") == "printed"
@@ -214,7 +214,7 @@ class Contact(Strict):
         return k1u, k2u, k1p, k2p
 
     def springs(self, of: Material) -> Stations:
-        """Contact stations that the law names (model, section 5), at Young's modulus of the material."""
+        """Contact stations of the law (model, section 5), at the nominal Young's modulus of the material."""
         if self.law == "stations":
             assert self.stations is not None
             own = sorted(self.stations, key=lambda station: -station.s_over_z)
@@ -244,10 +244,10 @@ class Contact(Strict):
         )
 
     def undamped_ends(self) -> list[int]:
-        """Indices among ``stations`` of those that can touch alone and have no damping: nothing damps their whirl.
+        """Indices in ``stations`` of undamped stations that can touch alone, where the pin's whirl has no damping.
 
-        Along a straight pin the largest displacement is at an end, so that a station that carries can touch alone when
-        none farther out carries; one with a weight that is at least as far out damps it.
+        Along a straight pin the largest displacement is at an end, so that a station with stiffness can touch alone if
+        no station farther out has stiffness; a station with a weight that is at least as far out damps it.
         """
         found = []
         for side in (1.0, -1.0):
@@ -258,7 +258,7 @@ class Contact(Strict):
         return sorted(set(found))
 
     def normal_damping(self, pin: Pin, of: Material) -> float:
-        """Damping c_d (N*s/m): as given, or of the pin as a cantilever, eqs. (6)-(7)."""
+        """Damping c_d (N*s/m): as given, or from the pin as a cantilever, eqs. (6)-(7)."""
         if self.damping == "given":
             assert self.c_d is not None
             return self.c_d

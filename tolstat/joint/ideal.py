@@ -1,6 +1,6 @@
-"""Closed forms of the ideal joint: no errors, no clearance, no elasticity; no inertia but in `loads`.
+"""Closed forms of the ideal joint: no errors, clearance or elasticity; inertia in `loads` and `reversal_torque` only.
 
-Truth for tests and baseline of reports. Source: Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and
+Reference of tests and baseline of reports. Source: Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and
 Driveshafts, ch. 4; Cirelli et al. (2021), eq. (2).
 """
 
@@ -33,7 +33,7 @@ def speed_ratio(theta: ArrayLike, alpha: float) -> Array:
 
 
 def output_angle(theta: ArrayLike, alpha: float) -> Array:
-    """Angle of the output shaft, tan(theta_o) = tan(theta) / cos(alpha), following theta without jumps.
+    """Angle of the output shaft, tan(theta_o) = tan(theta) / cos(alpha), continuous in theta.
 
     Parameters and returned value in rad, as in `speed_ratio`.
     """
@@ -80,11 +80,11 @@ def pin_force(theta: ArrayLike, alpha: float, torque: float, radius: float) -> A
 
 
 def reversal_torque(params: NDArray[np.void]) -> Array:
-    """Torque below which the inertia of the output shaft turns the load around twice a revolution.
+    """Torque below which the inertia of the output shaft reverses the load twice per revolution.
 
     The shaft and the two arms on it, moment of inertia J, are accelerated by w^2 dr/dtheta, r being the speed ratio
-    (eq. 2). Where J w^2 max|dr/dtheta| exceeds the resisting torque, the joint drives and is driven in turn: its pins
-    cross their clearances and hit.
+    (eq. 2). Where J w^2 max|dr/dtheta| exceeds the resisting torque, the transmitted torque changes its sign: the pins
+    cross their clearances and impact.
 
     Parameters
     ----------
@@ -106,18 +106,19 @@ def reversal_torque(params: NDArray[np.void]) -> Array:
 def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
     """Loads of all bushings and contact forces of the ideal joint at its operating point.
 
-    Each pin is in touch with the outer end of its hole, R + z/2 from the centre (R + the outermost station's distance
-    with the law ``sliced``), as it is once the cross has turned through its clearance; without clearance both touch
-    and the force lies further in. What moves the bodies in the ideal motion is included: centrifugal loads, the
-    cross's couple, inertia of the output shaft and its arms. Without it the forces are those of `pin_force`, and in
-    the forks' axes the secondary couples, up to T sin(alpha) on the input side and T tan(alpha) on the output side.
+    Each pin touches the outer end of its hole, R + z/2 from the centre (R + the outermost station's distance with the
+    law ``sliced``), as it does once the cross has turned through its clearance; without clearance both ends touch and
+    the force acts closer to the centre. The inertial loads of the ideal motion are included: centrifugal loads, the
+    couple that moves the cross, inertia of the output shaft and its arms. Without them the loads are the forces of
+    `pin_force` and, in the forks' axes, the secondary couples, up to T sin(alpha) on the input side and T tan(alpha)
+    on the output side.
 
     Parameters
     ----------
     theta : array_like, shape (n,)
         Input angle, rad.
     par : ndarray of PARAM, shape (1,)
-        The joint; its errors and clearances are not looked at.
+        The joint; its errors and clearances are ignored.
 
     Returns
     -------

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FIT_LOADS = 100
-"""Loads at which the fit samples eq. (3); ten times as many move k1 by 0.2 % and k2 by 0.05 %."""
+"""Number of loads at which the fit samples eq. (3); ten times as many change k1 by 0.2 % and k2 by 0.05 %."""
 
 
 class BeamStiffness(NamedTuple):
@@ -184,7 +184,7 @@ def point_coefficients(k1u: float, k2u: float, H: float) -> tuple[float, float]:
 
 
 def contact_damping(xi: float, mass: float, *, length: float, A: float, J: float, E: float, rho: float) -> float:
-    """Damping of a contact, eqs. (6)-(7): c = 2 xi m omega, omega that of the pin as a cantilever.
+    """Damping of a contact, eqs. (6)-(7): c = 2 xi m omega, with omega of the pin as a cantilever.
 
     Parameters
     ----------

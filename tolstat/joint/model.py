@@ -21,7 +21,7 @@ from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pi
 class Joint(Strict):
     """A nominal Cardan joint: the sections of a joint file in SI units.
 
-    Triples and sixes that the properties give are along or about the local axes (e, t, z) of a pin or arm.
+    Arrays of three or six values that the properties return refer to the local axes (e, t, z) of a pin or arm.
     """
 
     description: str = ""
@@ -45,14 +45,14 @@ class Joint(Strict):
     @field_validator("contact")
     @classmethod
     def _fits_hertz(cls, value: Contact, info: ValidationInfo) -> Contact:
-        """Refuse a load range beyond which eq. (3) turns back: the logarithms of 2 D / b go below zero."""
+        """Refuse a load range in which eq. (3) stops rising, because the logarithms of 2 D / b become negative."""
         of = info.data.get("material")
         if value.coefficients == "fitted" and of is not None and not min(value.stiffness(of)) > 0.0:
             raise refuse("the fit to eq. (3) gives no stiffening contact", "give a smaller contact.fit_load")
         return value
 
     def warnings(self) -> list[Fault]:
-        """What can be simulated and is hardly meant, by key path in the joint file."""
+        """Settings that can be simulated but are probably not intended, by key path in the joint file."""
         found = "can touch alone with weight 0: nothing damps the whirl of the pin there"
         remedy = "give it a weight, or a station with a weight beyond it"
         return [Fault(f"contact.stations[{i}]", found, remedy) for i in self.contact.undamped_ends()]
@@ -88,7 +88,7 @@ def load(
     overrides : mapping
         Keys of the case's ``[joint]`` table other than `base`, nested as TOML nests them.
     place : str
-        What faults of `base` and `overrides` are reported at: the case file's name.
+        Name of the case file, under which faults of `base` and `overrides` are reported.
     relative_to : Path, optional
         Folder that a relative path is taken from; the working directory by default.
     section : str
@@ -126,7 +126,7 @@ def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
 
 
 def overridden(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Put the keys of `over` in place of those of a joint; where it sets a contact law, keys of other laws go."""
+    """Replace keys of a joint by those of `over`; where `over` sets a contact law, remove the keys of other laws."""
     contact, own = data.get("contact"), over.get("contact")
     if isinstance(contact, Mapping) and isinstance(own, Mapping) and "law" in own:
         data = {**data, "contact": of_its_law(contact, own["law"])}
@@ -134,7 +134,7 @@ def overridden(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, An
 
 
 def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Put the keys of `over` in place of those of `data`, table by table."""
+    """Replace keys of `data` by those of `over`, table by table."""
     result = dict(data)
     for key, value in over.items():
         below = result.get(key)
@@ -147,7 +147,7 @@ def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 def _attributed(
     faults: tuple[Fault, ...], data: Mapping[str, Any], path: Path, place: str, section: str
 ) -> list[Fault]:
-    """Report the faults that the joint file has by itself under its name, the others under `place`."""
+    """Report the faults that the joint file has without overrides under its name, the others under `place`."""
     try:
         schema.validate(Joint, data, str(path))
         own = {}

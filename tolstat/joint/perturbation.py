@@ -1,4 +1,4 @@
-"""The nominal joint, its operating point, and `perturb`: the one place where metrology meets mechanics."""
+"""Operating point, nominal errors, and `perturb`, which alone turns manufacturing errors into model parameters."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _steep(alpha: float) -> float:
 class Operation(Strict):
     """Operating point: misalignment (rad), speed of the input shaft (rad/s), resisting torque (N*m).
 
-    Both may be negative: the joint turns the other way, the torque drives.
+    Speed and torque may be negative: the joint then turns the other way, the torque drives the output shaft.
     """
 
     alpha: Annotated[units.Angle, AfterValidator(_steep)]
@@ -61,11 +61,11 @@ def nominal_errors(n: int, operation: Operation) -> Table:
 
 
 def perturb(joint: Joint, errors: Table) -> Table:
-    """Turn a table of errors into a table of parameters: what the mechanics needs of each joint.
+    """Turn a table of errors into a table of parameters of the mechanical model.
 
-    Errors and diameters enter the contacts alone: they move no marker, mass, inertia or stiffness. The factor
-    on E scales stiffness and contact coefficients in proportion and bushing damping by its root, eq. (12);
-    contact damping it leaves alone.
+    Position errors, tilts and diameters affect the contacts only: they change no marker, mass, inertia or stiffness.
+    The factor on E scales stiffness and contact coefficients in proportion and bushing damping by its square root,
+    eq. (12); it does not change contact damping.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def perturb(joint: Joint, errors: Table) -> Table:
     factor = errors["material.E_factor"]
     for name in ("k_cross", "k_fork", "station_k1", "station_k2"):
         params[name] *= factor[:, None]
-    with np.errstate(invalid="ignore"):  # a negative modulus ends in NaN, which the kernel reports as such
+    with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
         for name in ("c_cross", "c_fork"):
             params[name] *= np.sqrt(factor)[:, None]
     for i in range(4):
@@ -100,7 +100,7 @@ def perturb(joint: Joint, errors: Table) -> Table:
 
 
 def _constants(joint: Joint) -> dict[str, Any]:
-    """Parameters that are the same for every joint, at factor 1 on E."""
+    """Parameters that do not depend on the errors, at factor 1 on E."""
     pin_mass, pin_inertia = joint.pin.body(joint.material.rho)
     arm_mass, arm_inertia = joint.arm.body(joint.material.rho)
     stations = joint.contact.springs(joint.material)
@@ -148,9 +148,9 @@ def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
 
 
 def _clearance(contact: Contact, hole: Array, pin: Array) -> Array:
-    """Radial clearance (m) of deviations (m) of both diameters, shape (n,); rounding about zero is zero.
+    """Radial clearance (m) from deviations (m) of both diameters, shape (n,); rounding errors about zero become zero.
 
-    Without that, a pin meant to fit exactly would be an interference fit of 1e-17 m.
+    Otherwise a pin meant to fit exactly could have an interference fit of 1e-17 m.
     """
     clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin))
     clearance[np.abs(clearance) < 4.0 * np.finfo(float).eps * contact.D_H] = 0.0

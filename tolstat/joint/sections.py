@@ -1,7 +1,7 @@
-"""The sections of a joint file for its bodies and bushings, and what follows from each alone.
+"""The sections of a joint file for its bodies and bushings, and the quantities derived from a single section.
 
-`data/joints/cirelli2021.toml` says what each key means and where its value comes from. A key that may be left
-out is ``None`` where it is; the section's methods give the resolved value.
+`data/joints/cirelli2021.toml` says what each key means and where its value comes from. An optional key that is left
+out is ``None``; the section's methods give the resolved value.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def _poisson(nu: float) -> float:
 
 
 def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
-    """No body has one principal moment above the sum of the two others."""
+    """Refuse moments of inertia that no body has: one exceeds the sum of the two others."""
     if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
         raise refuse(f"no body has the moments of inertia {inertia}", "none may exceed the other two's sum")
     return inertia
@@ -51,7 +51,7 @@ Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
 
 
 def needed(value: object, info: ValidationInfo, selector: str, word: str, instead: str) -> None:
-    """Raise when a key is absent though its section's `selector` says `word`."""
+    """Raise when a key is missing although the key `selector` of its section has the value `word`."""
     if value is None and info.data.get(selector) == word:
         remedy = f'add {info.field_name}, or write {selector} = "{instead}"'
         raise refuse(f'missing key, needed with {selector} = "{word}"', remedy)
@@ -81,7 +81,7 @@ class Pin(Strict):
     def body(self, rho: float) -> tuple[float, Array]:
         """Mass (kg) and inertia about (e, t, z) (kg*m^2, shape (3,)) at density `rho` (kg/m^3).
 
-        Where they are not given: rho A l, and a solid cylinder of diameter d.
+        Values that are not given follow from rho A l and from a solid cylinder of diameter d.
         """
         mass = rho * self.A * self.l if self.mass is None else self.mass
         return mass, np.array(self.inertia or material.cylinder_inertia(mass, self.d, self.l))
@@ -107,7 +107,7 @@ class Arm(Strict):
     def body(self, rho: float) -> tuple[float, Array]:
         """Mass (kg) and inertia about (e, t, z) (kg*m^2, shape (3,)) at density `rho` (kg/m^3).
 
-        Where they are not given: rho A l_f, and a box with the section's area moments.
+        Values that are not given follow from rho A l_f and from a box with the section's area moments.
         """
         mass = rho * self.A * self.l_f if self.mass is None else self.mass
         box = material.box_inertia(mass, self.A, self.Jx, self.Jy, self.l_f)

@@ -1,4 +1,4 @@
-"""The joint of a variant, from the values that a result file keeps of it."""
+"""Rebuild the joint of a variant from the values that the result file stores."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tolstat.joint.sections import BeamAxes
 
 
 def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
-    """The joint of a variant.
+    """Return the joint of a variant.
 
     Parameters
     ----------
     joint : Joint
         The joint of the study.
     values : mapping
-        `Variant.values`: dotted key of the joint to SI value or word; keys of other sections are passed over.
+        `Variant.values`: dotted key of the joint to SI value or string; keys of other sections are ignored.
     """
     sections: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
@@ -31,12 +31,12 @@ def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
 
 
 def _item(value: Any) -> Any:
-    """An item of a list: a contact station, or a number."""
+    """Convert an item of a list: a contact station, or a number."""
     return Station.model_construct(**value) if isinstance(value, Mapping) else value
 
 
 def _section(section: Any, values: Mapping[str, Any]) -> Any:
-    """A section with new values; keys of a table in it (the stiffness of a bushing) have a dot."""
+    """Copy a section with new values; a dotted key belongs to a table in it (the stiffness of a bushing)."""
     flat = {key: value for key, value in values.items() if "." not in key}
     tables: dict[str, dict[str, Any]] = {}
     for key, value in values.items():

@@ -1,1 +1,1 @@
-"""What is asked of a result file, one folder a question."""
+"""Questions to a result file, one folder per question."""

@@ -1,4 +1,4 @@
-"""Reports of a result file: a table to read, pictures, and their numbers as CSV.
+"""Reports of a result file: a table as text, pictures, and their numbers as CSV.
 
 A campaign of random joints gets load exceedance; a sweep gets loads against the swept value; a list of cases
 gets its table.
@@ -18,14 +18,14 @@ from tolstat.store.view import LOAD_FIELDS, Campaign, read
 
 
 class Report(NamedTuple):
-    """What a report came to.
+    """Output of a report.
 
     Attributes
     ----------
     table : str
         The numbers that the study asks for, as aligned text.
     notes : str
-        How many joints they stand on and what the intervals cover.
+        How many joints were evaluated, and what the intervals cover.
     files : list of Path
         Pictures and CSV files written.
     """
@@ -47,7 +47,7 @@ def write(path: str | Path, out_dir: str | Path | None = None) -> list[Path]:
 
 
 def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
-    """Write the report of a result file, in whatever state the campaign is.
+    """Write the report of a result file; the campaign may be unfinished.
 
     For ``FILE.h5`` it writes ``FILE_exceedance.png``, ``.svg`` and ``.csv`` (the curves),
     ``FILE_quantiles.csv`` and, where the study sets limits, ``FILE_limits.csv``; for a sweep
@@ -151,7 +151,7 @@ def _text(content: str, stem: Path, ending: str) -> Path:
 
 
 def _stopped(stop: dict[str, Any]) -> str:
-    """Sentence about a campaign that ended when its precision was reached."""
+    """Sentence about a campaign that its stop rule ended."""
     return (
         f"stopped by {stop['rule']} at {stop['joints']} joints; {stop['confidence']:.0%} interval corrected for "
         f"{len(stop['looks'])} looks: {stop['lower']:.5f} to {stop['upper']:.5f}. Intervals above are not corrected."

@@ -1,4 +1,4 @@
-"""What the page stands on: numerical against statistical error, load cycles, and where the numbers come from."""
+"""Sections of the page on numerical against statistical error, fatigue, swept values and provenance."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def accuracy_section(found: Findings, verification: Verification) -> Section:
-    """Numerical error of the loads, beside what few joints leave uncertain."""
+    """Numerical error of the loads, compared with the statistical error of the shares."""
     table = accuracy.distribution(verification)
     head = ["load", "error", "joints", "median", "95 % below", "worst"]
     cells = [[row[0], row[1], str(row[2]), *(_small(x) for x in row[3:])] for row in table.itertuples(index=False)]
@@ -35,7 +35,7 @@ def accuracy_section(found: Findings, verification: Verification) -> Section:
 
 
 def _budget(table: pd.DataFrame) -> Table:
-    """Widths of what makes a share uncertain."""
+    """Contributions to the uncertainty of each share: sampling, numerical error, unresolved joints."""
     rows = []
     for row in table.to_dict("records"):
         numerical = max(abs(row[f"numerical_{end}"] - row["estimate"]) for end in ("lower", "upper"))
@@ -126,6 +126,6 @@ def _sweep(ax: Axes, found: Findings, group: str, letter: str) -> None:
 
 
 def provenance_section(found: Findings) -> Section:
-    """Where the numbers come from."""
+    """Provenance of the numbers, and the text of the study."""
     blocks: list[Block] = [Facts(found.facts), Listing("The study as it was run", found.study)]
     return Section("provenance", "Where the numbers come from", blocks)

@@ -1,4 +1,4 @@
-"""A study that lists its joints: largest loads of every joint, and how far its errors have moved them."""
+"""A study that lists its joints: largest loads of every joint, and their change due to its errors (Gamma)."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def table(store: ResultStore) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row a joint: ``variant``, what makes it (``values``), ``note``, ``alpha [deg]``, ``case``, ``status``,
-        ``motion``, ``cost`` in Newton iterations of the first joint, ``remedy``; force and torque of each bushing, SI,
-        and their Gamma, eq. (14), per cent; those that the study does not keep are left out. Where the file holds a
-        comparison with the reference (``tolstat verify``), also what `reference` gives.
+        One row per joint: ``variant``, the ``values`` that define it, ``note``, ``alpha [deg]``, ``case``, ``status``,
+        ``motion``, ``revolutions``, ``cost`` (Newton iterations relative to the first joint), ``remedy``; force and
+        torque of each bushing, SI, and their Gamma, eq. (14), per cent; loads that the study does not keep are left
+        out. If the file holds a comparison with the reference (``tolstat verify``), also the columns of `reference`.
     """
     design, results, alpha = store.design(), store.results(), store.errors()["operation.alpha"]
     variants = [store.variants[i] for i in design["variant"]]
@@ -72,10 +72,10 @@ def reference(store: ResultStore) -> dict[str, object]:
     Returns
     -------
     dict of str to ndarray, shape (n,)
-        ``error_F``, ``error_T``: of the largest load of the worst bushing, relative to the largest of the kind; NaN for
-        joints that did not settle, and where the reference has no result. ``reference``: state of the reference, empty
-        where there was no comparison. ``reference_change``: what its largest loads change in a revolution, as errors
-        are measured. Empty where the file holds no comparison.
+        ``error_F``, ``error_T``: error of the largest load of the worst bushing, relative to the largest of the kind;
+        NaN for joints that did not settle or without a reference result. ``reference``: status of the reference
+        simulation, empty for joints that were not compared. ``reference_change``: closure of the reference. The
+        dictionary is empty if the file holds no comparison.
     """
     found = verification.read(store)
     if found is None or accuracy.REFERENCE not in found.checks:
@@ -99,10 +99,10 @@ def _own(variant: Variant, section: str) -> dict[str, Any]:
 
 
 def markdown(full: pd.DataFrame) -> str:
-    """Table of `table` for a document: what makes each joint hard, and what became of it.
+    """Markdown form of `table`: why each joint is difficult, and its results.
 
-    A line a joint; its largest force and torque, their errors where they are known, and its cost in units of the first
-    joint's.
+    One line per joint: status, largest force and torque, their errors if known, and its cost relative to the first
+    joint.
     """
     heads = ["joint", "what makes it hard", "status", "motion", "revolutions", "max F (N)", "max T (N m)", "cost"]
     checked = "reference" in full
@@ -123,7 +123,7 @@ def _of_bushings(full: pd.DataFrame, what: str) -> list[str]:
 
 
 def _errors(row: Mapping[Any, Any]) -> list[str]:
-    """Cells of the errors of F and T, or the reason why there are none."""
+    """Cells with the errors of F and T, or the reason why they are missing."""
     if not row["reference"]:
         return ["nothing to compare" if row["status"] != Status.OK.label else "not compared", "nan"]
     if row["reference"] == Status.NEWTON_FAILED.label:
@@ -133,13 +133,13 @@ def _errors(row: Mapping[Any, Any]) -> list[str]:
 
 
 def advice(full: pd.DataFrame) -> list[str]:
-    """Lines of text on the joints that did not settle: which, and what to do about it."""
+    """One line for each joint with a remedy: its name, and what to do."""
     loose = full[full["remedy"] != ""]
     return [f"{row['variant']}, {row['case']}: {row['remedy']}" for row in loose.to_dict("records")]
 
 
 def worst(full: pd.DataFrame) -> pd.DataFrame:
-    """Short form of `table`: of all bushings kept the largest change of force and of torque, with its sign."""
+    """Short form of `table`: Gamma of the largest modulus among the bushings kept, signed, for force and for torque."""
     short = full[["variant", "alpha [deg]", "case", "status", "motion"]].copy()
     for letter in "FT":
         columns = _of_bushings(full, f"Gamma_{letter} [%]")

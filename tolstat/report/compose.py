@@ -1,4 +1,4 @@
-"""The report as one page: what was found (`findings`), put into blocks (`compose`), written as HTML."""
+"""Composition of the report page: the `Findings` of a campaign become sections of blocks."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ __all__ = ["Findings", "Page", "compose"]
 
 
 def compose(found: Findings) -> Page:
-    """Put what was found into the order of reading; a section without content is left out.
+    """Compose the page from the findings, in reading order; sections without content are left out.
 
     Parameters
     ----------
     found : Findings
-        What was found out about the campaign.
+        Results of the evaluation of the campaign.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What was found out about a campaign: all that its page shows, as numbers."""
+"""Results of the evaluation of a campaign: everything that its page shows, as numbers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Worst(NamedTuple):
     joints : sequence of TailJoint
         The largest first.
     revolutions : Revolutions, optional
-        Of the first of them, rows ascending; None where the page is to be made without.
+        Load histories of the first of these joints, rows ascending; None if the page shows no histories.
     """
 
     load: str
@@ -54,34 +54,34 @@ class Findings:
     Attributes
     ----------
     campaign : Campaign
-        The joints; of the results only status and largest loads, of the errors none but for a sweep.
+        The joints with their status and largest loads; with their errors only for a sweep.
     question : str
-        What the study asks, from the comment that opens it; empty where it does not say.
+        Question of the study, from its opening comment; empty if there is none.
     accepted : float
-        Share of the joints that may exceed a limit; NaN where nothing is asked.
+        Accepted share: share of the joints that may exceed a limit; NaN if none is given.
     counts : dict of str to int
         Joints by status, in the order of `tables.Status`.
     modes : ndarray, shape (4, 4)
-        Mean share of the revolution of each pin in each contact mode, over the settled joints; NaN where not kept.
+        Mean share of the revolution of each pin in each contact mode, over the settled joints; NaN if not kept.
     leading : tuple of str
-        Of each kind of load the one that counts most, see `page.leading`.
+        Leading load of each kind, see `page.leading`.
     logarithmic : frozenset of str
-        Those of them with so long a tail that the variance would be that of a few joints: causes are of the logarithm.
+        Leading loads with a tail so long that a few joints dominate the variance: their causes refer to the logarithm.
     causes, angles, worst : tuple
-        Of the leading loads.
+        Results for the leading loads.
     loading : Loading, optional
-        Load cycles, where the file holds them or histories.
+        Load cycles, if the file holds cycles or histories.
     lost : tuple of Lost
         The first joints without a valid result.
     lost_errors : DataFrame, optional
-        ``error``, and ``direction`` and ``size`` as in `causes.Causes.table`: whether joints without a valid result
-        have other errors than the settled ones; None where too few are lost.
+        ``error``, and ``direction`` and ``size`` as in `causes.Causes.table`: errors of joints without a valid result
+        compared with those of settled joints; None if there are too few of either.
     facts : tuple of (str, str)
-        Where the numbers come from.
+        Provenance of the numbers, as names and values.
     study : str
         Text of the study.
     notes : tuple of str
-        What the reader must know of the whole.
+        Remarks that concern the whole page.
     """
 
     campaign: Campaign
@@ -103,15 +103,15 @@ class Findings:
 
     @property
     def judged(self) -> bool:
-        """Whether a share is asked for."""
+        """Whether an accepted share is given."""
         return bool(np.isfinite(self.accepted))
 
     @property
     def sampled(self) -> bool:
-        """Whether the joints are a sample of a production, and neither a grid nor a design."""
+        """Whether the joints are a sample of a production, not a grid or a design."""
         return self.campaign.method in ("random", "sobol", "lhs", "importance")
 
     @property
     def alike(self) -> bool:
-        """Whether every joint counts the same."""
+        """Whether all joints have the same weight."""
         return self.campaign.weights is None

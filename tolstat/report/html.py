@@ -1,4 +1,4 @@
-"""The page as one HTML file: styles, pictures and script inside, nothing is loaded from anywhere."""
+"""The page as one self-contained HTML file: styles, pictures and script are embedded."""
 
 from __future__ import annotations
 
@@ -39,6 +39,6 @@ def _figure(panel: Panel) -> dict[str, Any]:
 
 
 def _data(value: Any) -> Markup:
-    """JSON to stand in a script: no text of it can end the element."""
+    """JSON for a script element, escaped so that no string can close the element."""
     text = json.dumps(value, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))

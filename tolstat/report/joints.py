@@ -14,7 +14,7 @@ from tolstat.questions.causes import angles_figure as angles
 from tolstat.report.findings import Findings, Worst
 
 ERRORS = 4
-"""Errors of a joint that the table names."""
+"""Number of errors listed for each joint."""
 SIGNIFICANT = 0.05
 MODE_COLOURS = ("#E6E6E6", style.COLOURS[3], style.COLOURS[1], style.COLOURS[0])
 
@@ -71,7 +71,7 @@ def _histories(ax: Axes, worst: Worst, found: Findings) -> None:
 
 
 def modes_section(found: Findings) -> Section:
-    """How the pins touch their holes."""
+    """Contact modes: mean share of the revolution that each pin spends in each mode."""
     words = [mode.name.lower().replace("_", " ") for mode in Mode]
     rows = [[pin, *(text.percent(share) for share in line)] for pin, line in zip(PINS, found.modes, strict=True)]
     said = "; ".join(f"{row[0]}: " + ", ".join(f"{w} {v}" for w, v in zip(words, row[1:], strict=True)) for row in rows)
@@ -94,7 +94,7 @@ def _modes(ax: Axes, found: Findings, words: list[str]) -> None:
 
 
 def lost_section(found: Findings) -> Section:
-    """Joints without a valid result: how many, why, and whether their errors are others."""
+    """Joints without a valid result: number, reason, and how their errors differ from those of settled joints."""
     states = {status.label: status for status in Status}
     rows = [[name, str(count), STATUS_TEXT[states[name]]] for name, count in found.counts.items() if count]
     blocks: list[Block] = [Table("What became of the joints", ["status", "joints", "meaning"], rows, frozenset({0, 2}))]

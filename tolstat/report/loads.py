@@ -21,7 +21,7 @@ from tolstat.store.view import Campaign, load
 from tolstat.store.view import ends as intervals
 
 STEPS = 240
-"""Loads at which the reader has an answer, some more or less: they are round."""
+"""Approximate number of levels at which the reader tool has values; the levels are round numbers."""
 ONE_IN = (1e3, 1e4, 1e5)
 TOLERANCE = 0.99
 """Share of the joints that the tolerance limit covers."""
@@ -132,14 +132,15 @@ def _bands(ax: Axes, campaign: Campaign, name: str) -> None:
 
 
 def readings(campaign: Campaign) -> dict[str, Any]:
-    """Exceedance of every load at round loads, for the reader; exact there, and nothing is read in between.
+    """Exceedance of every load at round levels, for the reader tool: exact there, not interpolated between them.
 
     Returns
     -------
     dict
-        By load: ``unit``; ``n``, ``failed``, ``unsettled``; ``start``, the place to begin at (the limit, or the 90 %
-        quantile); lists ``x``, ``count``, ``share`` and, for independent samples, ``lower``, ``upper``,
-        ``outer_lower``, ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``, of one length.
+        By load: ``unit``; ``n``, ``failed``, ``unsettled``; ``start``, index of the level shown first (nearest to the
+        limit or, without one, to the 90 % quantile); lists of equal length ``x``, ``count``, ``share`` and, for
+        independent samples, ``lower``, ``upper``, ``outer_lower``, ``outer_upper``, otherwise ``bound_lower``,
+        ``bound_upper``.
     """
     found = {}
     for name in campaign.listed:

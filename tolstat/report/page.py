@@ -1,4 +1,4 @@
-"""The report of a result file as one page: reads what it needs, a block of joints at a time, and writes it."""
+"""The report of a result file as one page: read and evaluate the campaign, then write the HTML."""
 
 from __future__ import annotations
 
@@ -41,29 +41,29 @@ from tolstat.study import Study
 from tolstat.study.tolerances.distributions import score
 
 JOINTS = 20_000
-"""Joints that causes and cycles are looked for in, the first ones: more tell little more, and take memory."""
+"""Maximum number of joints (the first ones) used for causes; a quarter for cycles. More add little and take memory."""
 WORST, DRAWN = 8, 3
-"""Joints named, and drawn, of each leading load."""
+"""Numbers of worst joints listed and drawn for each leading load."""
 HEAVY = 3.0
-"""Largest load over the median from which on the causes of a load are those of its logarithm."""
+"""Ratio of the largest load to the median above which the causes refer to the load's logarithm."""
 NAMED = 12
-"""Joints without a valid result that are named."""
+"""Maximum number of joints without a valid result that are listed."""
 
 
 def write(path: str | Path, out: str | Path, accepted: float = np.nan, again: int = angles.JOINTS) -> Path:
-    """Write the report of a result file as one page, in whatever state the campaign is.
+    """Write the report of a result file as one page; the campaign may be unfinished.
 
     Parameters
     ----------
     path : str or Path
-        The result file of a study that draws its joints, or sweeps.
+        The result file of a study that draws its joints or sweeps.
     out : str or Path
         HTML file to write.
     accepted : float
-        Share of the joints that may be above a limit; NaN where nothing is asked.
+        Accepted share: share of the joints that may be above a limit; NaN if none is given.
     again : int
-        Joints that loads over the shaft angle are looked at of; without stored histories they are simulated again.
-        None with 0.
+        Number of joints whose load histories are evaluated; without stored histories they are simulated again. With 0
+        the page shows no histories.
 
     Returns
     -------
@@ -90,19 +90,19 @@ def write(path: str | Path, out: str | Path, accepted: float = np.nan, again: in
 
 
 def simulates(store: ResultStore) -> bool:
-    """Whether the page of a file needs joints to be simulated again: it is of a sample, and has no histories."""
+    """Whether the page needs joints to be simulated again: the file holds a sample without load histories."""
     return store.sampling["method"] in angles.DRAWN and not revolutions.held(store)
 
 
 def gather(store: ResultStore, accepted: float = np.nan, again: int = angles.JOINTS) -> Findings:
-    """Find out all that the page shows; what cannot be told is left out, and the page says why.
+    """Evaluate everything that the page shows; what cannot be evaluated is left out, and a note says why.
 
     Parameters
     ----------
     store : ResultStore
         The result file.
     accepted, again
-        As of `write`.
+        As in `write`.
     """
     campaign, modes = read(store)
     names = leading(campaign)
@@ -138,9 +138,9 @@ def gather(store: ResultStore, accepted: float = np.nan, again: int = angles.JOI
 
 @contextmanager
 def _noting(notes: list[str], what: str, path: Path) -> Iterator[None]:
-    """Turn an error that a user could mend into a note: a report of what there is comes first.
+    """Turn a `TolstatError` into a note, so that the rest of the report is still written.
 
-    The page of a file does not depend on the folder in which it lies.
+    The note names the file without its folder, so that the page does not depend on the folder.
     """
     try:
         yield
@@ -149,19 +149,19 @@ def _noting(notes: list[str], what: str, path: Path) -> Iterator[None]:
 
 
 def read(store: ResultStore) -> tuple[Campaign, NDArray[np.float64]]:
-    """Read the campaign without what the page does not need: 200 bytes a joint.
+    """Read the part of the campaign that the page needs: 200 bytes per joint.
 
     Returns
     -------
     campaign : Campaign
-        Results have the fields `source.LOAD_FIELDS`; errors are there for a sweep only.
+        Its results have the fields `source.LOAD_FIELDS`; it has errors only for a sweep.
     modes : ndarray, shape (4, 4)
         Mean share of the revolution by pin and contact mode, over the settled joints.
 
     Raises
     ------
     StoreError
-        When the file holds levels of a subset simulation, which are no sample.
+        When the file holds levels of a subset simulation, which are not a sample.
     """
     swept = store.sampling["method"] == "sweep"
     campaign = source.read(store, source.LOAD_FIELDS, None if swept else (), weighted=True)
@@ -178,10 +178,11 @@ def read(store: ResultStore) -> tuple[Campaign, NDArray[np.float64]]:
 
 
 def leading(campaign: Campaign) -> tuple[str, ...]:
-    """Of each kind of load the one that counts most.
+    """Select the leading load of each kind (force, torque, ...).
 
-    Of those with limits, or of all bushing loads where there are none, force and torque each the one that most joints
-    exceed its limit by; among equals the one with the highest 99 % quantile over its limit.
+    Candidates are the loads with limits or, without limits, all bushing loads kept. The leading load is the one whose
+    limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the limit (without limits
+    by the 99 % quantile).
     """
     names = list(campaign.limits) or list(campaign.drawn)
     found: dict[str, tuple[tuple[float, float], str]] = {}
@@ -198,13 +199,13 @@ def leading(campaign: Campaign) -> tuple[str, ...]:
 
 
 def heavy(campaign: Campaign, name: str) -> bool:
-    """Whether a load that is never zero has joints above `HEAVY` times its median."""
+    """Whether all valid values of a load are positive and the largest exceeds `HEAVY` times the median."""
     valid = exceedance.sort_out(load(campaign.results, name)[0], campaign.results["status"]).valid
     return bool(valid[0] > 0 and valid[-1] > HEAVY * valid[valid.size // 2])
 
 
 def question(text: str) -> str:
-    """What a study asks: the paragraph ``# Question: ...`` of the comment that opens it; empty where there is none."""
+    """Question of a study: the paragraph ``# Question: ...`` of its opening comment; empty if there is none."""
     lines = []
     for line in text.splitlines():
         if not line.startswith("#"):
@@ -215,7 +216,7 @@ def question(text: str) -> str:
 
 
 def _first(store: ResultStore) -> int:
-    """Row of the first joint that counts."""
+    """File slot of the first joint after the nominal one: 1 if slot 0 holds the nominal joint, else 0."""
     return int(bool(store.sampling["nominal_first"]) and store.rows.start == 0)
 
 
@@ -228,7 +229,7 @@ def _of_leading(
     again: int,
     notes: list[str],
 ) -> tuple[list[Causes], list[AgainstAngle], list[Worst]]:
-    """Causes, contribution against the angle, and worst joints of the leading loads."""
+    """Causes, contribution of the errors against the shaft angle, and worst joints of the leading loads."""
     found, at_angles, worst = [], list[AgainstAngle](), []
     bushings = [name for name in names if name.endswith((".F", ".T"))]
     with _noting(notes, "causes are left out", store.path):
@@ -251,7 +252,7 @@ def _of_leading(
 
 
 def _some(store: ResultStore, campaign: Campaign) -> Campaign:
-    """The first joints with their errors."""
+    """The first `JOINTS` joints, with their errors."""
     skip, results = _first(store), campaign.results[:JOINTS]
     return replace(campaign, results=results, errors=store.errors(slice(skip, skip + len(results))))
 
@@ -268,7 +269,7 @@ def _worst(store: ResultStore, study: Study, campaign: Campaign, name: str, hist
 
 
 def _cycles(store: ResultStore, campaign: Campaign, notes: list[str]) -> Loading | None:
-    """Load cycles of the first joints, where the file holds what they are counted from."""
+    """Load cycles of the first joints; None if the file has no usable histories."""
     if not store.history_specs or campaign.method == "sweep" or not campaign.count(Status.OK):
         return None
     with _noting(notes, "load cycles are left out", store.path):
@@ -286,7 +287,7 @@ def _lost(store: ResultStore, campaign: Campaign) -> list[Lost]:
 
 
 def _errors_of_lost(store: ResultStore, study: Study, campaign: Campaign) -> pd.DataFrame | None:
-    """Whether lost joints have other errors than settled ones, among the first joints; None where too few are lost."""
+    """Compare errors of lost and settled joints among the first `JOINTS`; None if there are too few of either."""
     status, skip = campaign.results["status"][:JOINTS], _first(store)
     done = status != Status.PENDING
     lost = np.isin(status, (*FAILED, *UNSETTLED))[done]
@@ -311,7 +312,7 @@ def _stopped(store: ResultStore) -> str:
 
 
 def _facts(store: ResultStore) -> Iterator[tuple[str, str]]:
-    """Where the numbers come from, as names and values."""
+    """Provenance of the numbers, as names and values."""
     attributes = store.attributes()
     yield "Study", store.study_name
     rows = f"{store.n}" if store.whole else f"{store.rows.start} to {store.rows.stop - 1} of {store.campaign_rows}"
@@ -330,7 +331,7 @@ def _facts(store: ResultStore) -> Iterator[tuple[str, str]]:
 
 
 def _word(name: str, value: Any) -> str:
-    """A setting of the solver as a study writes it."""
+    """Value of a solver setting as it is written in a study."""
     kinds: dict[str, type[IntEnum]] = {"method": Method, "start": Start, "fidelity": Fidelity}
     return kinds[name](value).name.lower() if name in kinds else str(value)
 

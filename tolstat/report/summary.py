@@ -1,4 +1,4 @@
-"""All statistics of a campaign at once, for other programs: what the report has, as JSON has it."""
+"""All statistics of a campaign as JSON values, for other programs: the numbers of the report."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from tolstat.store import view as source
 
 
 def of_store(store: ResultStore, confidence: float = 0.95) -> dict[str, Any]:
-    """Put the statistics of a campaign together.
+    """Collect the statistics of a campaign.
 
     Parameters
     ----------
     store : ResultStore
         File of a study whose joints are drawn from tolerances.
     confidence : float
-        Of all intervals.
+        Confidence level of all intervals.
 
     Returns
     -------
     dict
-        JSON values, SI, null for what is not known: ``study``, ``method``, ``confidence``; ``joints`` by status;
-        ``limits`` (share above each, as `report.exceedance.limits`), ``quantiles`` of every load kept, ``capability``
-        (as `report.capability.limits`; not of weighted joints); ``numerical_error`` by kind of load; ``fidelity``, what
-        the results stand on; ``provenance``.
+        JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``joints``, numbers by status;
+        ``limits`` (share above each, as `exceedance.rendering.limits`), ``quantiles`` of every load kept,
+        ``capability`` (as `capability.rendering.limits`; empty for weighted joints); ``numerical_error`` by kind of
+        load; ``fidelity``, a sentence on the fidelity of the results; ``provenance``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""First on the page: what was asked, and what came of it."""
+"""First section of the page: the question, and the verdict on each limit."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ def section(found: Findings) -> Section:
 
 
 def verdict(row: Mapping[Any, Any], accepted: float) -> str:
-    """Whether an interval, with all that is known to be doubtful in it, lies below or above the share accepted.
+    """Verdict on a limit: whether the interval `ends` of its share lies below or above the accepted share.
 
     Parameters
     ----------
     row : mapping
         A row of `exceedance.limits`.
     accepted : float
-        Share of the joints that may be above the limit; NaN where nothing is asked.
+        Accepted share: share of the joints that may be above the limit; NaN if none is given.
 
     Returns
     -------
     str
-        ``yes``, ``no``, ``open``; empty where nothing is asked.
+        ``yes`` (below), ``no`` (above), ``open`` (neither, or no interval); empty without an accepted share.
     """
     if np.isnan(accepted):
         return ""
@@ -62,7 +62,7 @@ def verdict(row: Mapping[Any, Any], accepted: float) -> str:
 
 
 def ends(row: Mapping[Any, Any]) -> tuple[float, float]:
-    """Interval that covers sampling, unresolved joints and, where it is known, the numerical error."""
+    """Interval that covers sampling, unresolved joints and, if known, the numerical error."""
     wide = (row["total_lower"], row["total_upper"])
     return (row["outer_lower"], row["outer_upper"]) if np.isnan(wide[0]) else wide
 
@@ -144,7 +144,7 @@ def _limits(found: Findings, table: pd.DataFrame, judged: list[str]) -> list[Blo
 
 
 def _open(records: list[dict[Any, Any]], judged: list[str], accepted: float) -> str:
-    """Joints that would tell of each open limit, did the share stay what it is."""
+    """Sentence on the number of joints that would decide each open limit if the shares stayed the same."""
     said = []
     for row, answer in zip(records, judged, strict=True):
         if answer == "open":

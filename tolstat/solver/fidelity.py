@@ -1,7 +1,7 @@
 """``solver.fidelity = "auto"``: the cheapest rung of the fidelity ladder that a pilot shows to be good enough.
 
-A few joints of the campaign are solved on every rung and on a finer one, the reference. What decides is counted, not
-timed: the same study chooses the same rung on a loaded machine.
+A few joints of the campaign are solved on every rung and on a finer one, the reference. Cost is counted, not timed, so
+that the same study chooses the same rung on a loaded machine.
 """
 
 from __future__ import annotations
@@ -36,12 +36,13 @@ REFERENCE = Rung(Fidelity.DYNAMIC, 2 * FINEST_STEPS)
 JOINTS = 24
 """Random joints of a pilot, beside the nominal one."""
 MARGIN = 1.5
-"""What the worst error of the pilot is multiplied by before the budget must hold: a campaign has worse joints than a
+"""Factor on the worst error of the pilot before it is compared with the budget: a campaign has worse joints than a
 pilot of two dozen."""
 WEIGHTS = {"steps": 2.3, "newton_iterations": 2.6, "factorisations": 4.3}
-"""Cost of a joint by its counts: microseconds of one core, fitted over fidelities and steps a revolution."""
+"""Weights of the counts in the cost of a joint: microseconds of one core, fitted over fidelities and steps a
+revolution."""
 LOADS = tuple(f"{bushing}.{kind}" for bushing in BUSHINGS for kind in "FT")
-"""What a study without limits is taken to ask for."""
+"""Loads whose errors decide where a study has no limits."""
 
 
 class Choice(NamedTuple):
@@ -64,7 +65,7 @@ class Choice(NamedTuple):
 
 
 def pilot(rows: int, nominal_first: bool, seed: int) -> NDArray[np.intp]:
-    """Rows of a campaign to choose by: the nominal joint, if it has one, and random others; ascending."""
+    """Select the rows of the pilot: the nominal joint, if the campaign has one, and random others; ascending."""
     first = int(nominal_first)
     count = min(JOINTS, rows - first)
     drawn = first + np.random.default_rng([seed, JOINTS]).choice(rows - first, count, replace=False)
@@ -82,15 +83,15 @@ def choose(
     """Choose a rung by a pilot of joints.
 
     A rung is good enough when the error of every load asked for, times `MARGIN`, is within the budget for every joint
-    of the pilot that settles in the reference, and when no joint ends in another state than there. Errors are relative
-    to the joint's largest load of the kind.
+    of the pilot that settles in the reference, and when every joint ends with the same status as in the reference.
+    Errors are relative to the joint's largest load of the kind.
 
     Parameters
     ----------
     params : ndarray of PARAM, shape (n,)
-        The pilot.
+        The joints of the pilot.
     options : Options
-        Settings but for fidelity and steps a revolution.
+        Numerical settings; fidelity and steps a revolution are replaced.
     budget : float
         Largest error allowed.
     loads : sequence of str
@@ -98,7 +99,7 @@ def choose(
     simulate : callable
         (n,) table PARAM, Options -> Simulation.
     least_steps : int
-        Steps a revolution that histories need.
+        Minimum number of steps a revolution, as load histories need it.
 
     Returns
     -------
@@ -129,12 +130,12 @@ def choose(
 
 
 def apply(options: Options, record: Mapping[str, Any]) -> Options:
-    """Options of a campaign whose choice is on record."""
+    """Return the options with the rung on record."""
     return _at(options, Rung(Fidelity[record["fidelity"].upper()], record["steps_per_rev"]))
 
 
 def describe(record: Mapping[str, Any]) -> str:
-    """The choice and the table that it rests on, as aligned text; a line a rung."""
+    """Format the choice and its table as aligned text, one line per rung."""
     lines = [str(record["reason"]), "  rung                    error worst     q95    cost  other states"]
     for entry in record["table"]:
         name = f"{entry['fidelity']} {entry['steps_per_rev']}"
@@ -144,7 +145,7 @@ def describe(record: Mapping[str, Any]) -> str:
 
 
 def sentence(options: Mapping[str, Any], record: Mapping[str, Any]) -> str:
-    """What the numbers of a file stand on, for its report; empty for the dynamic joint at steps that the user gave."""
+    """Fidelity of the numbers in a file, for its report; empty for dynamic fidelity at steps that the user gave."""
     if record:
         return str(record["reason"])
     rung = Rung(Fidelity(options["fidelity"]), options["steps_per_rev"])
@@ -152,7 +153,7 @@ def sentence(options: Mapping[str, Any], record: Mapping[str, Any]) -> str:
 
 
 def values(results: NDArray[np.void], name: str) -> tuple[Array, Array]:
-    """A load of each joint and the joint's largest of the kind, which errors are relative to; (n,) each, SI."""
+    """Return a load of each joint and, as scale of its error, the joint's largest load of the kind; (n,) each, SI."""
     part, _, kind = name.partition(".")
     if kind == "contact":
         contact = results["contact_max"].max(axis=2)
@@ -168,7 +169,7 @@ def _at(options: Options, rung: Rung) -> Options:
 
 
 def _entry(rung: Rung, results: NDArray[np.void], truth: NDArray[np.void], names: Sequence[str]) -> dict[str, Any]:
-    """What the pilot shows of one rung: plain values for the result file; errors None where no joint has one."""
+    """Summarise the pilot on one rung, as plain values for the result file; errors are None if no joint settled."""
     settled = (results["status"] == Status.OK) & (truth["status"] == Status.OK)
     errors = {name: _error(results[settled], truth[settled], name) for name in names}
     worst = np.max(list(errors.values()), axis=0)

@@ -24,7 +24,7 @@ class Trajectory(NamedTuple):
     q, v, a : ndarray, shape (steps + 1, n)
         Unknowns, velocities, accelerations; NaN from the point of a failure on.
     status : Status
-        What became of it, see `integrate`.
+        How the integration ended, see `integrate`.
     steps, newton_iterations, halvings : int
         Work done; `steps` counts sub-steps.
     """
@@ -62,7 +62,7 @@ def integrate(
     Parameters
     ----------
     acceleration : function (t, q, v, out) -> None
-        Writes every entry of q'' to `out`; with `mass`, every entry of the force f. `out` holds NaN before. Jitted by
+        Writes every entry of q'' to `out`; with `mass`, every entry of the force f. `out` is NaN on entry. Jitted by
         numba, or plain Python that numba can compile.
     q0, v0 : array_like, shape (n,)
         Initial unknowns and velocities; a number for one unknown.
@@ -72,12 +72,12 @@ def integrate(
         Steps of the output grid.
     method : {"generalized_alpha", "bdf2", "tr_bdf2"}
         All of order 2; generalised-alpha with spectral radius `rho_inf` at infinite frequency keeps energy better, the
-        others are L-stable. BDF2 alone stays quiet where steps are far too long for an impact.
+        others are L-stable. Only BDF2 does not oscillate where steps are far too long for an impact.
     tangent : function (t, q, v, dq, dv) -> None, optional
-        Writes the derivatives by q and by v of what `acceleration` writes to `dq` and `dv`, each (n, n), row i that of
-        entry i. Both hold zeros before. Without it differences are used.
+        Writes to `dq` and `dv`, each (n, n), the derivatives by q and by v of what `acceleration` writes; row i belongs
+        to entry i. Both are zero on entry. Without it finite differences are used.
     mass : array_like, shape (n, n), or function (t, q, out) -> None, optional
-        Mass M, or a function that writes it to `out`, (n, n), which holds zeros before.
+        Mass M, or a function that writes it to `out`, (n, n), which is zero on entry.
     rho_inf : float
         Numerical dissipation of generalised-alpha, 0 (strongest) to 1 (none).
     rtol, atol : float
@@ -107,9 +107,9 @@ def integrate(
     Raises
     ------
     ValueError
-        For shapes or values that make no sense; the message lists all of them.
+        For invalid shapes or values; the message lists all of them.
     TypeError
-        For functions that cannot be called or compiled as described. What they raise themselves passes through.
+        For functions that cannot be called or compiled as described. Exceptions that they raise are passed on.
     """
     options = Options(
         method=_method(method),
@@ -141,14 +141,14 @@ def integrate(
 
 
 def _method(name: str) -> int:
-    """Number of a method; ValueError for one that there is not."""
+    """Return the number of a method; ValueError for an unknown name."""
     if not isinstance(name, str) or name.upper() not in Method.__members__:
         raise ValueError(f"method {name!r} is none of {', '.join(m.name.lower() for m in Method)}")
     return int(Method[name.upper()])
 
 
 def _start_faults(q: NDArray[Any], v: NDArray[Any], matrix: NDArray[Any] | None) -> list[str]:
-    """What is wrong with the initial values and a constant mass."""
+    """List the faults of the initial values and of a constant mass."""
     faults = []
     if q.ndim != 1 or q.size < 1 or q.shape != v.shape or not (np.isfinite(q).all() and np.isfinite(v).all()):
         faults.append(f"q0 and v0 must be finite vectors of one length, not of shapes {q.shape} and {v.shape}")
@@ -161,7 +161,7 @@ def _start_faults(q: NDArray[Any], v: NDArray[Any], matrix: NDArray[Any] | None)
 
 
 def _grid_faults(t_span: tuple[float, float], steps: int, max_substeps: int) -> list[str]:
-    """What is wrong with the output grid and the bound on the work."""
+    """List the faults of the output grid and of the bound on the work."""
     faults = []
     span = np.asarray(t_span, float)
     if span.shape != (2,) or not np.isfinite(span).all() or not span[1] > span[0]:
@@ -174,7 +174,7 @@ def _grid_faults(t_span: tuple[float, float], steps: int, max_substeps: int) -> 
 
 
 def _option_faults(options: Options) -> list[str]:
-    """What is wrong with the numerical settings."""
+    """List the faults of the numerical settings."""
     faults = []
     if not 0 <= options.rho_inf <= 1:
         faults.append(f"rho_inf {options.rho_inf} must lie between 0 and 1")
@@ -191,7 +191,7 @@ def _option_faults(options: Options) -> list[str]:
 
 @lru_cache(maxsize=128)
 def _jitted(function: Any, signature: str, dimensions: tuple[int, ...]) -> Any:
-    """Compile a function for numbers (0) and arrays of `dimensions`; TypeError with the reason when it cannot be."""
+    """Compile a function for arguments of `dimensions` (0: number); TypeError with the reason if that fails."""
     import numba
     from numba.core.errors import NumbaError
 
@@ -209,7 +209,7 @@ def _jitted(function: Any, signature: str, dimensions: tuple[int, ...]) -> Any:
 
 @lru_cache(maxsize=32)
 def _bind(force: Any, tangent: Any, mass: Any, divided: bool) -> Any:
-    """Compile the march for one system; a system met again is not compiled again."""
+    """Bind the integrator to one system; the cache spares compiling the same system again."""
     from tolstat.kernel.integrators import march
 
     build: Any = march.build_march

@@ -1,7 +1,7 @@
 """Rainflow cycles of a settled revolution, for one signal or for all channels of a joint.
 
 The revolution repeats, so counting begins at its largest value and every cycle closes (ASTM E1049-85, 5.4.5). The
-four-point method gives the same cycles when its residue is counted once more behind itself.
+four-point method gives the same cycles when its residue is appended to itself and counted again.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.common.tables import CHANNELS, HistorySpec
 
 KEPT = 16
-"""Most cycles kept of a channel: joints made to ISO 2768-f have 1.7 a channel in the mean, 11 at most."""
+"""Maximum number of cycles kept per channel: joints made to ISO 2768-f have 1.7 a channel in the mean, 11 at most."""
 GATE = 1e-4
-"""Cycles up to this part of the joint's largest force or torque are not counted: what the default of
-``solver.settle_tol`` leaves open between two revolutions."""
+"""Cycles up to this fraction of the joint's largest force or torque are not counted: the default of
+``solver.settle_tol`` allows loads to differ by as much between two revolutions."""
 LEAST_SAMPLES = 90
-"""Fewest samples of a revolution where tolstat chooses the steps: peaks of a load of four cycles are within 1 %."""
+"""Minimum number of samples a revolution where tolstat chooses the steps: errors of peaks of a load with four cycles
+are within 1 %."""
 
 SPECS = {
     "cycles": HistorySpec(

@@ -1,7 +1,7 @@
-"""Tight reference solutions of single joints by integrators of scipy, and the joint as they take it.
+"""Tight reference solutions of single joints by scipy's integrators, and the joint as a first-order system for them.
 
 Only the equations of motion are shared with the solver: its integrators, linear algebra and analytic tangent are not.
-The Jacobian is made of differences of the accelerations.
+The Jacobian is computed from finite differences of the accelerations.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ FloatArray = NDArray[np.float64]
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
 
 SAMPLES_PER_REV = 2880
-"""Angles at which loads are looked at, beside the integrator's own steps: a peak is met within 1e-6 of its height."""
+"""Angles a revolution at which loads are evaluated, in addition to the integrator's own steps: a peak is met within
+1e-6 of its height."""
 LENGTH, VELOCITY = 1e-4, 1.0
-"""Sizes (m or rad, per s) below which errors of unknowns and velocities are absolute: a clearance, and what moves a
-bushing's damping force by its tolerance."""
+"""Sizes (m or rad, per s) below which errors of unknowns and velocities are absolute: a clearance, and a velocity that
+changes a bushing's damping force by its tolerance."""
 MAX_STEPS = 50_000
-"""Bound on the work of a joint: half a minute. Where contacts ring it takes a few thousand steps."""
+"""Bound on the steps of a joint: half a minute. Where contacts ring the integrator takes a few thousand steps."""
 MAX_REVS = 6
-"""Revolutions after which a joint whose largest loads still change is not periodic."""
+"""Number of revolutions after which a joint whose largest loads still change is not periodic."""
 
 
 class Largest(NamedTuple):
@@ -48,7 +49,7 @@ class Largest(NamedTuple):
 
 
 class FirstOrder(NamedTuple):
-    """A joint as y' = f(t, y), y = (q, q') of 110 components (m and rad, per s), and a state to begin from.
+    """A joint as y' = f(t, y), y = (q, q') of 110 components (m and rad, per s), and an initial state.
 
     Attributes
     ----------
@@ -57,9 +58,9 @@ class FirstOrder(NamedTuple):
     jacobian : callable
         (t, y) -> df/dy, (110, 110).
     t0 : float
-        Time, s, of that state: of the settled one in its revolution.
+        Time of the initial state, s; for a settled one, time within its revolution.
     y0 : ndarray, shape (110,)
-        The state.
+        Initial state.
     period : float
         Time of a revolution, s.
     scale : ndarray, shape (110,)
@@ -67,7 +68,7 @@ class FirstOrder(NamedTuple):
     largest : callable
         Times (m,) and states (m, 110) -> Largest.
     settled : ndarray of RESULT, shape (1,)
-        What the solver made of the joint. Without results in it (its status says so) there is no state to begin from.
+        Result of the solver for the joint. If its status is one without results, there is no initial state.
     """
 
     rate: Callable[[float, FloatArray], FloatArray]
@@ -81,21 +82,21 @@ class FirstOrder(NamedTuple):
 
 
 def first_order(params: NDArray[np.void], options: Options, from_start: bool = False) -> FirstOrder:
-    """Settle a joint with the solver and give it as a system of first order from there.
+    """Simulate a joint until it settles, and return it as a first-order system that starts in the settled state.
 
     Parameters
     ----------
     params : ndarray of PARAM, shape (1,)
         The joint.
     options : Options
-        Settings of the solver that settles it, at dynamic fidelity whatever they say.
+        Numerical settings of that simulation; its fidelity is always dynamic.
     from_start : bool
-        Begin where the solver does instead, at time zero.
+        Start the system where the solver starts instead, at time zero.
 
     Returns
     -------
     FirstOrder
-        Its functions share work arrays: not for several threads.
+        Its functions share work arrays, and so are not thread-safe.
     """
     from tolstat.kernel.integrators import first_order as kernel
     from tolstat.kernel.mechanics.topology import N_DOF
@@ -114,7 +115,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     if from_start:
         t0, y0 = 0.0, _start(par, options)
     else:
-        options = options._replace(start=int(Start.STATIC))  # the torque has risen
+        options = options._replace(start=int(Start.STATIC))  # the torque ramp has ended
 
     n = 2 * N_DOF
     works, scratch = np.zeros(1, WORK), np.empty((3, n))
@@ -143,7 +144,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
 
 def _start(par: np.record, options: Options) -> FloatArray:
-    """State at time zero that the solver starts from, (110,)."""
+    """Initial state of the solver at time zero, (110,)."""
     from tolstat.kernel.revolution.simulate import make_scratch
     from tolstat.kernel.revolution.trajectory import follow
 
@@ -162,14 +163,16 @@ def reference_rows(
     max_steps: int = MAX_STEPS,
     angles: int | None = None,
 ) -> NDArray[np.void]:
-    """Solve joints tightly from their settled state: one revolution to forget it, then until the largest loads repeat.
+    """Solve joints with a tight tolerance from their settled state until their largest loads repeat.
+
+    The first revolution serves to forget the errors of that state.
 
     Parameters
     ----------
     params : ndarray of PARAM, shape (n,)
         The joints.
     options : Options
-        Settings of the solver that gives the state to begin from.
+        Numerical settings of the solver that gives the settled state.
     rtol : float
         Relative tolerance; the absolute one is `rtol` times `LENGTH` and `VELOCITY`.
     integrator : {"Radau", "BDF", "LSODA"}
@@ -187,8 +190,8 @@ def reference_rows(
     ndarray of RESULT, shape (n,)
         ``status``, ``settled``, ``closure`` (that change), ``revolutions``, ``steps`` and the largest loads of the last
         revolution; all else is NaN. A joint that the solver cannot simulate keeps its status; one that does not repeat
-        within `MAX_REVS` or `max_steps` is ``NOT_SETTLED``, and ``NEWTON_FAILED`` if that came before the second
-        revolution ended.
+        within `MAX_REVS` or `max_steps` is ``NOT_SETTLED``, or ``NEWTON_FAILED`` if the integration ended before the
+        second revolution did.
     """
     results = without_results(len(params), Status.NEWTON_FAILED)
     for i in range(len(params)):
@@ -210,7 +213,7 @@ def _periodic(
     angles: int | None,
     out: NDArray[np.void],
 ) -> Status:
-    """Integrate until the largest loads repeat; write them and what it took to `out`, (1,)."""
+    """Integrate until the largest loads repeat; write them and the work to `out`, (1,); return the status."""
     import scipy.integrate
 
     end = system.t0 + (MAX_REVS + 0.5) * system.period
@@ -236,7 +239,7 @@ def _periodic(
 
 
 def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | None) -> Iterator[tuple[Largest, int]]:
-    """Largest loads of each revolution and steps taken until then; ends early when the integrator gives up."""
+    """Yield the largest loads of each revolution and the steps so far; end early when the integrator gives up."""
     times, states = np.empty(0), np.empty((0, len(system.y0)))
     new_times, new_states = [], []
     spacing, done = system.period / (angles or SAMPLES_PER_REV), 0

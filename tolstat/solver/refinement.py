@@ -1,7 +1,7 @@
-"""Joints that the uniform steps do not resolve, once more with steps that follow the error.
+"""Second simulation, with error-controlled steps, of joints that the uniform steps do not resolve.
 
-These are joints that have not settled, and those whose steps err by too much. A joint whose largest loads still change
-with the last tolerance is unresolved, and is said to be.
+These are joints that have not settled, and those whose estimated step error is too large. A joint whose largest loads
+still change with the last tolerance is reported as not resolved.
 """
 
 from __future__ import annotations
@@ -18,27 +18,29 @@ TOLERANCE = 0.04
 """First tolerance of the error of a part of a step, as a load relative to the joint's largest
 (`kernel.integrators.mesh`); each tighter one is an eighth (`kernel.revolution.resolve.TIGHTER`)."""
 WATCHED = 48
-"""Revolutions after which a joint that has not repeated is given up, if `max_revs` is less."""
+"""Revolutions after which a joint that has not repeated is given up, unless `max_revs` is larger."""
 STEP_ERROR, AT_STEPS = 0.07, 180
 """Mean error of the uniform steps above which a joint is refined. Its largest loads err by less, since ringing that the
-steps do not resolve decays. With fewer steps a revolution than these it is larger for smooth motion, too: it goes with
-the third power of a step."""
+steps do not resolve decays. With fewer steps a revolution than the second number the bound grows with the third power
+of the step, as the error of smooth motion does."""
 LIVELY, LIVELY_ERROR = 1.5e-3, 1e-3
 """|Psi| above which the output shaft swings about the ideal motion, and the mean error above which such a joint is
-refined: a swing remembers errors for long, and steps of BDF2 damp it. Both were found with 2759 joints that were
-solved both ways, at 10, 30 and 100 N m and of the fuzz: of those not refined the worst is 0.8 % off."""
+refined: a swing remembers errors for long, and BDF2 damps it. Both numbers come from 2759 joints that were solved both
+ways, at 10, 30 and 100 N m and of the fuzz tests: of those not refined the worst is 0.8 % off."""
 UNRESOLVED = 0.05
-"""Change by the last tolerance that a joint may not exceed. TR-BDF2 leaves a third of it as error, or less."""
+"""Change of the largest loads by the last tolerance above which a joint is not resolved. TR-BDF2 leaves a third of it
+as error, or less."""
 NARROW = 0.02
-"""Width of a stationary joint's interval, as a part of its largest load, up to which its motion may as well repeat."""
+"""Width of a stationary joint's interval, relative to its largest load, up to which results of the uniform steps may
+stand."""
 COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")
-"""What a joint has cost: all its runs together."""
+"""Counters of work, summed over all runs of a joint."""
 
 Simulate = Callable[[NDArray[np.intp], Options], tuple[NDArray[np.void], NDArray[np.void]]]
 
 
 def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> None:
-    """Simulate joints again that need it, with steps that follow the error, until their largest loads change no more.
+    """Repeat joints that need it with error-controlled steps, until their largest loads change no more.
 
     Parameters
     ----------
@@ -67,7 +69,7 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     found["step_error"] = results["step_error"][rows]
     agreed = (results["status"][rows] == Status.OK) & _agree(results[rows], found)
     if agreed.any():
-        results[rows[agreed]], _ = simulate(rows[agreed], options)  # its load histories are to be kept
+        results[rows[agreed]], _ = simulate(rows[agreed], options)  # for the load histories of the uniform steps
     for name in COUNTS:
         results[name][rows[agreed]] = found[name][agreed]
     rows, found, known = rows[~agreed], found[~agreed], known[~agreed]
@@ -78,7 +80,7 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
 
 
 def _agree(plain: NDArray[np.void], found: NDArray[np.void]) -> NDArray[np.bool_]:
-    """Whether stationary joints found have narrow intervals, and these hold the largest loads without refinement."""
+    """Whether joints are stationary, with narrow intervals that contain the largest loads of the uniform steps."""
     agree: NDArray[np.bool_] = found["status"] == Status.STATIONARY
     for load in ("F", "T"):
         lower, upper = found[f"{load}_lower"], found[f"{load}_upper"]

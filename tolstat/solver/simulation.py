@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
 MOST_KEPT = 12_000
-"""Samples that are in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
+"""Maximum number of samples in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
 
 NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
-"""Where no statistics of single revolutions are asked for."""
+"""Stands for the statistics of single revolutions where none are asked for."""
 
 
 def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
@@ -105,14 +105,14 @@ def scratch(options: Options) -> Scratch:
 
 @cache
 def lanes(options: Options) -> Batch:
-    """Work arrays of this process for joints in lock-step."""
+    """Work arrays of this process for joints simulated in lock-step."""
     from tolstat.kernel.lanes.batch import make_batch
 
     return make_batch(options)
 
 
 def in_lanes(options: Options) -> bool:
-    """Whether joints with these settings go in lock-step; all others go one after the other."""
+    """Whether joints with these settings are simulated in lock-step; all others are simulated one after the other."""
     from numba import config
 
     uniform = options.method == Method.BDF2 and options.rtol == 0
@@ -121,7 +121,7 @@ def in_lanes(options: Options) -> bool:
 
 
 def follows_error(options: Options) -> bool:
-    """Whether the steps of joints with these settings follow the error."""
+    """Whether these settings mean error-controlled steps."""
     return options.fidelity == Fidelity.DYNAMIC and options.method == Method.TR_BDF2 and options.rtol > 0
 
 
@@ -173,7 +173,7 @@ def _alone(
     results: NDArray[np.void],
     blocks: NDArray[np.void] = NO_BLOCKS,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints one after the other; gives the samples of each if they are to be kept."""
+    """Simulate joints one after the other; yield index and samples of each if `keep`."""
     from tolstat.kernel.revolution.simulate import simulate_joint
 
     alone = scratch(options)
@@ -193,7 +193,7 @@ def _together(
     results: NDArray[np.void],
     blocks: NDArray[np.void] = NO_BLOCKS,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints in lock-step, those with as many contact stations together; gives their samples if kept."""
+    """Simulate joints in lock-step by number of contact stations; yield index and samples of each if `keep`."""
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
@@ -215,7 +215,7 @@ def _together(
 
 
 def _groups(params: NDArray[np.void], most: int) -> Iterator[NDArray[np.intp]]:
-    """Rows with one number of contact stations, `most` at a time."""
+    """Yield the indices of joints with equal numbers of contact stations, `most` at a time."""
     for stations in np.unique(params["n_stations"]):
         rows = np.flatnonzero(params["n_stations"] == stations)
         for first in range(0, len(rows), most):
@@ -223,7 +223,7 @@ def _groups(params: NDArray[np.void], most: int) -> Iterator[NDArray[np.intp]]:
 
 
 def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:
-    """What is kept of the revolution recorded last, its samples given."""
+    """Extract the histories that are kept from the samples of the recorded revolution."""
     if histories == "full":
         return {name: samples[name] for name in specs}
     loads = np.ascontiguousarray(samples["loads"])
@@ -244,7 +244,7 @@ def is_compiled(options: Options | None = None) -> bool:
 
 
 def warm_up(options: Options | None = None) -> None:
-    """Compile the kernels that `options` need, or load them from the cache, with a joint that has no clearance."""
+    """Compile the kernels that `options` need, or load them from the cache, by a joint with negative clearance."""
     options = options or Options()
     params = np.zeros(1, PARAM)
     params["clearance"] = -1.0

@@ -1,9 +1,9 @@
-"""Joints whose motion never repeats, but whose largest loads do not change any more: stationary ones.
+"""Stationary joints: their motion never repeats, but the distribution of their largest loads does not change.
 
-Such a joint is watched for some revolutions. Their largest loads, one of each load a revolution (block maxima), tell
-how large the largest of ``solver.duration`` revolutions is: values above a threshold follow a generalised Pareto
-distribution (Pickands 1975), fitted by probability-weighted moments (Hosking and Wallis 1987). Its shape is kept from
-being heavy: a driven joint with losses has bounded loads.
+Such a joint is watched for some revolutions. The largest loads of each revolution (block maxima) tell how large the
+largest of ``solver.duration`` revolutions is: values above a threshold follow a generalised Pareto distribution
+(Pickands 1975), fitted by probability-weighted moments (Hosking and Wallis 1987). Heavy tails are excluded from the
+fit: a driven joint with losses has bounded loads.
 """
 
 from __future__ import annotations
@@ -16,28 +16,29 @@ from numpy.typing import NDArray
 from tolstat.common.tables import LARGEST, VALID, Motion, Status
 
 SETTLING = 1 / 3
-"""Share of the revolutions watched that is left out at their beginning."""
+"""Share of the revolutions watched that is discarded at their beginning."""
 FEWEST = 16
-"""Of a joint with less revolutions to go by nothing is told."""
+"""Minimum number of revolutions, without those discarded, to call a joint stationary."""
 ALIKE, SPREAD_ALIKE = 3.5, 3.0
-"""Halves are alike when their means differ by no more than this many standard errors, or `NEGLIGIBLE`, and when the
-ratio of their standard deviations is no more than this, or these are negligible."""
+"""Halves are alike when their means differ by no more than the first number of standard errors, or `NEGLIGIBLE`, and
+when the ratio of their standard deviations is no more than the second, or these are negligible."""
 NEGLIGIBLE = 0.01
-"""Part of a load that nobody would tell from it."""
+"""Relative difference of a load that does not matter."""
 TAIL = 0.4
-"""Share of the revolutions that the tail's distribution is fitted to."""
+"""Share of the revolutions, those with the largest loads, that the tail's distribution is fitted to."""
 DRAWS, SEED = 400, 5
-"""Of the bootstrap, and its seed: one joint's interval is the same wherever it is computed."""
+"""Number of bootstrap samples, and the seed: one joint's interval is the same wherever it is computed."""
 CONFIDENCE = 0.95
+"""Probability that the interval contains the largest load."""
 STEPS = 0.005
-"""Part of a load that the steps may be off by: no interval is narrower on either side."""
+"""Relative error of a load that the time steps may cause: no interval is narrower on either side."""
 
 FloatArray = NDArray[np.float64]
 Table = NDArray[np.void]
 
 
 class Interval(NamedTuple):
-    """Largest of many revolutions: median, and ends of the interval; each shape (m,)."""
+    """Largest load of many revolutions: median, and ends of the interval; each shape (m,)."""
 
     median: FloatArray
     lower: FloatArray
@@ -45,7 +46,7 @@ class Interval(NamedTuple):
 
 
 def tell(results: Table, blocks: Table, duration: int) -> None:
-    """Make joints stationary that are; write their largest loads, and for each kind the widest interval of any of them.
+    """Set the status of stationary joints; write their largest loads and, by kind of load, the widest interval.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def tell(results: Table, blocks: Table, duration: int) -> None:
     blocks : ndarray of RESULT, shape (n, revolutions)
         Statistics of their last revolutions, revolution r at r modulo their number.
     duration : int
-        Revolutions whose largest loads are asked for.
+        Number of revolutions whose largest loads are predicted.
     """
     for i in np.flatnonzero(np.isin(results["status"], (Status.NOT_SETTLED, Status.NOT_PERIODIC))):
         if results["motion"][i] == Motion.SUBHARMONIC:
@@ -75,7 +76,7 @@ def tell(results: Table, blocks: Table, duration: int) -> None:
 
 
 def fill_ends(results: Table) -> None:
-    """Write the ends of joints that repeat: 1, as there is no doubt of them; NaN of joints without a valid load.
+    """Write the interval ends of joints that repeat, 1 (no uncertainty), and of joints without a valid load, NaN.
 
     Parameters
     ----------
@@ -90,12 +91,12 @@ def fill_ends(results: Table) -> None:
 
 
 def is_stationary(watched: Table) -> bool:
-    """Whether largest loads are alike in both halves of the revolutions watched, in level and in spread.
+    """Whether the largest loads of both halves of the revolutions watched are alike, in mean and in spread.
 
     Parameters
     ----------
     watched : ndarray of RESULT, shape (revolutions,)
-        Statistics of one revolution after the other.
+        Statistics of successive revolutions.
     """
     return all(_alike(watched[field].max(axis=1)) for field in ("F_max", "T_max"))
 
@@ -111,20 +112,20 @@ def _alike(series: FloatArray) -> bool:
 
 
 def largest(values: FloatArray, duration: int) -> Interval:
-    """Largest of `duration` further revolutions, from the largest loads of each of those watched.
+    """Predict the largest of `duration` further revolutions from the largest loads of each of those watched.
 
     Parameters
     ----------
     values : ndarray, shape (n, m)
         m loads of n revolutions.
     duration : int
-        Revolutions asked about.
+        Number of revolutions of the prediction.
 
     Returns
     -------
     Interval
-        Prediction: median, and ends between which the largest lies with `CONFIDENCE`; fits to samples of the fitted
-        distribution (parametric bootstrap) carry the doubt of the fit.
+        Median, and ends between which the largest lies with `CONFIDENCE`; the uncertainty of the fit is included by
+        fits to samples of the fitted distribution (parametric bootstrap).
     """
     n, m = values.shape
     count = max(3, round(TAIL * n))
@@ -143,7 +144,7 @@ def largest(values: FloatArray, duration: int) -> Interval:
 
 
 def _pareto(excesses: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Scale and shape (negative: bounded) of the generalised Pareto distribution of excesses ascending along axis 0."""
+    """Scale and shape (negative: bounded) of the generalised Pareto distribution; excesses ascend along axis 0."""
     k = excesses.shape[0]
     place = (np.arange(1, k + 1) - 0.35) / k
     mean = excesses.mean(axis=0)

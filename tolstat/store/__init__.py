@@ -1,4 +1,4 @@
-"""The result file of a campaign; it knows tables, not physics."""
+"""The result file of a campaign: stores tables, contains no physics."""
 
 from tolstat.store.counts import Counts
 from tolstat.store.result_store import ResultStore

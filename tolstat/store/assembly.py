@@ -1,4 +1,4 @@
-"""A result file made of others: the files of slices put together, or a file with room for further rows."""
+"""Make one result file from others: merge the files of slices, or add pending rows to a file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tolstat.store.result_file import campaign_digest, fault, fill
 
 
 class Differing(Exception):
-    """Two files hold different results of one joint.
+    """Two files hold different results for the same joint.
 
     Attributes
     ----------
@@ -43,27 +43,27 @@ def assemble(
     overwrite: bool = False,
     origin: Iterable[NDArray[np.void]] | None = None,
 ) -> None:
-    """Make the file of a whole campaign from files of its rows.
+    """Create the result file of a whole campaign from files that hold parts of its rows.
 
     Parameters
     ----------
     path : Path
-        The file to make. It gets its name when it is complete.
+        The file to create. It is written under a temporary name and renamed when complete.
     attrs : mapping
-        Its attributes.
+        Attributes of the new file.
     n : int
-        Its rows.
+        Number of rows of the campaign.
     sources : sequence of Reader
-        Files with rows of it; where two hold the same row, what is done goes before what is pending.
+        Files with rows of the campaign; for a row in several files, a finished result takes precedence over pending.
     errors : iterable of table ERROR
-        Errors of all rows, block after block.
+        Errors of all rows, in consecutive blocks.
     design : (n,) table DESIGN, optional
-        What each row is, for a study that lists its joints.
+        Variant, case and group of each row, for a study that lists its joints.
     overwrite : bool
-        Whether a file at `path` is replaced. Histories then go beside it, since rows are still pending; otherwise
-        into it, and every row must be done.
+        Whether to replace a file at `path`. If true, histories are written to the folder of parts beside the file,
+        since rows are still pending; if false, into the file, and with histories every row must be finished.
     origin : iterable of tables, optional
-        How all rows were drawn, block after block, for methods that have `origins.columns`.
+        How each row was drawn, in consecutive blocks, for methods that have `draw_records.columns`.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def assemble(
 
 
 def _copy_results(file: h5py.File, source: Reader) -> None:
-    """Copy the rows that are done, and compare those that are done in the file already."""
+    """Copy finished rows, and compare the results of rows that are already finished in the file."""
     for first in range(0, source.n, BLOCK):
         own = slice(first, min(first + BLOCK, source.n))
         there = slice(own.start + source.rows.start, own.stop + source.rows.start)
@@ -110,12 +110,12 @@ def _copy_results(file: h5py.File, source: Reader) -> None:
 
 
 def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """Bytes of each value, (m, size): a NaN equals itself."""
+    """Bytes of each value, (m, size), so that a NaN compares equal to the same NaN."""
     return values.view(np.uint8).reshape(len(values), values.itemsize)
 
 
 def _history_blocks(source: Reader) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    """Name of a history and rows of `source`, some `HISTORY_BYTES` of them at a time."""
+    """Yield the name of a history and file slots of `source`, about `HISTORY_BYTES` of data at a time."""
     for name, spec in source.history_specs.items():
         chunk = rows_per_chunk(spec, source.n)
         size = chunk * max(1, HISTORY_BYTES // (chunk * spec.blank(1).nbytes))
@@ -141,7 +141,7 @@ def _histories_beside(path: Path, file: h5py.File, n: int, sources: Sequence[Rea
     if not specs:
         return
     parts = HistoryParts(parts_folder(path), n, specs, campaign_digest(file))
-    parts.remove()  # of an attempt that was killed: the file at `path` has its histories inside
+    parts.remove()  # left by an attempt that was killed: the file at `path` has its histories inside
     for source in sources:
         size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in specs.values()))
         for first in range(0, source.n, size):
@@ -155,7 +155,7 @@ def check_free(path: Path) -> None:
     Raises
     ------
     StoreError
-        When there is one, or histories of one, or no folder for it.
+        When the file or a folder of its histories exists, or its parent folder does not exist.
     """
     if path.exists():
         raise fault(path, "exists already", "delete it, or use another --out")

@@ -1,4 +1,4 @@
-"""Whether a file is a result file, before anything in it is believed: damaged and hostile files end here.
+"""Validation of a result file before its contents are used: damaged and hostile files are rejected here.
 
 No length that a file states is used to allocate memory before the file is known to hold that many bytes. Only hard
 links to contiguous datasets inside the file are followed: neither to other files nor through filters.
@@ -21,13 +21,13 @@ from tolstat.store import integrity
 from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, descriptions, fault, text
 
 DAMAGED = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
-"""What reading a damaged file raises, in h5py or in the code that trusts a file's attributes."""
+"""Exceptions that reading a damaged file raises, in h5py or in code that relies on the file's attributes."""
 MOST_COMPRESSED = 1100
-"""Beyond this ratio no gzip stream goes (deflate ends at 1032): a dataset that claims more is not whole."""
+"""Largest compression ratio accepted (deflate cannot exceed 1032): a dataset that claims more is incomplete."""
 MOST_SAMPLES = 50_000_000
-"""Numbers of a history for one joint: more than the finest solution of all loads has."""
+"""Largest number of values in a history of one joint: more than the finest solution of all loads has."""
 MOST_TEXT = 64_000_000
-"""Bytes of the longest attribute that is read."""
+"""Largest size of a JSON attribute that is read, bytes."""
 
 
 def check_schema(path: Path, file: h5py.File) -> None:
@@ -36,7 +36,9 @@ def check_schema(path: Path, file: h5py.File) -> None:
     Raises
     ------
     StoreError
-        When it is not.
+        When it is another kind of file, or has another schema version.
+    ValueError
+        When its attributes do not match their checksum.
     """
     filetype = text(file.attrs, "filetype") if "filetype" in file.attrs else None
     if filetype != FILETYPE:
@@ -51,14 +53,14 @@ def check_schema(path: Path, file: h5py.File) -> None:
 
 
 def integer(file: h5py.File, name: str, default: int | None = None) -> int:
-    """Attribute that is a whole number of zero or more.
+    """Read an attribute that must be a non-negative integer.
 
     Raises
     ------
     KeyError
-        When it is not there and there is no default.
+        When it is missing and there is no default.
     ValueError
-        When it is something else.
+        When it has any other value.
     """
     if default is not None and name not in file.attrs:
         return default
@@ -69,14 +71,14 @@ def integer(file: h5py.File, name: str, default: int | None = None) -> int:
 
 
 def mapping(file: h5py.File, name: str) -> dict[str, Any]:
-    """Attribute that is a JSON object.
+    """Read an attribute that must be a JSON object.
 
     Raises
     ------
     KeyError
-        When it is not there.
+        When it is missing.
     ValueError
-        When it is no JSON object.
+        When it is not a JSON object, or longer than `MOST_TEXT`.
     """
     held = file.attrs.get_id(name)
     if held.get_storage_size() > MOST_TEXT:
@@ -93,7 +95,7 @@ def history_specs(file: h5py.File) -> dict[str, HistorySpec]:
     Raises
     ------
     KeyError, ValueError, TypeError
-        When it says anything that no campaign keeps.
+        When it does not describe histories that a campaign can keep.
     """
     specs = {}
     for name, (shape, dtype, unit, description, *axes) in mapping(file, "histories").items():
@@ -107,7 +109,7 @@ def history_specs(file: h5py.File) -> dict[str, HistorySpec]:
 
 
 def check_tables(file: h5py.File) -> int:
-    """Check that every column kept is there as the tables have it, and lies in the file as a whole.
+    """Check that every kept column is present with the type that its table defines, contiguous and complete.
 
     Returns
     -------
@@ -117,7 +119,7 @@ def check_tables(file: h5py.File) -> int:
     Raises
     ------
     KeyError, ValueError
-        With the dataset that is missing or is something else.
+        With the dataset that is missing or wrong.
     """
     status = _dataset(file, "results", "status")
     n = int(status.shape[0]) if status.ndim == 1 else 0
@@ -137,12 +139,12 @@ def check_tables(file: h5py.File) -> int:
 
 
 def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> None:
-    """Check that the datasets of histories, once they are in the file, are what its attributes say.
+    """Check that histories, if the file includes them yet, have the shapes and types that its attributes state.
 
     Raises
     ------
     KeyError, ValueError
-        With the dataset that is missing or is something else.
+        With the dataset that is missing or wrong.
     """
     if "histories" not in file:
         return
@@ -155,7 +157,7 @@ def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> N
 
 
 def _dataset(file: h5py.File, group: str, name: str) -> h5py.Dataset:
-    """Dataset in a group of the file, reached by hard links only, without data in other files."""
+    """Return a dataset of a group; reject soft or external links and data stored in other files."""
     for holder, key in ((file, group), (file[group], name)):
         if not isinstance(holder, h5py.Group) or not isinstance(holder.get(key, getlink=True), h5py.HardLink):
             raise ValueError(f"/{group}/{name} is not in the file itself")

@@ -1,4 +1,4 @@
-"""How far a campaign is."""
+"""Progress of a campaign: numbers of joints by status."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from tolstat.common.tables import FAILED, Status
 
 
 class Counts(NamedTuple):
-    """How far a campaign is.
+    """Numbers of joints by status.
 
     Attributes
     ----------
     total : int
-        Joints of the campaign.
+        All joints.
     done : int
         Joints that are not pending.
     not_settled : int
-        Joints among them whose last revolution does not close.
+        Joints whose status is NOT_SETTLED or NOT_PERIODIC.
     failed : int
-        Joints among them without results.
+        Joints without results.
     not_resolved : int
-        Joints among them whose results finer steps would not repeat.
+        Joints whose largest loads still change with finer steps.
     """
 
     total: int
@@ -45,7 +45,7 @@ class Counts(NamedTuple):
         return words + (f", {self.not_resolved} not resolved" if self.not_resolved else "")
 
     def after(self, status: NDArray[np.uint8]) -> Counts:
-        """Count further joints that have ended with `status`, (m,)."""
+        """Return these counts plus those of further joints with the given `status`, (m,)."""
 
         def count(*states: Status) -> int:
             return int(np.count_nonzero(np.isin(status, states)))

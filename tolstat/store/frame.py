@@ -1,4 +1,4 @@
-"""A campaign as one pandas frame."""
+"""Export of a campaign to a pandas DataFrame or an xarray Dataset."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LABELS = np.array([s.label for s in Status], dtype=object)
 
 
 def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
-    """Put a campaign into one frame, see `ResultStore.to_pandas`."""
+    """Export a campaign to one DataFrame, see `ResultStore.to_pandas`."""
     import pandas as pd
 
     errors, results = store.errors(), store.results()
@@ -43,7 +43,7 @@ def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
 
 
 def to_xarray(store: Reader) -> xarray.Dataset:
-    """Put a campaign into one data set, see `ResultStore.to_xarray`."""
+    """Export a campaign to one Dataset, see `ResultStore.to_xarray`."""
     try:
         import xarray
     except ImportError as error:
@@ -57,7 +57,7 @@ def to_xarray(store: Reader) -> xarray.Dataset:
 
 
 def _design(store: Reader) -> dict[tuple[str, str], NDArray[Any]]:
-    """Which of the listed joints each row is, names in place of indices where there are names."""
+    """Case, variant, family and group of each row; case and family by name, variant and group by index."""
     design = store.design()
     families = np.array([variant.family for variant in store.variants], dtype=object)
     return {

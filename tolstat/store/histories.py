@@ -1,10 +1,10 @@
-"""Load histories of a campaign in progress: one small file a block beside the result file.
+"""Load histories of a campaign in progress: one small file per block, beside the result file.
 
-HDF5 keeps the places of compressed chunks in an index that it rewrites as chunks are added. A process killed
-between two of those writes leaves a file that opens and cannot be read. Compressed histories therefore never
-go into a result file that is being written: each block's become a file of their own in ``FILE.h5.parts``,
-complete before it gets its name, and when no row is pending a copy of the result file with all of them takes
-its place.
+HDF5 keeps the addresses of compressed chunks in an index that it rewrites as chunks are added. A process killed
+between two of these writes leaves a file that opens but cannot be read. Compressed histories are therefore never
+added to a result file under way: the histories of each block are written to a separate file in ``FILE.h5.parts``,
+which gets its final name only when complete. When no row is pending, a copy of the result file that includes all
+histories replaces the result file.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from tolstat.common.tables import HistorySpec
 from tolstat.store.result_file import fault, put_attributes
 
 CHUNK_BYTES = 1 << 16
-"""About how much of a history one compressed chunk holds."""
+"""Approximate size of one chunk of a history before compression, bytes."""
 HISTORY_BYTES = 1 << 25
-"""About how much of the histories is copied at a time."""
+"""Approximate amount of history data copied at a time, bytes."""
 
 
 def rows_per_chunk(spec: HistorySpec, n: int) -> int:
@@ -51,7 +51,7 @@ def create_dataset(group: h5py.Group, name: str, n: int, spec: HistorySpec) -> h
 
 
 def attach_scales(dataset: h5py.Dataset, row: h5py.Dataset, spec: HistorySpec) -> None:
-    """Name the axes of a history: the first is that of the rows, the others are those of `spec`."""
+    """Attach dimension scales to a history: `row` to the first axis, those named in `spec` to the others."""
     dataset.dims[0].attach_scale(row)
     name = dataset.name.rpartition("/")[2]
     given = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
@@ -64,16 +64,16 @@ def attach_scales(dataset: h5py.Dataset, row: h5py.Dataset, spec: HistorySpec) -
 
 
 class Index(NamedTuple):
-    """Where the histories of each row are.
+    """Location of the histories of each file slot.
 
     Attributes
     ----------
     paths : list of Path
-        The parts.
+        Files of the parts.
     part : (n,) array of int
-        Index into `paths`, -1 for a row that no part holds.
+        Index into `paths`, -1 for a slot that no part holds.
     position : (n,) array of int
-        Index of the row within that part.
+        Index of the slot within that part.
     """
 
     paths: list[Path]
@@ -87,13 +87,13 @@ class HistoryParts:
     Parameters
     ----------
     folder : Path
-        ``FILE.h5.parts``; made when the first part is added.
+        ``FILE.h5.parts``; created when the first part is added.
     n : int
-        Number of joints of the campaign.
+        Number of joints in the result file.
     specs : mapping of str to HistorySpec
         Histories of the campaign.
     campaign : str
-        What tells the campaign from others; parts that carry another are refused.
+        Identifier of the campaign (`campaign_digest`); parts with another one are rejected.
     """
 
     def __init__(self, folder: Path, n: int, specs: Mapping[str, HistorySpec], campaign: str) -> None:
@@ -104,12 +104,12 @@ class HistoryParts:
         self._next: int | None = None
 
     def add(self, rows: NDArray[np.intp], arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Write the histories of `rows`; when this returns they are on the disk.
+        """Write the histories of `rows`; on return they are on disk.
 
         Parameters
         ----------
         rows : (m,) array of int
-            Rows of the campaign.
+            File slots.
         arrays : mapping of str to (m, ...) array
             One array for each history of the campaign.
         """
@@ -123,7 +123,7 @@ class HistoryParts:
         if self._next is None:
             paths = self.paths()
             self._next = int(paths[-1].stem) + 1 if paths else 0
-        content = BytesIO()  # on a full disk plain writing fails clearly, and HDF5 does not
+        content = BytesIO()  # on a full disk a plain write raises a clear error, HDF5 does not
         with h5py.File(content, "w") as file:
             file.attrs["campaign"] = self.campaign
             file["rows"] = rows
@@ -134,7 +134,7 @@ class HistoryParts:
         self._next += 1
 
     def size(self) -> int:
-        """Bytes of all parts."""
+        """Total size of all parts, bytes."""
         return sum(path.stat().st_size for path in self.paths())
 
     def paths(self) -> list[Path]:
@@ -142,7 +142,7 @@ class HistoryParts:
         return sorted(self.folder.glob("[0-9]*.h5"))
 
     def index(self) -> Index:
-        """Find the histories of each row.
+        """Locate the histories of each file slot.
 
         Raises
         ------
@@ -165,31 +165,31 @@ class HistoryParts:
         name : str
             One of `specs`.
         rows : (m,) array of int
-            Rows of the campaign.
+            File slots.
         done : (m,) array of bool
-            Which of them must have histories, as their status said before this call.
+            Which of these joints must have histories, by the status read before this call.
 
         Returns
         -------
         (m, ...) array
-            NaN for a row that is not done and that no part holds.
+            NaN for a joint that is not done and that no part holds.
 
         Raises
         ------
         StoreError
-            When no part holds a row that is done, or as `index`.
+            When no part holds a joint that is done, or for the reasons of `index`.
         """
         index = self.index()
         self._check_held(index.part[rows[done]])
         return self._gather(name, rows, index)
 
     def gather_into(self, file: h5py.File) -> None:
-        """Copy the histories of all rows to datasets in the group ``histories``, a few chunks at a time.
+        """Copy the histories of all joints to datasets in the group ``histories``, a few chunks at a time.
 
         Raises
         ------
         StoreError
-            When no part holds a row, or as `index`.
+            When no part holds a joint of the file, or for the reasons of `index`.
         """
         index = self.index()
         self._check_held(index.part)
@@ -203,7 +203,7 @@ class HistoryParts:
                 dataset[first : first + len(rows)] = self._gather(name, rows, index)
 
     def _check_held(self, part: NDArray[np.intp]) -> None:
-        """Refuse to pass rows that have lost their histories for rows that have none."""
+        """Raise an error if finished joints have lost their histories, instead of returning NaN for them."""
         lost = np.count_nonzero(part < 0)
         if lost:
             remedy = "bring the folder back, or run the campaign again: these joints will be simulated again"

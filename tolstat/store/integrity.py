@@ -1,12 +1,13 @@
-"""Checksums: a row or an attribute that is not as it was written is not believed.
+"""Checksums that detect rows and attributes that changed after they were written.
 
-Each row has two, one of its errors and one of its results, in the group ``ledger``; each history has one a row, and the
-attributes have one together. The row number is in it, and that of the errors goes into that of the results, so that
-rows can neither be swapped nor mixed.
+Each row has two checksums in the group ``ledger``, one of its errors and one of its results; each history has one
+checksum per row, and all attributes together have one. The row number enters the checksum of the errors, which in turn
+enters the checksum of the results, so that swapped or mixed rows are detected.
 
-The rows' hash goes column by column over whole arrays: state = (state xor word) * odd number, then xor with its upper
-half. Each step can be undone (for a given word), so a change of a single number never goes unseen, and any other with a
-probability of 2^-64. CRC-32 as of zlib would need the bytes of each row together, which lie columns apart.
+The hash of the rows is updated column by column on whole arrays: state = (state xor word) * odd number, then xor with
+its upper half. Each update is invertible for a given word, so that a change of a single number is always detected; any
+other change goes undetected with a probability of 2^-64. The CRC-32 of zlib would need contiguous bytes of each row,
+but tables are stored by column.
 """
 
 from __future__ import annotations
@@ -25,26 +26,26 @@ from tolstat.common.columns import ERROR_COLUMNS, Column
 
 Hash = NDArray[np.uint64]
 Described = tuple[tuple[Column, ...], NDArray[np.void]]
-"""A table and its columns."""
+"""Columns of a table, and the table."""
 
 FACTOR = np.uint64(0x9E3779B97F4A7C15)
-"""2^64 over the golden ratio, odd (Knuth 1998, The Art of Computer Programming 3, 6.4)."""
+"""2^64 divided by the golden ratio, odd (Knuth 1998, The Art of Computer Programming 3, 6.4)."""
 HALF = np.uint64(32)
 DIGEST = "digest"
 """Name of the attribute that holds the checksum of the others."""
 
 
 def errors_hash(first_row: int, errors: NDArray[np.void], described: Sequence[Described] = ()) -> Hash:
-    """Checksum of the errors of each row, and of what joint it is, (m,).
+    """Checksum of each row's number, errors and further descriptions, (m,).
 
     Parameters
     ----------
     first_row : int
-        Row of the campaign that the first one is.
+        Row of the campaign of the first entry.
     errors : (m,) table ERROR
         Errors.
     described : sequence of (columns, (m,) table)
-        What else the file says of each joint, see `result_file.described`.
+        Further tables that describe each joint, see `result_file.descriptions`.
     """
     state = np.arange(first_row + 1, first_row + 1 + len(errors), dtype=np.uint64)
     for columns, table in described:
@@ -61,13 +62,13 @@ def results_hash(
     Parameters
     ----------
     errors_check : (m,) array
-        That of its errors.
+        Checksum of the errors of each row.
     attempt : (m,) array
-        Which attempt gave the results.
+        Number of the attempt that gave the results.
     results : (m,) table RESULT
         Results, status included.
     columns : tuple of Column
-        Those of them that are kept.
+        Columns of the results that are kept.
     """
     state = errors_check ^ attempt.astype(np.uint64)
     _mix(state)
@@ -76,19 +77,19 @@ def results_hash(
 
 
 def history_checks(history: NDArray[Any], rows: NDArray[np.intp]) -> NDArray[np.uint32]:
-    """CRC-32 of each joint's history of one kind, (m,); `rows` are those of the campaign."""
+    """CRC-32 of each joint's history of one kind, (m,); `rows` are rows of the campaign."""
     joints = np.ascontiguousarray(history)
     checks = (zlib.crc32(joints[i], int(row) & 0xFFFFFFFF) for i, row in enumerate(rows))
     return np.fromiter(checks, np.uint32, len(rows))
 
 
 def seal(file: h5py.File) -> None:
-    """Write the checksum of the attributes of a file; to be done after any change of them."""
+    """Write the checksum of a file's attributes; call this after every change of an attribute."""
     file.attrs[DIGEST] = np.bytes_(_digest(file))
 
 
 def is_sealed(file: h5py.File) -> bool:
-    """Whether the attributes of a file are as they were written."""
+    """Whether the attributes of a file match their checksum."""
     return _plain(file.attrs.get(DIGEST)) == _digest(file)
 
 
@@ -98,7 +99,7 @@ def _digest(file: h5py.File) -> str:
 
 
 def _plain(value: object) -> str:
-    """Text of an attribute, however it is stored."""
+    """Value of an attribute as text, independent of how HDF5 stores it."""
     if isinstance(value, bytes):
         return value.decode("utf-8")
     return value if isinstance(value, str) else repr(np.asarray(value).tolist())

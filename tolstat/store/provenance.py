@@ -1,4 +1,4 @@
-"""Where numbers come from: versions of what computed them, and the commit of the code."""
+"""Provenance of results: versions of the software that computed them, and the commit of the code."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ DECIDING = (
     *("kernel", "joint", "common/tables.py", "sampling.py", "study/tolerances", "study/design.py", "study/proposal.py"),
     *("solver/simulation.py", "solver/refinement.py", "solver/stationary.py", "solver/rainflow.py"),
 )
-"""Modules that decide the numbers of a campaign, given what its identity holds."""
+"""Sources that, together with the study's identity, determine the results of a campaign."""
 
 
 def versions() -> dict[str, str]:
-    """Versions of tolstat, of Python and of the libraries that take part in the numbers, and `source_hash`."""
+    """Versions of tolstat, of Python and of the libraries that affect results, and `source_hash`."""
     found = {"tolstat": tolstat.__version__, "sources": source_hash(), "python": platform.python_version()}
     return found | {name: metadata.version(name) for name in LIBRARIES}
 
 
 def source_hash() -> str:
-    """Hash of the sources that decide the numbers: code under development changes while its version stays."""
+    """Hash of the sources that determine results: during development, code changes without a new version number."""
     package = Path(tolstat.__file__).parent
     digest = hashlib.sha256()
     for name in DECIDING:
@@ -37,13 +37,13 @@ def source_hash() -> str:
 
 
 def git_commit() -> str:
-    """Commit of the checkout that the package was installed or is run from, ``-dirty`` after it if files differ.
+    """Git commit of the checkout that the package was installed from or runs in, with ``-dirty`` if files differ.
 
     Returns
     -------
     str
-        Empty when the package is not the top of a git checkout: an environment may lie inside the repository
-        of something else, whose commit says nothing about this code.
+        Empty when the package is not at the top of a git checkout: a virtual environment may lie inside the
+        repository of another project, whose commit does not describe this code.
     """
     package = Path(tolstat.__file__).resolve().parent
     recorded = package / "_commit.txt"

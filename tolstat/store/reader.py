@@ -1,4 +1,4 @@
-"""Reading a result file: what of it is data, and which rows of a campaign it holds."""
+"""Reading a result file: its attributes, its tables and the status of its joints."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray
 
 BLOCK = 1 << 16
-"""Rows that are looked at together: no table of a large campaign is needed whole to go on with it."""
+"""Rows read at a time, so that a large campaign can be resumed without loading whole tables."""
 
 
 class Session(NamedTuple):
@@ -39,7 +39,7 @@ class Session(NamedTuple):
 
 
 class Reader:
-    """What can be asked of an open result file; see `ResultStore`."""
+    """Read access to an open result file; see `ResultStore`."""
 
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
@@ -90,25 +90,25 @@ class Reader:
 
     @property
     def whole(self) -> bool:
-        """Whether the file holds all rows of its campaign, and not a slice of them."""
+        """Whether the file holds all rows of its campaign, not a slice."""
         return self.rows == range(self.campaign_rows)
 
     def status(self, rows: slice = slice(None)) -> NDArray[np.uint8]:
-        """Status of the joints, (n,), or of a slice of them: that of damaged rows is PENDING.
+        """Status of the joints, (n,), or of a slice of file slots; joints whose row is damaged are PENDING.
 
         Raises
         ------
         StoreError
-            When it is none that this version knows.
+            When a status is unknown to this version.
         """
         if self._file.mode != "r":
-            return self._status(rows)  # who writes has looked at all rows when he opened the file
+            return self._status(rows)  # opening for writing has already marked damaged rows as pending
         first, last, _ = rows.indices(self.n)
         blocks = (slice(begin, min(begin + BLOCK, last)) for begin in range(first, last, BLOCK))
         return np.concatenate([np.empty(0, np.uint8), *map(self._status_if_intact, blocks)])
 
     def damaged(self) -> NDArray[np.intp]:
-        """Rows of this file whose results are not as they were written, as after a torn write or a bad disk."""
+        """File slots whose results do not match their checksums, as after an interrupted write or a disk fault."""
         found = [np.empty(0, np.intp)]
         for first in range(0, self.n, BLOCK):
             rows = slice(first, first + BLOCK)
@@ -118,25 +118,25 @@ class Reader:
         return np.concatenate(found)
 
     def counts(self) -> Counts:
-        """How far the campaign is."""
+        """Count the joints of the file by status."""
         counts = Counts(self.n, 0, 0, 0)
         for first in range(0, self.n, BLOCK):
             counts = counts.after(self.status(slice(first, first + BLOCK)))
         return counts
 
     def session(self) -> Session | None:
-        """Tell of the run under way; None where there is none."""
+        """Return the run under way; None if no process is writing the file."""
         if "session" not in self._file or not is_locked(self.path):
             return None
         started, done = np.asarray(self._file["session"][:])
         return Session(float(started), int(done)) if started > 0 else None
 
     def pending(self) -> NDArray[np.intp]:
-        """Rows of this file still to be simulated, ascending."""
+        """File slots still to be simulated, ascending."""
         return np.concatenate([np.empty(0, np.intp), *self.pending_blocks()])
 
     def pending_blocks(self) -> Iterator[NDArray[np.intp]]:
-        """Rows of this file still to be simulated, ascending, in arrays of at most `BLOCK`; none is empty."""
+        """Yield the file slots still to be simulated, ascending, in non-empty arrays of at most `BLOCK`."""
         for first in range(0, self.n, BLOCK):
             found = np.flatnonzero(self.status(slice(first, first + BLOCK)) == Status.PENDING)
             if found.size:
@@ -148,7 +148,7 @@ class Reader:
         Raises
         ------
         StoreError
-            When the study does not list its joints, or they are damaged.
+            When the study does not list its joints, or the table is damaged.
         """
         if "design" not in self._file:
             remedy = 'give the file of a study with sampling.method = "cases"'
@@ -162,28 +162,28 @@ class Reader:
         return table
 
     def origin(self, rows: slice = slice(None)) -> NDArray[np.void]:
-        """How every joint was drawn, (n,) table as `origins.columns` has it for the sampling method, or of a slice.
+        """How every joint was drawn, (n,) table with the columns `draw_records.columns`, or of a slice of file slots.
 
         Raises
         ------
         StoreError
-            When the method has no such table, or it is damaged.
+            When the sampling method has no such table, or it is damaged.
         """
         if "origin" not in self._file:
             remedy = 'give a file with sampling.method = "importance", or one of tolstat rare'
             raise fault(self.path, "does not tell how its joints were drawn", remedy)
-        self.errors(rows)  # whose checksums are of both
+        self.errors(rows)  # checks this table too: it enters the checksums of the errors
         return self._described("origin", rows)
 
     def errors(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
-        """Errors of every joint, (n,) table ERROR, or of a slice of the rows of this file.
+        """Errors of every joint, (n,) table ERROR, or of a slice of file slots.
 
-        With `fields` the table has these only: all are read and checked, in blocks, and the others not held.
+        With `fields` the table has these only: all fields are read and checked in blocks, the others then dropped.
 
         Raises
         ------
         StoreError
-            When they are damaged.
+            When the errors are damaged.
         """
         if fields is not None:
             return self._in_blocks(self.errors, rows, tables.ERROR, fields)
@@ -192,15 +192,15 @@ class Reader:
         return table
 
     def results(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
-        """Results of every joint, (n,) table RESULT, or of a slice.
+        """Results of every joint, (n,) table RESULT, or of a slice of file slots.
 
-        Those of a joint that is PENDING mean nothing; a joint whose row is damaged is PENDING. Columns that the
-        campaign does not keep are NaN. With `fields` the table has these only, as that of `errors`.
+        A joint whose row is damaged is PENDING. Results of pending joints are NaN (integers 0), as are columns that
+        the campaign does not keep. With `fields` the table has these only, as in `errors`.
 
         Raises
         ------
         StoreError
-            When a status is none that this version knows.
+            When a status is unknown to this version.
         """
         if fields is not None:
             return self._in_blocks(self.results, rows, tables.RESULT, fields)
@@ -212,18 +212,18 @@ class Reader:
         return table
 
     def attempt(self, rows: slice = slice(None)) -> NDArray[np.int32]:
-        """Which attempt gives the results of each joint, (n,): 0 is the study's, k is ``retries[k - 1]``."""
+        """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``."""
         return np.asarray(self.column("ledger", "attempt", rows))
 
     def histories(self, name: str, rows: NDArray[np.intp] | None = None) -> NDArray[Any]:
-        """Load histories of one kind.
+        """Read the histories of one kind.
 
         Parameters
         ----------
         name : str
             One of `history_specs`.
         rows : (m,) array of int, optional
-            Rows of this file to read; all without it.
+            File slots to read; all without it.
 
         Returns
         -------
@@ -233,7 +233,7 @@ class Reader:
         Raises
         ------
         StoreError
-            When the file holds no such histories, or those of joints that are done are gone.
+            When the file holds no such histories, or those of finished joints are missing or damaged.
         """
         if name not in self.history_specs:
             held = ", ".join(self.history_specs) or "none"
@@ -241,7 +241,7 @@ class Reader:
             raise fault(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
         rows = np.arange(self.n) if rows is None else np.asarray(rows, dtype=np.intp)
         if "histories" not in self._file:
-            done = self.status()[rows] != Status.PENDING  # asked first: histories are there before the status
+            done = self.status()[rows] != Status.PENDING  # read first: histories are written before the status
             try:
                 values = self._parts.read(name, rows, done)
                 self._check_history(name, rows, values, done)
@@ -255,7 +255,7 @@ class Reader:
         return values[back]
 
     def to_pandas(self, units: bool = False) -> pd.DataFrame:
-        """Errors and results as one frame, a row per joint, none dropped.
+        """Export errors and results as one DataFrame, one row per joint, pending and failed joints included.
 
         Parameters
         ----------
@@ -265,13 +265,13 @@ class Reader:
         Returns
         -------
         pandas.DataFrame
-            Index ``row``, that of the campaign; the errors' columns, then the results' kept; ``status`` as text. Before
-            them, where the study lists its joints, name of the case, index and family of the variant, and group.
+            Index ``row``: row of the campaign. Columns: case, variant, family and group for a study that lists its
+            joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` as text.
         """
         return to_pandas(self, units)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Errors and results along ``row``, with ``units`` and ``description``; raises InputError without xarray."""
+        """Export errors and results along ``row``, with units and descriptions; raises InputError without xarray."""
         return to_xarray(self)
 
     def _read_judgement(self) -> None:
@@ -281,7 +281,7 @@ class Reader:
         self.limits: dict[str, float] = json.loads(text(attrs, "limits"))
 
     def _reopen(self) -> bool:
-        """Go over to the file that has taken this one's place with the histories in it; whether there is one."""
+        """Switch to the file that has replaced this one and includes the histories; return whether there is one."""
         if self._file.mode != "r":
             return False
         file = open_hdf5(self.path, "r")
@@ -299,7 +299,7 @@ class Reader:
 
     def _status_if_intact(self, rows: slice) -> NDArray[np.uint8]:
         found = self._status(rows)
-        # PENDING is 0; a copy, since a view would keep the table of the block
+        # any(): PENDING is 0; copy(): a view would keep the whole table of the block in memory
         return self.results(rows)["status"].copy() if found.any() else found
 
     def _check_status(self, found: NDArray[np.uint8]) -> None:
@@ -319,7 +319,7 @@ class Reader:
         return table
 
     def _intact(self, rows: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:
-        """Whether rows are as they were written, (m,). Checksums are read last, as they are written last."""
+        """Whether rows match their checksums, (m,); checksums are read after the values, the order of writing."""
         attempt, errors, held = (self.column("ledger", c.name, rows) for c in LEDGER_COLUMNS)
         return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
 
@@ -342,7 +342,7 @@ class Reader:
     def _in_blocks(
         self, read: Callable[[slice], NDArray[np.void]], rows: slice, dtype: np.dtype[np.void], fields: Sequence[str]
     ) -> NDArray[np.void]:
-        """Some fields of a table that is read and checked whole, `BLOCK` rows at a time."""
+        """Selected fields of a table; all fields are read and checked, `BLOCK` rows at a time."""
         first, last, _ = rows.indices(self.n)
         table = np.empty(max(0, last - first), [(name, dtype[name]) for name in fields])
         for begin in range(first, last, BLOCK) if fields else ():
@@ -354,13 +354,13 @@ class Reader:
     def _read(self, group: str, columns: tuple[Column, ...], dtype: Any, rows: slice) -> NDArray[np.void]:
         first, last, _ = rows.indices(self.n)
         table = np.zeros(max(0, last - first), dtype)
-        # The status comes first among the results: what it declares valid was written before it was.
+        # The status is read first among the results: the values that it declares valid were written before it.
         for c in columns:
             c.of(table)[:] = self.column(group, c.name, slice(first, last))
         return table
 
     def attributes(self) -> dict[str, str | int]:
-        """All attributes of the file: texts, those with JSON unread, and whole numbers."""
+        """All attributes of the file as integers or text; JSON is not parsed."""
         attrs = self._file.attrs
         return {
             name: int(value) if isinstance(value, (int, np.integer)) else text(attrs, name)
@@ -368,7 +368,7 @@ class Reader:
         }
 
     def column(self, group: str, name: str, rows: Any) -> NDArray[Any]:
-        """Values of one dataset, at an index into its rows.
+        """Read a dataset at an index or slice of its rows.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Parameters of the joints of a campaign and their settings: from its study, or from its result file alone."""
+"""Parameters and solver options of a campaign's joints, from its study or from its result file alone."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 
 def joint_of(store: ResultStore, row: int) -> Joint:
-    """Nominal joint of a row of the file: the study's, or that of the row's variant.
+    """Nominal joint of file slot `row`: the study's, or that of the slot's variant.
 
     Raises
     ------
     InputError
-        When the file's joint is not one of this version.
+        When this version cannot read the joint in the file.
     """
     nominal = validate(Joint, store.joint, f"{store.path}: joint")
     return varied(nominal, _values(store, row))
 
 
 def options_of(store: ResultStore, row: int) -> Options:
-    """Solver options of a row of the file: the study's, its variant's, or those of its last retry.
+    """Solver options of file slot `row`: the study's, its variant's, or those of its last retry.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def options_of(store: ResultStore, row: int) -> Options:
     if own and not attempt:
         written = {key: value for key, value in store.identity.items() if key.startswith("solver.")} | own
         if written.get("solver.fidelity") != "auto":
-            written.pop("solver.error_budget", None)  # identities hold its default, studies must not write it
+            written.pop("solver.error_budget", None)  # identity holds its default; studies give it with "auto" only
         solver = validate(Solver, nested(written)["solver"], f"{store.path}: solver")
         return settings(solver, store.fidelity)
     held = store.retries[attempt - 1]["options"] if attempt else store.options
@@ -58,13 +58,13 @@ def options_of(store: ResultStore, row: int) -> Options:
 
 
 def settings(solver: Solver, choice: dict[str, Any]) -> Options:
-    """Settings as the kernel takes them; those of ``auto`` are in the record of the choice."""
+    """Solver options for the kernel; for ``auto``, fidelity and steps are taken from the record `choice`."""
     options = solver.options()
     return fidelity.apply(options, choice) if solver.fidelity == "auto" else options
 
 
 def parameters(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[np.void]:
-    """Parameters of rows of the file, (m,) table PARAM."""
+    """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
     params = np.empty(len(rows), PARAM)
     for i, row in enumerate(rows.tolist()):
         params[i : i + 1] = perturb(joint_of(store, row), store.errors(slice(row, row + 1)))
@@ -74,7 +74,7 @@ def parameters(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[np.void]:
 def perturbed(
     study: Study, rows: NDArray[np.intp], errors: NDArray[np.void], perturb: Callable[..., NDArray[np.void]]
 ) -> NDArray[np.void]:
-    """Parameters of `rows` of the campaign, (m,) table PARAM, each from the joint of its own variant."""
+    """Parameters of `rows` of the campaign, (m,) table PARAM, each computed from the nominal joint of its variant."""
     params = np.empty(len(rows), PARAM)
     variant = variants(study, rows)
     for number in np.unique(variant):
@@ -84,10 +84,10 @@ def perturbed(
 
 
 def variants(study: Study, rows: NDArray[np.intp]) -> NDArray[np.integer]:
-    """Variant of each of `rows` of the campaign, (m,)."""
+    """Index of the variant of each of `rows` of the campaign, (m,)."""
     return study.design["variant"][rows] if len(study.joints) > 1 else np.zeros(len(rows), np.intp)
 
 
 def _values(store: ResultStore, row: int) -> dict[str, Any]:
-    """What makes the variant of a row; empty where the study lists none."""
+    """Values that define the variant of file slot `row`; empty if the study lists no variants."""
     return store.variants[store.design()["variant"][row]].values if store.case_names else {}

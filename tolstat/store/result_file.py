@@ -1,4 +1,4 @@
-"""The layout of a result file, docs/result_format.md: how a new one is filled and how any is opened."""
+"""Layout of a result file (docs/result_format.md): fill a new file, open or replace an existing one."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ if TYPE_CHECKING:
 FILETYPE = "tolstat campaign"
 SCHEMA_VERSION = 4
 LONGEST_FIXED = 32_000
-"""Bytes of the longest text that is an attribute of fixed length: HDF5 allows some 64 kB."""
+"""Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
 OVERHEAD = 800
-"""Bytes that HDF5 needs for a column beside its values."""
+"""Bytes that HDF5 needs per column beside its values."""
 BLOCK = 1 << 16
-"""Rows of a column written at a time where it is not known beforehand."""
+"""Rows of the dimension scale ``row`` written at a time."""
 
 
 def campaign_digest(file: h5py.File) -> str:
-    """Hash of what tells a campaign from others: the study's identity, the code that began it, and the rows held."""
+    """Hash that identifies a campaign: the study's identity, the software versions, and the rows in the file."""
     texts = [text(file.attrs, name) for name in ("identity", "versions")]
     if "first_row" in file.attrs:
         texts.append(f"{int(file.attrs['first_row'])} {file['results/status'].shape[0]}")
@@ -49,7 +49,7 @@ def campaign_digest(file: h5py.File) -> str:
 
 
 def judgement(study: Study) -> dict[str, str]:
-    """Make the attributes of a study that decide no number and may change while a campaign goes on."""
+    """Return the attributes of a study that do not affect results and may change between runs of a campaign."""
     return {"study": study.text, "study_name": study.name, "limits": json.dumps(study.limits, allow_nan=False)}
 
 
@@ -60,7 +60,7 @@ def attributes(
     options: Options | None = None,
     fidelity: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Make the attributes of a new file: all that a reader needs beyond the tables.
+    """Return the attributes of a new file: all that a reader needs beyond the tables.
 
     Parameters
     ----------
@@ -69,9 +69,9 @@ def attributes(
     specs : mapping of str to HistorySpec
         Histories that the campaign keeps.
     dimensions : mapping of str to int
-        Which dimension of the sequence each error is drawn from.
+        Dimension of the sampling sequence that each error is drawn from.
     options, fidelity : Options and mapping, optional
-        Settings that ``solver.fidelity = "auto"`` chose, and its record.
+        Settings that ``solver.fidelity = "auto"`` chose, and the record of that choice.
     """
     sampling = study.sampling.model_dump(mode="json")
     structured = {
@@ -97,14 +97,14 @@ def attributes(
 
 
 def size_of_new(n: int, results: tuple[Column, ...]) -> int:
-    """About how many bytes a new file of `n` rows with these results takes at most, without long attributes."""
+    """Approximate upper bound on the size of a new file of `n` rows, bytes, without long attributes."""
     groups = (DESIGN_COLUMNS, ERROR_COLUMNS, results, LEDGER_COLUMNS)
     columns = [np.dtype(c.dtype).itemsize for group in groups for c in group]
     return n * sum(columns) + OVERHEAD * len(columns)
 
 
 def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:
-    """Write attributes; texts in UTF-8 of fixed length, as MATLAB and Fortran read them, but for very long ones."""
+    """Write attributes; texts are fixed-length UTF-8, which MATLAB and Fortran can read, except very long ones."""
     for name, value in values.items():
         data: Any = value
         dtype = None
@@ -115,14 +115,14 @@ def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str |
 
 
 def text(attrs: h5py.AttributeManager, name: str) -> str:
-    """Text of an attribute, of fixed or variable length.
+    """Read a text attribute of fixed or variable length.
 
     Raises
     ------
     KeyError
-        When there is none of that name.
+        When there is no attribute of that name.
     ValueError
-        When it is something else than a text in UTF-8.
+        When it is not a text in UTF-8.
     """
     value = attrs[name]
     if isinstance(value, bytes):
@@ -151,11 +151,11 @@ def fill(
     rows : range
         Rows of the campaign that the file holds.
     errors : iterable of table ERROR
-        Errors of these rows, block after block.
+        Errors of these rows, in consecutive blocks.
     design : (len(rows),) table DESIGN, optional
-        What each row is, for a study that lists its joints.
+        Variant, case and group of each row, for a study that lists its joints.
     origin : iterable of tables, optional
-        How each row was drawn, block after block, for methods that have `origins.columns`.
+        How each row was drawn, in consecutive blocks, for methods that have `draw_records.columns`.
     """
     n = len(rows)
     put_attributes(file, dict(attrs) | {"first_row": rows.start})
@@ -181,7 +181,7 @@ def fill(
 
 
 def history_check_columns(attrs: Mapping[str, Any]) -> tuple[Column, ...]:
-    """Columns of the ledger for the histories that are kept."""
+    """Columns of the ledger with the checksums of the kept histories."""
     return tuple(check_column(name) for name in json.loads(attrs["histories"]))
 
 
@@ -191,7 +191,7 @@ def check_column(history: str) -> Column:
 
 
 def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -> Iterator[NDArray[np.void]]:
-    """Pass the blocks of `errors` on, writing their checksums."""
+    """Yield the blocks of `errors` unchanged, after writing their checksums."""
     first = 0
     for block in errors:
         here = slice(first, first + len(block))
@@ -207,9 +207,9 @@ def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -
 
 
 def descriptions(file: h5py.File) -> dict[str, tuple[tuple[Column, ...], np.dtype[np.void]]]:
-    """Tables that say what each joint is beside its errors, by group: their columns and types.
+    """Columns and dtypes of the tables that describe joints beside their errors, by HDF5 group.
 
-    Which of the joints listed it is, and how it was drawn; most campaigns have neither.
+    ``design`` has variant, case and group of each joint, ``origin`` how it was drawn; most campaigns have neither.
     """
     held = {"design": (DESIGN_COLUMNS, tables.DESIGN)} if "design" in file else {}
     if "origin" in file:
@@ -226,7 +226,7 @@ def create_table(
     blocks: Iterable[NDArray[np.void]] | None = None,
     scale: h5py.Dataset | None = None,
 ) -> None:
-    """Write a table column by column, each a contiguous dataset that can be overwritten in place.
+    """Create a table: one contiguous dataset per column, which can be overwritten in place.
 
     Parameters
     ----------
@@ -237,9 +237,9 @@ def create_table(
     columns : tuple of Column
         Columns of the table.
     n : int
-        Its rows.
+        Number of rows.
     blocks : iterable of structured array, optional
-        Its values, one block of rows after the other; without them floats are NaN and integers 0.
+        Values, in consecutive blocks of rows; without them floats are NaN and integers 0.
     scale : h5py.Dataset, optional
         Dimension scale of the rows; ``row`` of the file without it.
     """
@@ -261,7 +261,7 @@ def create_table(
 
 
 def _allocated(dtype: str | None, fill: float | None = None) -> h5py.h5p.PropDCID:
-    """Properties of a dataset whose whole space is taken, and filled if a value is given, when it is made."""
+    """Creation properties of a dataset that is allocated, and filled with `fill` if given, when it is created."""
     properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
@@ -277,7 +277,7 @@ def get(dataset: h5py.Dataset, rows: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def put(dataset: h5py.Dataset, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
-    """Overwrite the `rows` of a column with `values`, (m,); rows that follow one another go in one piece."""
+    """Overwrite the `rows` of a column with `values`, (m,); consecutive rows are written in one piece."""
     ends = [*(np.flatnonzero(np.diff(rows) != 1) + 1), len(rows)]
     for begin, end in pairwise([0, *ends]):
         dataset[rows[begin] : rows[end - 1] + 1] = values[begin:end]
@@ -289,15 +289,15 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
     Raises
     ------
     StoreError
-        When it is not there, not HDF5, damaged, without permission, or held by a writer; it says which.
+        When the file is missing, not HDF5, damaged, not permitted or locked by a writer; the message says which.
     """
     if path.is_dir():
         raise fault(path, "is a folder", "give the path of a file")
     if mode != "r" and path.is_file() and not h5py.is_hdf5(path):
-        # opening an empty file for writing would make it one
+        # h5py would turn an empty file that it opens for writing into an HDF5 file
         raise fault(path, "is not an HDF5 file", "give a file that tolstat run has made")
     try:
-        # Readers take no lock: the writer changes numbers only, so they may look at a campaign under way.
+        # Readers take no lock: a writer only changes numbers in place, so a campaign under way can be read.
         file = h5py.File(path, mode, locking=False if mode == "r" else "best-effort")
     except OSError as error:
         if not path.is_file():
@@ -312,19 +312,19 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
             raise fault(path, "is not an HDF5 file", "give a file that tolstat run has made") from error
         raise fault(path, f"is damaged: {error}", "run the campaign again with another --out") from error
     if mode != "r" and not is_at(file, path):
-        # opened before another process replaced it and locked after: nobody else will ever see this file
+        # opened before another process replaced the file, locked afterwards: this file has no name any more
         file.close()
         raise fault(path, "is being written by another process", "wait for it or stop it")
     return file
 
 
 def is_at(file: h5py.File, path: Path) -> bool:
-    """Whether an open file is the one of that name."""
+    """Whether an open file is the one now at `path`."""
     return path.exists() and os.path.samestat(os.fstat(file.id.get_vfd_handle()), path.stat())
 
 
 def copy_open(file: h5py.File, path: Path) -> None:
-    """Copy an open file, whose name may be gone, to `path`."""
+    """Copy an open file to `path`, even if its own name has been deleted."""
     file.flush()
     handle = file.id.get_vfd_handle()
     with open(path, "wb") as copy:
@@ -335,10 +335,10 @@ def copy_open(file: h5py.File, path: Path) -> None:
 
 
 def is_locked(path: Path) -> bool:
-    """Whether a process writes the file; asked for a moment, and so as not to hinder it."""
+    """Whether a process has locked the file for writing; tested by a shared lock that is released at once."""
     try:
         import fcntl
-    except ImportError:  # a system without: nobody knows
+    except ImportError:  # a system without file locks: unknown, taken as not locked
         return False
     with open(path, "rb") as file:
         try:
@@ -349,25 +349,25 @@ def is_locked(path: Path) -> bool:
 
 
 def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
-    """Change more of a file than numbers, by way of a copy: a kill leaves the file as it was or as it shall be.
+    """Change the structure of a file by way of a copy; a kill leaves either the old or the changed file.
 
-    No other process can write in between: `held` stays open and locked until the copy has its lock and the name.
+    No other process can write in between: `held` stays open and locked until the copy is locked and at `path`.
 
     Parameters
     ----------
     path : Path
         The file.
     held : h5py.File
-        The same, open for writing; closed afterwards.
+        The same file, open for writing; closed afterwards.
     change : callable
-        Told the copy, open for writing.
+        Called with the copy, open for writing.
     growth : int
-        By about how many bytes it makes the copy larger.
+        Approximate number of bytes by which `change` enlarges the copy.
 
     Returns
     -------
     h5py.File
-        What is now at `path`, open for writing.
+        The file now at `path`, open for writing.
     """
     check_room(path, held.id.get_filesize() + growth)
     with ExitStack() as opened:

@@ -1,9 +1,9 @@
-"""The result file of a campaign: errors and results of every joint, and the list of what is still to do.
+"""The result file of a campaign: errors, results and status of every joint; pending rows are the ones still to do.
 
-Everything but histories lies in datasets of a fixed size, written in full when the file is created. From then
-on only numbers inside them change and none of HDF5's own structures, so a process killed at any moment leaves
-a file that can be read. Values are on the disk before the status that declares them valid. What changes more, the
-histories taken in at the end and limits edited between two runs, makes a new file that takes the old one's place.
+Everything except histories lies in datasets of fixed size, written in full when the file is created. From then
+on only numbers inside these datasets change and none of HDF5's own structures, so a process killed at any moment
+leaves a file that can be read. Values are on disk before the status that declares them valid. Larger changes, such as
+adding histories at the end or editing limits between two runs, write a new file that replaces the old one.
 """
 
 from __future__ import annotations
@@ -57,32 +57,32 @@ class ResultStore(Reader):
     n : int
         Number of joints in the file.
     rows : range
-        Their rows in the campaign: all of them, unless the file holds a slice. Row i of every table is row
-        ``rows[i]`` of the campaign.
+        Rows of the campaign in the file: all of them, unless the file holds a slice. File slot i (row i of every
+        table) is row ``rows[i]`` of the campaign.
     campaign_rows : int
         Number of rows of the campaign.
     study_name, study_text : str
         Name of the study and the TOML that it was read from.
     identity : dict
-        Everything that decides the numbers, by dotted key.
+        All settings that determine results, by dotted key.
     columns : tuple of Column
         Columns of the results that the campaign keeps, in the order of the table.
     joint, options, sampling, versions : dict
-        The joint as resolved, solver options, sampling (with ``dimensions``), versions of what ran.
+        Nominal joint with all values resolved, solver options, sampling (with ``dimensions``), software versions.
     limits : dict of str to float
         Limits of the study in SI units, ``{"cross1.F": 700.0}``.
     case_names : tuple of str
         Cases of a study that lists its joints, ``"ideal"`` first; empty for other methods.
     variants : tuple of Variant
-        Family and values (dotted key of the joint to SI value or word) of each of its joints; empty likewise.
+        Family and values (dotted key to SI value or word) of each joint that the study lists; else empty.
     created, git_commit : str
         Time of creation (UTC) and commit of the code, if known.
     stop : dict
-        Where a precision asked for was reached before all rows were simulated: the rule and what it found; else empty.
+        Stop rule and its outcome, if the precision asked for was reached before all rows were simulated; else empty.
     retries : list of dict
-        Settings with which joints were simulated again, in their order; see `attempt`.
+        Settings of each retry, in chronological order; see `attempt`.
     history_specs : dict of str to HistorySpec
-        Histories asked for; empty if none.
+        Histories that the campaign keeps; empty if none.
     """
 
     @classmethod
@@ -105,24 +105,24 @@ class ResultStore(Reader):
         path : str or Path
             The file; must not exist.
         study : Study
-            What is to be kept of it goes into the file's attributes.
+            The study; its text and settings become attributes of the file.
         errors : (n,) table ERROR, or iterable of tables
-            Errors of every joint of the file; as blocks of rows, one after the other, where they are many.
+            Errors of every joint of the file, as one table or as consecutive blocks of rows.
         histories : mapping of str to HistorySpec, optional
             Load histories to keep.
         dimensions : mapping of str to int, optional
-            Which dimension of the sequence each error is drawn from.
+            Dimension of the sampling sequence that each error is drawn from.
         rows : range, optional
-            Rows of the campaign that the file shall hold; all without it.
+            Rows of the campaign that the file holds; all without it.
         options, fidelity : Options and mapping, optional
-            Settings that ``solver.fidelity = "auto"`` chose, and its record.
+            Settings that ``solver.fidelity = "auto"`` chose, and the record of that choice.
         origin : iterable of tables, optional
-            How the joints were drawn, as blocks of rows, for sampling methods that have `origins.columns`.
+            How the joints were drawn, in consecutive blocks, for methods that have `draw_records.columns`.
 
         Raises
         ------
         StoreError
-            When the file, or the parts of an earlier one, exist, or the file cannot be written.
+            When the file or the parts of an earlier one exist, or the file cannot be written.
         """
         path = Path(path)
         specs = {name: HistorySpec(*spec) for name, spec in (histories or {}).items()}
@@ -156,13 +156,14 @@ class ResultStore(Reader):
         path : str or Path
             The file.
         mode : {"r", "r+"}
-            For reading, also while a campaign writes it; or for writing, by one process at a time.
+            For reading, also while a campaign writes it; or for writing, by one process at a time, where rows with
+            damaged results or missing histories become pending.
 
         Raises
         ------
         StoreError
-            When it is not a result file of this or an earlier version, is damaged, or is being written by
-            another process.
+            When it is not a result file of this schema version, is damaged, or is being written by another
+            process.
         """
         if mode not in ("r", "r+"):
             raise ValueError(f"mode is {mode!r}, 'r' or 'r+' expected")
@@ -182,19 +183,19 @@ class ResultStore(Reader):
         return store
 
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
-        """Write the results of `rows`; when this returns they are on the disk and no longer pending.
+        """Write the results of `rows`; on return they are on disk and the joints are no longer pending.
 
         Parameters
         ----------
         rows : (m,) array of int
-            Rows of the campaign.
+            File slots.
         simulation : Simulation
-            Results, and the histories if the campaign keeps them, of these rows.
+            Results of these joints, and their histories if the campaign keeps them.
 
         Raises
         ------
         StoreError
-            When the file cannot be written, e.g. for want of space.
+            When the file cannot be written, e.g. because the disk is full.
         """
         results = simulation.results
         if len(results) != len(rows):
@@ -218,24 +219,24 @@ class ResultStore(Reader):
             raise fault(self.path, f"cannot be written: {reason}", remedy) from error
 
     def begin_session(self, done: int) -> None:
-        """Note for others who look at the file that a run begins, `done` joints being done."""
+        """Record for readers of the file that a run begins with `done` joints finished."""
         self._file["session"][:] = time.time(), done
         self._sync()
 
     def end_session(self) -> None:
-        """Note that the run is over. One that is killed cannot: that nobody holds the lock tells as much."""
+        """Record that the run is over; after a killed run, readers infer this from the missing lock (`session`)."""
         self._file["session"][:] = 0.0
         self._sync()
 
     def finish(self) -> None:
-        """Take the histories of a complete campaign into the file.
+        """Copy the histories of a complete campaign into the file and delete the parts.
 
-        Does nothing while rows are pending, and nothing the second time.
+        Does nothing while rows are pending, or when the histories are in the file already.
 
         Raises
         ------
         StoreError
-            When there is no room for them, or parts of them are gone.
+            When the disk has no room for the histories, or some of them are missing.
         """
         if not self.history_specs or not self.complete:
             return
@@ -244,9 +245,9 @@ class ResultStore(Reader):
         self._parts.remove()
 
     def judge_by(self, study: Study) -> None:
-        """Take over what decides no number: limits, text and name of a study of the same identity.
+        """Adopt the attributes that do not affect results (limits, text, name) from a study of the same identity.
 
-        Does nothing where the file has them already.
+        Does nothing if the file has them already.
 
         Raises
         ------
@@ -259,7 +260,7 @@ class ResultStore(Reader):
             self._read_judgement()
 
     def note_stop(self, stop: Mapping[str, Any]) -> None:
-        """Note that, and why, the campaign ends before all rows are simulated; does nothing where that is noted.
+        """Record why the campaign ends before all rows are simulated; does nothing if `stop` is recorded already.
 
         Raises
         ------
@@ -271,14 +272,14 @@ class ResultStore(Reader):
             self.stop = dict(stop)
 
     def begin_retry(self, rows: NDArray[np.intp], entry: Mapping[str, Any]) -> None:
-        """Make joints pending that are to be simulated again, with settings other than the study's.
+        """Mark joints as pending that are to be simulated again, with the settings of `entry`.
 
         Parameters
         ----------
         rows : (m,) array of int
-            Rows of this file.
+            File slots.
         entry : mapping
-            What `retries` is to say of it; ``options`` are the settings of the solver.
+            Entry added to `retries`; ``options`` are the solver options.
 
         Raises
         ------
@@ -295,7 +296,7 @@ class ResultStore(Reader):
                 del file["histories"]
 
         if "histories" in self._file:
-            self._parts.remove()  # of an attempt to come here that was stopped
+            self._parts.remove()  # left by an earlier call that was interrupted
             size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in self.history_specs.values()))
             for first in range(0, self.n, size):
                 some = np.arange(first, min(first + size, self.n))
@@ -315,12 +316,12 @@ class ResultStore(Reader):
         put(self._file["results"][name], rows, values)
 
     def _check_there(self) -> None:
-        """Put the file back if somebody has deleted it; the system keeps it as long as it is open.
+        """Restore the file if it was deleted or replaced; its contents exist as long as it is open.
 
         Raises
         ------
         StoreError
-            When it was gone.
+            When the file was deleted or replaced.
         """
         if is_at(self._file, self.path):
             return
@@ -347,7 +348,7 @@ class ResultStore(Reader):
         os.fsync(self._file.id.get_vfd_handle())
 
     def _forget_lost_histories(self) -> None:
-        """Make rows pending whose histories are gone, as when the file was moved without its parts."""
+        """Mark rows as pending whose histories are missing, e.g. because the file was moved without its parts."""
         if not self.history_specs or "histories" in self._file:
             return
         part = self._parts.index().part

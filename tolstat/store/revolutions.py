@@ -1,4 +1,4 @@
-"""Loads of joints over the shaft angle: from the histories of a result file, or simulated again where it has none."""
+"""Loads of joints over the input angle, from the histories of a result file or by simulating the joints again."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tolstat.store.recorded import joint_of, options_of
 
 AGAIN = "simulated again"
 ANGLES = 60
-"""Angles of a revolution that are looked at, where the histories have as many."""
+"""Default number of input angles per revolution to read, if the histories have as many samples."""
 BLOCK = 64
 """Joints whose histories are in memory at a time."""
 
 MOST = 256
-"""Joints whose loads are to be read at a time: 9 MB at 180 samples a revolution."""
+"""Largest number of joints whose loads a caller should read at a time: 9 MB at 180 samples a revolution."""
 
 FloatArray = NDArray[np.float64]
 
@@ -32,16 +32,16 @@ class Revolutions(NamedTuple):
     Attributes
     ----------
     rows : ndarray of int, shape (m,)
-        Rows of the file.
+        File slots.
     angles : ndarray, shape (k,)
         Input angles, rad.
     F, T : ndarray, shape (m, k, 8)
         Moduli of force (N) and torque (N m), in the order of `tables.BUSHINGS`; NaN for joints without results.
     origin : str
-        Where they are from: ``"stored"``, ``"harmonics"`` or ``"simulated again"``.
+        Source of the loads: ``"stored"``, ``"harmonics"`` or ``"simulated again"``.
     apart : float
-        Of joints simulated again the largest relative difference of any largest load from what is stored: 0 on the
-        machine and with the versions that made the file. 0 for the others.
+        For joints simulated again, the largest relative difference of a largest load from the stored value: 0 on the
+        machine and with the versions that made the file. 0 for loads from histories.
     """
 
     rows: NDArray[np.intp]
@@ -53,7 +53,7 @@ class Revolutions(NamedTuple):
 
 
 def held(store: ResultStore) -> str:
-    """Kind of histories that a file holds, ``"stored"`` or ``"harmonics"``; empty where it has no loads."""
+    """Kind of histories that a file holds, ``"stored"`` or ``"harmonics"``; empty if it holds no loads."""
     return (
         "stored"
         if "loads" in store.history_specs
@@ -64,16 +64,16 @@ def held(store: ResultStore) -> str:
 
 
 def read(store: ResultStore, rows: NDArray[np.intp], most_angles: int = ANGLES) -> Revolutions:
-    """Read the loads of joints over the shaft angle.
+    """Return the loads of joints over the input angle.
 
     Parameters
     ----------
     store : ResultStore
         A campaign whose joints are drawn from tolerances.
     rows : ndarray of int, shape (m,)
-        Rows of the file, ascending; none pending.
+        File slots, ascending; none pending.
     most_angles : int
-        Samples of a revolution are left out evenly until about as few are left.
+        Approximate number of samples per revolution to keep; the samples are thinned evenly.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def read(store: ResultStore, rows: NDArray[np.intp], most_angles: int = ANGLES) 
     Raises
     ------
     InputError
-        When a joint has to be simulated again and the file's joint or options mean nothing to this version.
+        When a joint has to be simulated again and this version cannot read the file's joint or options.
     """
     origin = held(store) or AGAIN
     steps = int(store.options["steps_per_rev"])
@@ -106,19 +106,19 @@ def read(store: ResultStore, rows: NDArray[np.intp], most_angles: int = ANGLES) 
 
 
 def loads(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[Any]:
-    """Bushing loads of rows of a file over a revolution.
+    """Bushing loads of joints over a revolution.
 
     Parameters
     ----------
     store : ResultStore
         The campaign.
     rows : ndarray of int, shape (m,)
-        Rows of the file.
+        File slots.
 
     Returns
     -------
     ndarray, shape (m, samples, 8, 6)
-        Force and torque of each bushing along e, t, z, N and N m, from histories in full or restored from harmonics.
+        Force and torque of each bushing along e, t, z, N and N m, from full histories or restored from harmonics.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def loads(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def _again(store: ResultStore, rows: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
-    """Loads of joints simulated again, (m, samples, 8, 6), and how far their largest loads are from those stored."""
+    """Simulate joints again: their loads, (m, samples, 8, 6), and `Revolutions.apart`."""
     params = perturb(joint_of(store, int(rows[0])), _pick(store.errors, rows))
     attempts = _pick(store.attempt, rows)
     stored = _pick(store.results, rows)
@@ -154,7 +154,7 @@ def _again(store: ResultStore, rows: NDArray[np.intp]) -> tuple[NDArray[np.float
 
 
 def _pick(read: Callable[[slice], NDArray[Any]], rows: NDArray[np.intp]) -> NDArray[Any]:
-    """Rows of a table that is read by slices: as one slice where they lie close together."""
+    """Read `rows` of a table that is read by slices; as one slice if they lie close together."""
     first, last = int(rows[0]), int(rows[-1]) + 1
     if last - first <= 8 * len(rows):
         return read(slice(first, last))[rows - first]

@@ -1,4 +1,4 @@
-"""The group ``verify`` of a result file: joints of the campaign, simulated again in other ways."""
+"""The group ``verify`` of a result file: joints simulated again with other settings or another solver."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ GROUP = "verify"
 
 
 class Check(NamedTuple):
-    """One other way of simulating the joints.
+    """Results of the joints with other settings or another solver.
 
     Attributes
     ----------
     description : str
-        What is different, for the reader.
+        What differs from the campaign, in words.
     options : dict
-        Settings of the solver that were used.
+        Solver options that were used; those of the first joint, if joints differ.
     results : ndarray of RESULT, shape (m,)
-        What came of it.
+        Results of the joints.
     """
 
     description: str
@@ -39,18 +39,18 @@ class Check(NamedTuple):
 
 
 class Verification(NamedTuple):
-    """Some joints of a campaign, as they are in it and as other ways of simulating have them.
+    """Some joints of a campaign: their results in the campaign and in each check.
 
     Attributes
     ----------
     seed : int
-        Seed by which they were chosen.
+        Seed of the random choice of the joints.
     rows : ndarray, shape (m,)
-        Their rows in the campaign, ascending.
+        File slots of the joints, ascending; of a study that was not run, rows of the campaign.
     base : ndarray of RESULT, shape (m,)
         Their results in the campaign.
     checks : dict of str to Check
-        By name: ``half_step``, ``newton``, ``settling``, ``method``, ``reference``.
+        By name: ``half_step``, ``newton``, ``settling``, ``method``, ``reference``, ``fidelity``.
     """
 
     seed: int
@@ -60,7 +60,7 @@ class Verification(NamedTuple):
 
 
 def read(store: ResultStore) -> Verification | None:
-    """Take the verification out of a result file; None where it holds none."""
+    """Read the verification from a result file; None if it holds none."""
     file = store._file
     if GROUP not in file:
         return None
@@ -79,7 +79,7 @@ def read(store: ResultStore) -> Verification | None:
 
 
 def write(store: ResultStore, verification: Verification) -> None:
-    """Put a verification into a result file, in place of the one that it holds.
+    """Write a verification to a result file, replacing an earlier one.
 
     Raises
     ------

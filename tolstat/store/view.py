@@ -1,4 +1,4 @@
-"""What a report needs of a result file: the statistics' rows, the nominal joint, limits, swept errors."""
+"""View of a result file for reports: joints of the statistics, nominal joint, limits, swept errors."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ METHODS = {
     "pick_freeze": "pick-freeze design",
 }
 LOADS = tuple(f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT")
-"""The loads that every report shows, where they are kept: force and torque of each bushing."""
+"""Loads that every report shows if the study keeps them: force and torque of each bushing."""
 LOAD_FIELDS = ("status", *(f"{load}_{of}" for load in ("F", "T", "contact", "psi") for of in ("max", "lower", "upper")))
-"""Fields of the results that every load with a limit is read from, and the joints' status."""
+"""Fields of the results from which every load that can have a limit is read, and the status."""
 _ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 _DISPLAY = {
     "m": ("mm", 1e3),
@@ -58,7 +58,7 @@ class Axis(NamedTuple):
     label : str
         The study's pattern, such as ``pin*.diameter``, or the error's name.
     unit : str
-        Unit for the reader, such as ``mm``.
+        Display unit, such as ``mm``.
     values : ndarray, shape (n,)
         Value at each joint, in `unit`.
     """
@@ -69,12 +69,12 @@ class Axis(NamedTuple):
 
 
 Ends = tuple[FloatArray, FloatArray]
-"""Lower and upper end of the largest load of each joint."""
+"""Lower and upper end of the interval of each joint's largest load."""
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign as reports see it; row i of both tables is one joint.
+    """A campaign for reports; row i of `errors` and row i of `results` are the same joint.
 
     Attributes
     ----------
@@ -85,17 +85,17 @@ class Campaign:
     limits : mapping of str to float
         Allowed load in SI units by name (``"cross1.F"``).
     errors, results : ndarray of ERROR and RESULT, shape (n,)
-        The joints that count; the nominal joint is not among them.
+        All joints in the file except the nominal joint.
     nominal : ndarray of RESULT, shape (1,) or (0,)
-        The joint without errors, where the campaign has one and it settled.
+        The nominal joint, if the file has one and its results are valid.
     patterns : tuple of str
-        What the study sweeps; empty for a random campaign.
+        Key paths of what the study sweeps; empty without a sweep.
     verification : Verification, optional
-        Some of the joints simulated in other ways, where the file holds that.
+        The verification that the file holds, if any.
     columns : tuple of Column
         Columns of the results that the study keeps; the others are NaN.
     weights : ndarray, shape (n,), optional
-        What each joint counts for, where joints were not drawn from the tolerances alone.
+        Weight of each joint, if joints were not drawn from the tolerances alone.
     """
 
     name: str
@@ -112,7 +112,7 @@ class Campaign:
     def curve(
         self, values: FloatArray, levels: ArrayLike | None, confidence: float, ends: Ends | None = None
     ) -> NDArray[np.void]:
-        """Share of the joints above each level, see `exceedance.curve`, each joint counted by its weight."""
+        """Share of the joints above each level, see `exceedance.curve`; weighted by `weights` if any."""
         status = self.results["status"]
         if self.weights is None:
             return exceedance.curve(values, status, levels, confidence, self.iid, ends)
@@ -123,28 +123,28 @@ class Campaign:
         return Exceedance(*self.curve(values, [level], confidence, ends)[0].tolist())
 
     def quantile(self, values: FloatArray, share: float, confidence: float) -> Quantile:
-        """Load that a share of the joints stays at or below, see `quantile.at`, each joint counted by its weight."""
+        """Load that a share of the joints stays at or below, see `quantile.at`; weighted by `weights` if any."""
         status = self.results["status"]
         if self.weights is None:
             return quantile.at(values, status, share, confidence, self.iid)
         return weighted.quantile(values, status, self.weights, share, confidence)
 
     def done(self) -> Campaign:
-        """The same without the joints that are still pending."""
+        """Return the campaign without its pending joints."""
         here = self.results["status"] != Status.PENDING
         if here.all():
-            return self  # tables of a million joints are not copied
+            return self  # avoids a copy of large tables
         weights = None if self.weights is None else self.weights[here]
         return replace(self, errors=self.errors[here], results=self.results[here], weights=weights)
 
     @property
     def drawn(self) -> tuple[str, ...]:
-        """Those of `LOADS` that the study keeps."""
+        """Loads of `LOADS` that the study keeps."""
         return tuple(name for name in LOADS if kept.holds(self.columns, name))
 
     @property
     def listed(self) -> tuple[str, ...]:
-        """Loads that tables show: those of `drawn`, and all others that a study keeps which keeps none of these."""
+        """Loads that tables show: those of `drawn` or, if there are none, all others that the study keeps."""
         return self.drawn or tuple(name for name in LIMIT_UNITS if kept.holds(self.columns, name))
 
     @property
@@ -153,7 +153,7 @@ class Campaign:
         return self.method in ("random", "importance")
 
     def count(self, *states: Status) -> int:
-        """Joints in any of the given states."""
+        """Number of joints in any of the given states."""
         return int(np.isin(self.results["status"], [int(state) for state in states]).sum())
 
     def head(self) -> str:
@@ -164,7 +164,7 @@ class Campaign:
         return text + (f", {pending} still pending" if pending else "")
 
     def missing(self) -> str:
-        """Sentence on the loads that a report would show and the study does not keep; empty where it keeps them all."""
+        """Sentence that names the loads of `LOADS` that the study does not keep; empty if it keeps all."""
         names = [name for name in LOADS if name not in self.drawn]
         return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
 
@@ -175,19 +175,19 @@ def read(
     errors_of: Sequence[str] | None = None,
     weighted: bool = False,
 ) -> Campaign:
-    """Take from a result file what a report needs; row 0 goes apart where it is the nominal joint.
+    """Read what a report needs from a result file; row 0 is separated if it is the nominal joint.
 
     Parameters
     ----------
     store : ResultStore
         The file.
     fields : sequence of str, optional
-        Fields of the results to hold, ``status`` among them, such as `LOAD_FIELDS`; all without it. The tables of a
-        million joints take 1.2 GB when whole.
+        Fields of the results to load, including ``status``, such as `LOAD_FIELDS`; all without it. The complete
+        tables of a million joints take 1.2 GB.
     errors_of : sequence of str, optional
-        Columns of the errors to hold; all without it.
+        Columns of the errors to load; all without it.
     weighted : bool
-        Whether the caller counts joints by their `Campaign.weights`; others would be wrong on joints that were not
+        Whether the caller uses `Campaign.weights`; unweighted statistics would be wrong for joints that were not
         drawn from the tolerances alone.
 
     Returns
@@ -198,7 +198,7 @@ def read(
     Raises
     ------
     StoreError
-        When the joints count differently, and the caller does not go by that.
+        When the joints have weights that the caller does not use, or belong to a subset simulation.
     """
     check_counted(store.sampling, store.path, weighted)
     errors, results = store.errors(fields=errors_of), store.results(fields=fields)
@@ -223,19 +223,19 @@ def read(
 
 
 def patterns(text: str) -> tuple[str, ...]:
-    """Key paths of what the text of a study sweeps; empty for one that does not."""
+    """Key paths of what a study, given as TOML, sweeps; empty without a sweep."""
     return tuple(_patterns(tomllib.loads(text).get("sweep", {})))
 
 
 def error_blocks(store: ResultStore, columns: Sequence[str]) -> Iterator[NDArray[np.void]]:
-    """Errors of the joints that `read` gives, without the nominal one: tables of a part of the joints, in their order.
+    """Yield the errors of the joints that `read` returns, without the nominal joint, in consecutive blocks.
 
     Parameters
     ----------
     store : ResultStore
         The file.
     columns : sequence of str
-        Columns of the errors that the tables have.
+        Columns of the errors to load.
     """
     begin = int(store.sampling["nominal_first"] and store.rows.start == 0)
     for first in range(begin, store.n, BLOCK):
@@ -243,7 +243,7 @@ def error_blocks(store: ResultStore, columns: Sequence[str]) -> Iterator[NDArray
 
 
 def errors_at(store: ResultStore, columns: Sequence[str], samples: NDArray[np.intp]) -> NDArray[np.void]:
-    """Errors of some of the joints that `read` gives, by their places in ascending order; see `error_blocks`."""
+    """Errors of selected joints, by their ascending indices among the joints of `read`; see `error_blocks`."""
     parts, first = [], 0
     for block in error_blocks(store, columns):
         parts.append(block[samples[(samples >= first) & (samples < first + len(block))] - first])
@@ -293,12 +293,12 @@ def load(results: NDArray[np.void], name: str) -> tuple[FloatArray, str]:
 
 
 def ends(results: NDArray[np.void], name: str) -> Ends:
-    """Interval of the largest load of each joint, by its name as in `load`: a doubt that stationary joints have.
+    """Interval of the largest load of each joint; both ends are the load itself unless the joint is stationary.
 
     Returns
     -------
     lower, upper : ndarray, shape (n,)
-        SI; NaN for joints without.
+        SI; NaN for joints without results.
     """
     values, _ = load(results, name)
     kind = name.rpartition(".")[2]
@@ -306,14 +306,14 @@ def ends(results: NDArray[np.void], name: str) -> Ends:
 
 
 def swept_axes(campaign: Campaign) -> list[Axis]:
-    """Quantities that a sweep moves, in the study's order.
+    """Quantities that a sweep varies, in the study's order.
 
-    Errors that are equal in every joint move together and make one axis.
+    Errors with equal values in every joint are swept together and form one axis.
 
     Parameters
     ----------
     campaign : Campaign
-        A campaign of the method ``sweep``.
+        A campaign with the sampling method ``sweep``.
 
     Returns
     -------
@@ -329,7 +329,7 @@ def swept_axes(campaign: Campaign) -> list[Axis]:
     for names in groups.values():
         unit, factor = _DISPLAY[_ERROR_UNITS[names[0]]]
         values = campaign.errors[names[0]] * factor
-        values[np.abs(values) < 1e-12 * np.abs(values).max()] = 0.0  # a sweep through zero misses it by rounding
+        values[np.abs(values) < 1e-12 * np.abs(values).max()] = 0.0  # rounding error of a sweep through zero
         axes.append(Axis(_label(names, campaign.patterns), unit, values))
     rank = {pattern: i for i, pattern in enumerate(campaign.patterns)}
     return sorted(axes, key=lambda axis: rank.get(axis.label, len(rank)))

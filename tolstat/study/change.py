@@ -1,4 +1,4 @@
-"""Other tolerances for the joints of a study: what ``--set`` on the command line means."""
+"""Changed tolerances of a study, as ``--set`` on the command line gives them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ INSTEAD = {
     "std": ("cpk",),
     "sigma": ("cpk",),
 }
-"""Keys of a tolerance that a key takes the place of."""
+"""Keys of a tolerance entry that each key replaces."""
 EXAMPLE = 'write --set "pin*.offset_t.plus_minus=0.05 mm"'
 
 
@@ -35,16 +35,16 @@ class _Setting(NamedTuple):
 
 
 def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
-    """Tolerances of a study with some keys set anew.
+    """Tolerances of a study with some keys changed.
 
     Parameters
     ----------
     study : Study
-        The study, whose tolerances stay as they are.
+        The study, which is not modified.
     settings : sequence of str
         ``"pin*.offset_t.plus_minus=0.05 mm"``: name or pattern of errors that the study scatters, key of their
-        tolerances, value as in TOML; quotes may be left out. Later ones win. A band given one way takes the place of
-        one given another way, and ``cpk`` that of ``std``.
+        tolerances, value as in TOML; quotes may be left out. Later settings override earlier ones. A band given one
+        way replaces a band given another way, and ``cpk`` replaces ``std``.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
             found[name] = distribution(entries[name], site, f"--set {text!r}", ("tolerances", name))
         except InputError as error:
             key = (text, *(fault.found for fault in error.faults))
-            if key not in told:  # once for all errors of a pattern
+            if key not in told:  # report a fault once for all errors of a pattern
                 faults.extend(error.faults)
             told.add(key)
     if faults:
@@ -90,7 +90,7 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
 
 
 def _entries(study: Study) -> dict[str, dict[str, Any]]:
-    """Entry of each error that scatters, as the study's text has it."""
+    """Entry of each error that scatters, from the study's text."""
     table = tomllib.loads(study.text).get("tolerances", {})
     found: dict[str, dict[str, Any]] = {}
     for entry in selection.entries(table, "tolerances"):

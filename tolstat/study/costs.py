@@ -1,4 +1,4 @@
-"""What a tolerance costs: a table of reciprocal powers, from TOML or CSV.
+"""Cost of a tolerance as a reciprocal power, with coefficients from TOML or CSV.
 
 A tolerance t costs c(t) = fixed + (cost - fixed) (at / t)^power. The power 1 is the reciprocal model of Chase and
 Greenwood (1988, Design issues in mechanical tolerance analysis), 2 that of Spotts (1973), any other Sutherland and
@@ -24,7 +24,7 @@ from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.entry import Positive
 
 REACH = (0.25, 4.0)
-"""Least and largest factor on a tolerance that are looked at."""
+"""Smallest and largest factor on a tolerance that are considered."""
 
 
 class CostEntry(Strict):
@@ -37,11 +37,11 @@ class CostEntry(Strict):
     fixed : float
         Part of it that does not depend on the tolerance.
     at : float, optional
-        A tolerance (half a band), SI; that of the study without it.
+        Tolerance (half the band) that costs `cost`, SI; that of the study by default.
     power : float
-        Of the reciprocal.
+        Exponent of the reciprocal.
     least, most : float, optional
-        Tolerances that the process can hold, and that the function allows, SI.
+        Smallest tolerance that the process can hold, largest tolerance that the function allows, SI.
     keep : bool
         Whether the tolerance stays as it is.
     """
@@ -64,14 +64,14 @@ class CostEntry(Strict):
 
 
 class Cost(NamedTuple):
-    """Cost of one tolerance of the drawing by its factor: the sum over the errors it is for.
+    """Cost of one tolerance of the drawing as a function of its factor: the sum over the errors it applies to.
 
     Attributes
     ----------
     width : float
-        The tolerance as it is, SI.
+        Tolerance at factor 1, SI.
     entries : tuple of CostEntry
-        One an error.
+        One entry per error.
     """
 
     width: float
@@ -84,7 +84,7 @@ class Cost(NamedTuple):
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Least and largest factor that all of its errors allow, within `REACH`; (1, 1) where it is kept."""
+        """Smallest and largest factor that all errors allow, within `REACH`; (1, 1) if the tolerance is kept."""
         if any(e.keep for e in self.entries):
             return 1.0, 1.0
         least = max([REACH[0], *(e.least / self.width for e in self.entries if e.least is not None)])
@@ -98,11 +98,11 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
     Parameters
     ----------
     tolerances : sequence of Tolerance
-        Of the study.
+        Tolerances of the study.
     path : Path, optional
         TOML file whose keys are names or patterns of errors and whose entries are `CostEntry`, or CSV file with a
-        column ``tolerance`` of such names and the entries' keys as further columns. Errors that it does not name are
-        kept as they are. Without a file each tolerance of the study costs 1 an error, made f times as wide 1 / f.
+        column ``tolerance`` of such names and the entries' keys as further columns. Tolerances of errors that the file
+        does not name are kept. Without a file each tolerance costs 1 per error, and 1 / f if made f times as wide.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def _value(cell: str) -> object:
-    """Cell of a CSV file as TOML would have it."""
+    """Cell of a CSV file as the value that TOML would give."""
     if cell in ("true", "false"):
         return cell == "true"
     try:

@@ -23,7 +23,7 @@ SOBOL_BITS = 30
 
 @dataclass(frozen=True)
 class Design:
-    """What the rows of a study are.
+    """Variant, grid point and case of each row of a study.
 
     Attributes
     ----------
@@ -32,9 +32,9 @@ class Design:
     joints : tuple of Joint
         The joint of each variant.
     operations : tuple of Operation
-        The operating point of each; the grid's values go before.
+        The operating point of each variant; values of the grid override it.
     solvers : tuple of Solver
-        The numerical settings of each.
+        The numerical settings of each variant.
     cases : dict
         Name of a case to its errors (SI), `IDEAL` first.
     points : tuple of dict
@@ -78,9 +78,9 @@ def table(cases: Sequence[Sequence[int]], points: int) -> NDArray[np.void]:
     Parameters
     ----------
     cases : sequence of sequence of int
-        For each variant the cases that are run with it, in order.
+        For each variant the indices of the cases that are run with it, in order.
     points : int
-        Points of the grid.
+        Number of points of the grid.
 
     Returns
     -------
@@ -100,21 +100,21 @@ def sobol(n: int, dimensions: int, seed: int, first: int = 0) -> NDArray[np.floa
     from scipy.stats import qmc
 
     engine = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
-    # from the start SciPy asks for a power of two
+    # SciPy expects a power of two when it draws from the start of the sequence
     start = engine.fast_forward(first).random(n) if first else engine.random_base2(max(n - 1, 0).bit_length())
     points: NDArray[np.float64] = start[:n]
     return points + 2.0 ** -(SOBOL_BITS + 1)
 
 
 def cube(design: str, n: int, dimensions: int, seed: int) -> list[list[float]]:
-    """Points of a family in the unit cube, n lists of `dimensions`: on its diagonal (``line``), or all over it."""
+    """Points of a family in the unit cube, n lists of `dimensions`: its diagonal (``line``) or a Sobol' sequence."""
     if design == "sobol":
         return [[float(share) for share in point] for point in sobol(n, dimensions, seed)]
     return [[number / (n - 1)] * dimensions for number in range(n)]
 
 
 def flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Leaves of nested tables by dotted key; tuples as lists, as JSON has them."""
+    """Leaves of nested tables by dotted key; tuples become lists, as in JSON."""
     for key, inner in value.items():
         if isinstance(inner, Mapping):
             yield from flat(inner, f"{prefix}{key}.")
@@ -123,7 +123,7 @@ def flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
 
 
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables in tables from dotted keys: the inverse of `flat`."""
+    """Nested tables from dotted keys: the inverse of `flat`."""
     result: dict[str, Any] = {}
     for key, value in values.items():
         *tables, name = key.split(".")

@@ -1,4 +1,4 @@
-"""``[fatigue]``: what the cycles of the loads are judged by. It decides no number of a campaign, as limits do not."""
+"""``[fatigue]``: settings for the evaluation of load cycles. Like limits they do not affect a campaign's results."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Exponent = Annotated[units.Number, Field(ge=1, le=30)]
 
 
 class Settings(Strict):
-    """``[fatigue]`` without its lines.
+    """``[fatigue]`` as written; `read` converts the S–N lines.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Settings(Strict):
     revolutions : float
         Service life, in revolutions of the input shaft.
     reference_cycles : float
-        Cycles that the damage-equivalent loads are for.
+        Number of cycles that the damage-equivalent loads refer to.
     line : dict
         S–N lines by channel or pattern.
     """
@@ -42,7 +42,7 @@ class Settings(Strict):
 
 
 class LineEntry(Strict):
-    """One entry of ``[fatigue.line]``: N = N0 (S/S0)^-m, S a range."""
+    """One entry of ``[fatigue.line]``: N = N0 (S/S0)^-m, S the range of a load cycle."""
 
     m: Exponent
     S0: Any
@@ -51,16 +51,16 @@ class LineEntry(Strict):
 
 @dataclass(frozen=True)
 class Fatigue:
-    """What cycles are judged by.
+    """Settings for the evaluation of load cycles.
 
     Attributes
     ----------
     exponents : tuple of float
         Wöhler exponents of the damage-equivalent loads.
     revolutions : float
-        Service life.
+        Service life, in revolutions of the input shaft.
     reference_cycles : float
-        Cycles that the damage-equivalent loads are for.
+        Number of cycles that the damage-equivalent loads refer to.
     lines : dict
         Name of a channel to (m, S0, N0) of its S–N line; S0 a range, N or N m.
     """
@@ -79,7 +79,7 @@ def read(table: object, place: str) -> Fatigue:
     table : object
         The section as parsed.
     place : str
-        File that faults name.
+        File name shown in faults.
 
     Raises
     ------

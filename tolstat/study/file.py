@@ -1,4 +1,4 @@
-"""Reading a study or case file section by section, so that one run tells all of its faults."""
+"""Reading a study or case file section by section, so that all of its faults are reported at once."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from tolstat.study.tolerances.kinds import distribution
 ModelT = TypeVar("ModelT", bound=schema.Strict)
 
 SCATTER = ("tolerances", "correlation", "errors")
-"""Sections that say which joints there are, for the methods that draw; the first is needed."""
+"""Sections that define the joints of most sampling methods; the first is required."""
 SECTIONS_OF = {
     "sweep": ("sweep", "errors"),
     "cases": ("case", "grid", "variant"),
     "importance": (*SCATTER, "proposal"),
 }
-"""The same for the other methods."""
+"""Sections that define the joints of the other sampling methods; the first is required."""
 
 
 class StudyFile:
@@ -49,7 +49,7 @@ class StudyFile:
     sections : iterable of str
         Top-level keys that it may have.
     text : str, optional
-        What to read instead of the file's content.
+        TOML to read instead of the file's content.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class StudyFile:
                 self._fault((key,), "unknown key", schema.did_you_mean(key, allowed))
 
     def finish(self) -> None:
-        """Raise what was found.
+        """Raise an error if faults were found.
 
         Raises
         ------
@@ -82,12 +82,12 @@ class StudyFile:
             raise InputError(self._faults)
 
     def override(self, section: str, key: str, value: object) -> None:
-        """Put a value from the command line in place of the file's."""
+        """Replace a value of the file by one from the command line."""
         if isinstance(self.data.setdefault(section, {}), dict):
             self.data[section][key] = value
 
     def model(self, section: str, model: type[ModelT], *, required: bool = False) -> ModelT | None:
-        """Section that is one model; with its defaults where the file has none."""
+        """Read a section that is one model; the model has its defaults where the file lacks the section."""
         if required and section not in self.data:
             one_joint = "; a case of one joint is run with: tolstat simulate" if section == "sampling" else ""
             self._fault((section,), "missing table", f"add [{section}]{one_joint}")
@@ -133,7 +133,7 @@ class StudyFile:
         return scatter
 
     def correlation(self) -> Copula:
-        """``[[correlation]]``: which of the errors that `tolerances` has read come together."""
+        """``[[correlation]]``: correlation of errors with a tolerance; call `tolerances` first."""
         before = len(self._faults)
         entries = self._list("correlation", Correlation)
         if len(self._faults) == before:
@@ -142,7 +142,7 @@ class StudyFile:
         return Copula()
 
     def proposals(self) -> tuple[Proposal, ...]:
-        """``[[proposal]]``: what joints are drawn from beside the tolerances that `tolerances` has read."""
+        """``[[proposal]]``: distributions of importance sampling beside the tolerances; call `tolerances` first."""
         found = []
         for number, entry in enumerate(self._list("proposal", ProposalEntry)):
             with gather(self._faults):
@@ -166,7 +166,7 @@ class StudyFile:
         return tuple(axes)
 
     def limits(self) -> dict[str, float]:
-        """``[limits]``: the loads that the joints are judged by."""
+        """``[limits]``: limit of each load that has one (SI)."""
         limits: dict[str, float] = {}
         claims = Claims(self.place)
         for entry in self._entries("limits"):
@@ -180,7 +180,7 @@ class StudyFile:
         return limits
 
     def fatigue(self) -> fatigue.Fatigue:
-        """``[fatigue]``: what the cycles of the loads are judged by."""
+        """``[fatigue]``: settings for the evaluation of load cycles."""
         with gather(self._faults):
             return fatigue.read(self.data.get("fatigue", {}), self.place)
         return fatigue.Fatigue()
@@ -193,7 +193,7 @@ class StudyFile:
         return None
 
     def check_method(self, sampling: Sampling, sweep: tuple[SweepAxis, ...]) -> None:
-        """Find what does not go with the sampling method."""
+        """Note sections that the sampling method needs or does not use."""
         used = SECTIONS_OF.get(sampling.method, SCATTER)
         needed = used[0]
         if not self.data.get(needed):
@@ -218,15 +218,15 @@ class StudyFile:
             self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
 
     def check_one_joint(self, solver: Solver) -> None:
-        """Find what only a campaign can do."""
+        """Note settings that only a campaign can have."""
         if solver.fidelity == "auto":
             remedy = 'write "dynamic", "quasistatic" or "ideal"'
             self._fault(("solver", "fidelity"), "'auto' needs the joints of a campaign to choose by", remedy)
 
     def check_histories(self, output: Output, solver: Solver, listed: Design | None) -> None:
-        """Find histories of different lengths, and harmonics that the steps of a revolution cannot carry.
+        """Note histories of different lengths, and more harmonics than the steps per revolution resolve.
 
-        ``auto`` takes as many steps as the harmonics need.
+        ``auto`` chooses enough steps for the harmonics.
         """
         different = {s.steps_per_rev for s in listed.solvers} if listed else set()
         if output.histories != "none" and len(different) > 1:
@@ -240,12 +240,12 @@ class StudyFile:
             self._fault(("output", "harmonics"), found, f"give at most {most}, or more solver.steps_per_rev")
 
     def check_fatigue(self, output: Output) -> None:
-        """Find a judgement on cycles that are not kept."""
+        """Note a fatigue section where no cycles are stored."""
         if "fatigue" in self.data and output.histories == "none":
             self._fault(("fatigue",), "has no effect without cycles", 'write histories = "cycles" in [output]')
 
     def check_limits(self, output: Output, limits: Mapping[str, float]) -> None:
-        """Find limits of loads that are not kept."""
+        """Note limits of loads that are not stored."""
         held = {c.name for c in output.columns}
         lacking = [name for load in limits for name in kept.needed(load) if name not in held]
         if lacking:
@@ -253,7 +253,7 @@ class StudyFile:
             self._fault(("output", "results"), found, "add these, or remove their limits")
 
     def _list(self, section: str, model: type[ModelT]) -> list[ModelT]:
-        """Section that is a list of tables; those of them that are valid."""
+        """Read a section that is a list of tables; return the valid ones."""
         data = self.data.get(section, [])
         if not isinstance(data, list):
             self._fault((section,), "is not a list of tables", f"write [[{section}]]")

@@ -1,4 +1,4 @@
-"""Which errors a pick-freeze design moves together."""
+"""Groups of errors that a pick-freeze design exchanges together."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from tolstat.study.tolerances.correlation import Copula
 
 
 class Group(NamedTuple):
-    """Errors that get the numbers of another joint together; groups are independent of each other.
+    """Errors that are taken together from another joint; groups are independent of each other.
 
     Attributes
     ----------
     label : str
-        Name of the error, or pattern of the entry of ``[tolerances]``; of correlated ones the first and how many more.
+        Name of the error, or pattern of the entry of ``[tolerances]``; a group without a pattern is labelled by its
+        first error and the number of others.
     names : tuple of str
         The errors.
     """

@@ -30,7 +30,7 @@ class Axis(NamedTuple):
 
 
 class Nominal(NamedTuple):
-    """What variants differ from: ``[joint]``, ``[operation]`` and ``[solver]`` of the study."""
+    """Base of the variants: ``[joint]``, ``[operation]`` and ``[solver]`` of the study."""
 
     joint: Joint
     operation: Operation
@@ -38,7 +38,7 @@ class Nominal(NamedTuple):
 
 
 class Listed(NamedTuple):
-    """A variant, the joint, operating point and settings that it is, and the cases that are run with it."""
+    """A variant, its joint, operating point and settings, and the indices of the cases that are run with it."""
 
     variant: Variant
     joint: Joint
@@ -55,9 +55,9 @@ def read(data: Mapping[str, Any], nominal: Nominal | None, place: str, folder: P
     data : mapping
         The study's file.
     nominal : Nominal, optional
-        What the study says without variants; without it they are not read.
+        Joint, operating point and settings of the study; variants are not read if it is None.
     place : str
-        File that faults name.
+        File name shown in faults.
     folder : Path
         Folder that the path of a joint file is relative to.
 
@@ -116,13 +116,13 @@ def _values(entry: Entry, unit: str, place: str, faults: list[Fault]) -> Iterato
 
 
 def _points(axes: list[Axis]) -> Iterator[dict[str, float]]:
-    """Points of the product grid, the last axis running fastest; one empty point without axes."""
+    """Points of the product grid, the last axis varying fastest; one empty point without axes."""
     for values in product(*(axis.values for axis in axes)):
         yield {name: value for axis, value in zip(axes, values, strict=True) for name in axis.names}
 
 
 def _cases(section: Any, axes: list[Axis], place: str, faults: list[Fault]) -> dict[str, dict[str, float]]:
-    """Errors of each case; none for one that has faults, so that variants can name it."""
+    """Errors of each case; empty for a case with faults, so that variants can refer to it."""
     cases: dict[str, dict[str, float]] = {}
     for number, item in enumerate(_tables(section, "case", place)):
         name = item.get("name") if isinstance(item, Mapping) else None
@@ -152,14 +152,14 @@ def _clashes(section: list[Any], axes: list[Axis], place: str) -> list[Fault]:
 
 
 class _Variants:
-    """``[[variant]]``: joints that the keys of an entry make of the study's joint.
+    """``[[variant]]``: joints made from the study's joint by the keys of each entry.
 
     Parameters
     ----------
     study : mapping
         ``[joint]`` of the study.
     nominal : Nominal
-        The joint that it gives, operating point and settings.
+        Joint, operating point and settings of the study.
     place, folder
         As in `read`.
     """
@@ -214,7 +214,7 @@ class _Variants:
         ]
 
     def _settings(self, entry: VariantEntry, at: Section) -> tuple[Operation, Solver]:
-        """Operating point and numerical settings of a variant: the study's, with the entry's own keys over them."""
+        """Operating point and numerical settings of a variant: those of the study, with keys replaced by the entry."""
         faults: list[Fault] = []
         operation, solver = self._nominal.operation, self._nominal.solver
         with gather(faults):
@@ -280,9 +280,9 @@ def _ranges(section: Mapping[str, Any], at: Section, place: str, before: str = "
 
 
 def _written(value: float, like: str | float) -> str | float:
-    """`value` (SI) with the unit of `like`, a quantity as a joint's dump writes it.
+    """`value` (SI) with the unit of `like`, a quantity of a joint's JSON dump.
 
-    Fifteen digits: what a user can write is met exactly, 0.076 m and not 0.07600000000000001 m.
+    Rounded to fifteen digits, so that values as users write them are reproduced: 0.076, not 0.07600000000000001.
     """
     value = float(f"{value:.15g}")
     return f"{value!r} {like.partition(' ')[2]}" if isinstance(like, str) else value

@@ -1,4 +1,4 @@
-"""The tables of a study file that are models of their own; `study` reads the file as a whole."""
+"""Input models of the tables of a study file; `study` reads the file as a whole."""
 
 from __future__ import annotations
 
@@ -18,31 +18,32 @@ from tolstat.study.tolerances.entry import Value
 _DEFAULTS = Options()
 
 MAX_ROWS = 10_000_000
-"""Most joints of a list, a grid or a Latin hypercube: tables of them are held in memory."""
+"""Maximum number of joints of a list, a grid or a Latin hypercube, whose tables are held in memory."""
 MAX_SAMPLES = 1_000_000_000
-"""Most joints of a campaign whose samples can be drawn in parts: Sobol' sequences of 30 bits end soon after."""
+"""Maximum number of joints of a campaign that is drawn in parts: 30-bit Sobol' sequences end soon after."""
 
 Number = units.Number
 Flag = Annotated[bool, Field(strict=True)]
 
 
 class Solver(Strict):
-    """``[solver]``: numerical settings, the same for every joint but those of a variant that has its own.
+    """``[solver]``: numerical settings of all joints except those of variants with settings of their own.
 
     Attributes
     ----------
     fidelity : str
         ``dynamic``: integration until settled; ``quasistatic``: equilibrium at each angle; ``ideal``: closed forms of
-        the joint without errors; ``auto``: the cheapest of them, and of steps a revolution, that meets the budget.
+        the joint without errors; ``auto``: the cheapest fidelity and steps per revolution that meet `error_budget`.
     error_budget : float
         Largest error of a load that ``auto`` allows, relative to the joint's largest load of the kind.
     peak_substeps : int
-        Parts of a step where a contact switches on a load's peak, see `kernel.revolution.closeup`; 1 looks no closer.
+        Number of parts of a step where a contact switches on a load's peak, see `kernel.revolution.closeup`; with 1
+        these steps are not repeated.
     max_refinements : int
-        Times that the tolerance of a joint whose steps follow the error may be tightened, see `refinement`; 0 leaves
-        all joints at `steps_per_rev`.
+        Maximum number of times that a joint's error tolerance for adaptive steps is tightened, see `refinement`; 0
+        leaves all joints at `steps_per_rev`.
     duration : int
-        Revolutions over which the largest loads of a joint that never repeats are told, see `stationary`.
+        Revolutions for which the largest loads of a joint that never repeats are estimated, see `stationary`.
     """
 
     fidelity: Literal["dynamic", "quasistatic", "ideal", "auto"] = "dynamic"
@@ -70,7 +71,7 @@ class Solver(Strict):
         return self
 
     def options(self) -> Options:
-        """Return the settings as the kernel takes them; for ``auto``, which a campaign resolves, of ``dynamic``."""
+        """Return the settings for the kernel; ``auto``, which a campaign resolves, becomes ``dynamic``."""
         return Options(
             method=int(Method[self.method.upper()]),
             start=int(Start[self.start.upper()]),
@@ -97,20 +98,19 @@ class Sampling(Strict):
     Attributes
     ----------
     n : int, optional
-        Number of joints, the nominal one not counted; a sweep has its number from its points, cases from their list.
+        Number of joints without the nominal one; not for sweeps and cases, whose points and list give the number.
     method : str
         ``random``, ``sobol``, ``lhs``; ``sweep``: a grid of errors; ``cases``: joints listed one by one;
         ``importance``: random, from the tolerances and ``[[proposal]]``;
         ``pick_freeze``: for Sobol' indices, `n` times two random joints, and for each group of errors the first of the
         two with that group's errors of the second (Saltelli et al. 2010); ``subset``: not in a file, see `Subset`.
     groups : str
-        Of ``pick_freeze``: ``tolerance``, the errors of an entry of ``[tolerances]`` together, or ``error``, each by
-        itself.
+        Groups of ``pick_freeze``: ``tolerance``, all errors of an entry of ``[tolerances]``, or ``error``, each alone.
     seed : int
         Seed of all draws.
     nominal_first : bool
-        Whether row 0 is the joint without errors, kept out of the statistics. Never with ``cases``, where each
-        group of joints has its own.
+        Whether row 0 is the joint without errors, which statistics leave out. Never with ``cases``, where each group
+        has its own joint without errors.
     """
 
     method: Drawing = "random"
@@ -121,7 +121,7 @@ class Sampling(Strict):
 
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out `groups` where it means nothing: identities of other methods do not have it."""
+        """Leave out `groups` unless the method is ``pick_freeze``: identities of other methods do not have it."""
         data: dict[str, Any] = write(self)
         if self.method != "pick_freeze":
             data.pop("groups", None)
@@ -150,18 +150,18 @@ class Sampling(Strict):
 
 
 class Subset(Sampling):
-    """How the joints of a subset simulation are drawn, see `analysis.subset`; `n` is how many there are by now.
+    """How the joints of a subset simulation are drawn, see `analysis.subset`; `n` is their present number.
 
     Attributes
     ----------
     per_level : int
-        Joints a level.
+        Joints per level.
     p0 : float
-        Share of them that is carried to the next level.
+        Share of them that seeds the next level.
     load : str
-        The load asked about, ``cross1.F``.
+        Load whose exceedance is estimated, ``cross1.F``.
     above : float
-        The level asked about, SI.
+        Value of the load whose exceedance is estimated, SI.
     unresolved : str
         Whether a joint without a valid load counts as above every level or below.
     """
@@ -196,7 +196,7 @@ class Output(Strict):
     Attributes
     ----------
     results : list of str, optional
-        Names of columns of the results, or patterns of them, that are stored beside those that always are; all without.
+        Names or patterns of result columns to store beside those that are always stored; all by default.
     histories : str
         What is stored beside the results.
     harmonics : int
@@ -208,7 +208,7 @@ class Output(Strict):
     harmonics: Annotated[int, Field(strict=True, ge=0, le=10_000)] = 16
 
     def identity(self) -> dict[str, Any]:
-        """What of it decides the numbers stored: names in place of patterns, none where all results are kept."""
+        """Settings that decide the stored numbers: names in place of patterns, no names where all results are kept."""
         selected = [name for pattern in self.results or () for name in selection.select(pattern, kept.NAMES)]
         names = kept.chosen(selected) if self.results else None
         rest = self.model_dump(exclude={"results"})
@@ -228,7 +228,7 @@ class CaseEntry(Strict):
 
 
 class Range(Strict):
-    """One entry of ``vary``: a key of the joint goes from `start` to `stop`, as the file writes them."""
+    """One entry of ``vary``: a key of the joint goes from `start` to `stop`, given as in the file."""
 
     start: Annotated[Any, Field(alias="from")]
     stop: Annotated[Any, Field(alias="to")]
@@ -251,13 +251,13 @@ class VariantEntry(Strict):
     seed : int
         Seed of the scrambling.
     vary : dict
-        Keys of the joint that the family varies, and how far.
+        Keys of the joint that the family varies, each with its range.
     cases : list of str, optional
-        The cases that are run; all without it. The joint without errors is always run.
+        Cases to run; all by default. The joint without errors is always run.
     operation, solver : dict
         Keys in place of those of ``[operation]`` and ``[solver]``.
     note : str
-        A word on it for the reader of the report.
+        Note for the reader of the report.
     """
 
     name: Annotated[str, Field(min_length=1)]

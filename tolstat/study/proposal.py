@@ -1,13 +1,13 @@
 """Importance sampling: joints drawn from a mixture of the tolerances and of distributions with more joints of interest.
 
-Everything happens in the space of standard normal scores, independent of each other, that the errors are made from: a
-proposal gives some scores another mean and deviation. Whatever the tolerance's distribution, a proposal reaches no
-value that the tolerance does not; a normal error gets just this mean and deviation; and ratios of densities are those
-of normal distributions, with or without correlation.
+The mixture is defined for the independent standard normal scores from which the errors are computed: a proposal gives
+some scores another mean and standard deviation. Whatever the tolerance's distribution, a proposal reaches no value
+outside its support; a normal error gets exactly this mean and deviation, in units of its own deviation; and ratios of
+densities are those of normal distributions, with or without correlation.
 
-One part of the mixture is the tolerances themselves (Owen and Zhou 2000, defensive mixture). Weighing each joint by
-the density of the whole mixture, whichever part it was drawn from (balance heuristic), no joint counts for more than
-one over their share.
+One component of the mixture is the tolerances themselves (Owen and Zhou 2000, defensive mixture). The weight of a joint
+has the density of the whole mixture as denominator, whichever component it was drawn from (balance heuristic), so that
+no weight exceeds one over the share of the tolerances.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from tolstat.study.selection import columns_of, entries, select
 Array = NDArray[np.float64]
 
 LEAST_NOMINAL = 0.05
-"""Least share that is drawn from the tolerances themselves: no joint counts for more than twenty."""
+"""Minimum share of joints drawn from the tolerances themselves: it limits weights to twenty."""
 FARTHEST, WIDEST = 10.0, 10.0
-"""Largest shift, in standard deviations, and widening (narrowing: one over it)."""
+"""Largest shift, in standard deviations, and largest factor `widen` (its reciprocal is the smallest)."""
 
 
 class ProposalEntry(Strict):
-    """One ``[[proposal]]``: a part of the mixture that joints are drawn from.
+    """One ``[[proposal]]``: a component of the mixture that joints are drawn from.
 
     Attributes
     ----------
@@ -54,12 +54,12 @@ class ProposalEntry(Strict):
 
 @dataclass(frozen=True)
 class Proposal:
-    """A part of the mixture: share, and mean and deviation of the scores that are not standard normal in it.
+    """A component of the mixture: share, and mean and deviation of the scores that are not standard normal in it.
 
     Attributes
     ----------
     share : float
-        Of the joints.
+        Its share of the joints.
     scores : dict of str to (float, float)
         Mean and standard deviation by column of the errors.
     """
@@ -82,19 +82,19 @@ def weights(proposals: Sequence[Proposal], scores: Mapping[str, Array]) -> Array
     Parameters
     ----------
     proposals : sequence of Proposal
-        Parts of the mixture; the tolerances have the rest of it.
+        Components of the mixture; the tolerances have the remaining share.
     scores : mapping of str to ndarray, (n,)
         Standard normal scores by column of the errors.
     """
     density = np.full(len(next(iter(scores.values()))), 1.0 - math.fsum(p.share for p in proposals))
-    with np.errstate(over="ignore"):  # a joint that the tolerances all but never make has no weight
+    with np.errstate(over="ignore"):  # a joint of negligible density under the tolerances has weight 0
         for proposal in proposals:
             density += proposal.share * np.exp(proposal.log_ratio(scores))
     return 1.0 / density
 
 
 def component(proposals: Sequence[Proposal], u: Array) -> NDArray[np.intp]:
-    """Part of the mixture that each uniform number selects, (n,): 0 the tolerances, k proposal k."""
+    """Component of the mixture that each uniform number selects, (n,): 0 the tolerances, k proposal k."""
     ends = np.cumsum([1.0 - math.fsum(p.share for p in proposals), *(p.share for p in proposals)])
     return np.minimum(np.searchsorted(ends, u, side="right"), len(proposals))
 
@@ -105,11 +105,11 @@ def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: t
     Parameters
     ----------
     entry : ProposalEntry
-        As the file has it.
+        Entry as read from the file.
     toleranced : sequence of str
-        Errors that scatter; of ``pin1.offset_radial`` it is the score of the radius that is meant.
+        Errors that scatter; for ``pin1.offset_radial`` the entry applies to the score of the radius.
     place, path
-        File and key path that faults name.
+        File name and key path shown in faults.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def _number(value: object, key: str, where: str) -> float:
 
 
 def check_shares(proposals: Sequence[Proposal], place: str) -> None:
-    """Refuse a mixture with too little of the tolerances in it.
+    """Refuse a mixture with too small a share of the tolerances.
 
     Raises
     ------

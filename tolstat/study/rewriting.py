@@ -1,4 +1,4 @@
-"""Keys of a study set anew in its text, comments kept."""
+"""Change keys in the text of a study, keeping its comments."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def with_keys(text: str, section: str, values: Mapping[str, Any], place: str) ->
     text : str
         TOML.
     section : str
-        The table, which has a header of its own and one line a key.
+        The table, which has a header of its own and one line per key.
     values : mapping
         Key to JSON value; keys that the table lacks are added.
     place : str
-        File that faults name.
+        File name shown in faults.
 
     Returns
     -------

@@ -17,18 +17,18 @@ _STATEMENT = re.compile(
 
 
 class Statement(NamedTuple):
-    """P(load > level) is, or its interval is narrower than, something.
+    """Statement that P(load > level), or the width of its interval, is below a bound.
 
     Attributes
     ----------
     text : str
-        As it was written.
+        The statement as written.
     loads : tuple of str
         Names of the loads that the pattern selects; the statement is on the largest of them.
     level : float
         In SI units.
     bound : float
-        Between 0 and 1.
+        Upper bound, between 0 and 1.
     """
 
     text: str
@@ -47,19 +47,19 @@ def parse(text: str, what: str, option: str, example: str) -> Statement:
     what : str
         Word before the ``<``; empty for the probability itself.
     option : str
-        Option that faults name.
+        Option of the command line, shown in faults.
     example : str
-        Remedy where it is no statement.
+        Remedy shown for a text that is not a statement.
 
     Returns
     -------
     Statement
-        What it says.
+        The parsed statement.
 
     Raises
     ------
     InputError
-        With every fault of it.
+        With every fault of the statement.
     """
     found = _STATEMENT.fullmatch(text)
     if found is None or found["what"] != what:

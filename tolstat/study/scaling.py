@@ -1,4 +1,4 @@
-"""Wider and narrower tolerances: entries of ``[tolerances]`` by a factor, and the text of a study that has them."""
+"""Scale entries of ``[tolerances]`` by a factor, and write the text of a study with the scaled entries."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.kinds import KINDS, RADIAL_KINDS, distribution
 
 SCALED = ("normal", "uniform", "triangular", "beta", "rayleigh")
-"""Distributions whose band has a factor: those of measured parts, and of positive values, have none."""
+"""Distributions that can be scaled; those of measured parts and lognormal ones cannot."""
 _WIDTHS = ("plus_minus", "std", "sigma")
 _EXAMPLE = 'write it in one line: "pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal" }'
 
 
 class Tolerance(NamedTuple):
-    """One entry of ``[tolerances]``, which is one tolerance on the drawing of all features that it selects.
+    """One entry of ``[tolerances]``: one tolerance on the drawing for all features that it selects.
 
     Attributes
     ----------
     pattern : str
-        As the study writes it.
+        Pattern as written in the study.
     names : tuple of str
         Errors that it selects.
     entry : dict
@@ -36,7 +36,7 @@ class Tolerance(NamedTuple):
     site : Site
         Unit and middle of the errors.
     width : float
-        The tolerance t, SI: half the band; of an entry without band 3 standard deviations.
+        The tolerance t, SI: half the band, or 3 standard deviations for an entry without a band.
     """
 
     pattern: str
@@ -46,7 +46,7 @@ class Tolerance(NamedTuple):
     width: float
 
     def scaled(self, factor: float, digits: int = 12) -> dict[str, Any]:
-        """Entry with the tolerance `factor` times as wide, about the middle of the band; Cpk stays as it is.
+        """Entry with the tolerance `factor` times as wide, about the middle of the band; Cpk is unchanged.
 
         Parameters
         ----------
@@ -79,25 +79,25 @@ class Tolerance(NamedTuple):
         return entry
 
     def distribution(self, entry: Mapping[str, Any]) -> Distribution:
-        """Distribution of each of the errors with another entry."""
+        """Distribution that `entry` gives each of the errors."""
         return distribution(dict(entry), self.site, "scaled", ("tolerances", self.pattern))
 
     @property
     def widens(self) -> bool:
-        """Whether joints drawn with this tolerance can tell of a wider one: a band that rejects parts cannot."""
+        """Whether joints drawn with this tolerance can be reweighted to a wider one: not if it is bounded."""
         return unbounded(self.distribution(self.entry))
 
 
 def unbounded(found: Distribution) -> bool:
-    """Whether a distribution has values however far out, so that any wider one of its kind has no others."""
+    """Whether a distribution is unbounded, so that a wider one of its kind has the same support."""
     radius = isinstance(found, tolerance.Rayleigh) and found.upper is None
     return isinstance(found, tolerance.Normal) or radius
 
 
 def tolerances(study: Study) -> list[Tolerance]:
-    """Entries of a study that have a factor and are not of the operating point or the material, in its order.
+    """Entries of a study that can be scaled, in its order; not those of operating point and material.
 
-    Correlated errors are left out: theirs are not free of each other.
+    Entries with correlated errors are left out: they cannot be scaled independently.
     """
     found = []
     table = tomllib.loads(study.text).get("tolerances", {})
@@ -122,7 +122,7 @@ def width(entry: Mapping[str, Any], site: Site) -> float:
 
 
 def line(pattern: str, entry: Mapping[str, Any]) -> str:
-    """Entry as a line of a study."""
+    """Entry as a line of a study file."""
     keys = ", ".join(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items())
     return f"{json.dumps(pattern)} = {{ {keys} }}"
 
@@ -137,7 +137,7 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     entries : mapping
         Pattern to keys of its entry.
     seed : int
-        Of the sampling.
+        Seed of the sampling.
 
     Returns
     -------

@@ -21,7 +21,7 @@ UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 """SI unit of every error, in the order of the table."""
 
 RADIAL_UNITS = {f"{feature}.offset_radial": "m" for feature in PINS + HOLES}
-"""Radial offsets: not columns of the table but two of them, offset_t and offset_z, drawn together."""
+"""SI unit of each radial offset, which stands for two columns of the table, offset_t and offset_z, drawn together."""
 
 LIMIT_UNITS = {
     **{f"{bushing}.{load}": unit for bushing in BUSHINGS for load, unit in (("F", "N"), ("T", "N*m"))},
@@ -41,7 +41,7 @@ class Entry(NamedTuple):
     path : tuple of str and int
         Key path in the file.
     value : object
-        What the file says.
+        Value as parsed from the file.
     """
 
     pattern: str
@@ -65,7 +65,7 @@ def quantity(entry: Entry, unit: str, place: str) -> float:
     Raises
     ------
     InputError
-        When it is no such quantity.
+        When the value is not a quantity that can be converted to `unit`.
     """
     try:
         return to_si(entry.value, unit)
@@ -99,9 +99,9 @@ def fixed_errors(
     section : sequence
         Key path of the table in its file.
     place : str
-        File that faults name.
+        File name shown in faults.
     claims : Claims
-        What decides which error; the entries' names are added.
+        Errors that earlier entries set; those of this table are added.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def fixed_errors(
 
 
 def select(pattern: str, names: Iterable[str]) -> list[str]:
-    """Return those of `names` that a pattern selects; ``*`` does not reach across the dot.
+    """Return those of `names` that a pattern selects; ``*`` does not match across the dot.
 
     A radial offset is selected by its full key only: ``"pin1.offset_*"`` means the offsets along e, t, z.
     """
@@ -156,7 +156,7 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
     units : mapping
         The names to select from, and the unit of each.
     place : str
-        File that faults name.
+        File name shown in faults.
 
     Returns
     -------
@@ -180,7 +180,7 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
 
 
 def instead(pattern: str, names: Sequence[str]) -> str:
-    """Remedy for a pattern that selects nothing: which half of it is wrong."""
+    """Remedy for a pattern that selects nothing: a suggestion for the half of it that is wrong."""
     feature, _, key = pattern.partition(".")
     features = list(dict.fromkeys(name.partition(".")[0] for name in names))
     known = [f for f in features if fnmatchcase(f, feature)]
@@ -190,19 +190,19 @@ def instead(pattern: str, names: Sequence[str]) -> str:
 
 
 class Claims:
-    """Which entry has decided which error; a second entry for the same error is a fault naming both."""
+    """Record of the entry that sets each error; a second entry for the same error is a fault that names both."""
 
     def __init__(self, place: str) -> None:
         self._place = place
         self._owner: dict[str, Entry] = {}
 
     def claim(self, entry: Entry, names: Iterable[str]) -> None:
-        """Note that `entry` decides `names`; a radial offset decides offset_t and offset_z.
+        """Record that `entry` sets `names`; a radial offset sets offset_t and offset_z.
 
         Raises
         ------
         InputError
-            When an earlier entry decides one of them.
+            When an earlier entry sets one of them.
         """
         claimed = [column for name in names for column in columns_of(name)]
         clashes = {self._owner[c].path: c for c in claimed if c in self._owner}

@@ -60,32 +60,32 @@ class Case:
 
 @dataclass(frozen=True)
 class Study(Case):
-    """A campaign: which joints, how many, how they scatter, and what they are judged by.
+    """A campaign: its joints, the distribution of their errors, limits, and what is stored.
 
     Attributes
     ----------
     errors : dict
-        Errors that every joint has but the nominal one (SI).
+        Fixed errors of every joint except the nominal one (SI).
     tolerances : dict
         Error name to distribution; ``pin1.offset_radial`` stands for offset_t and offset_z of a feature.
     copula : Copula
         Correlation of the errors.
     proposals : tuple of Proposal
-        What joints are drawn from beside the tolerances; empty unless ``sampling.method`` is ``importance``.
+        Distributions of importance sampling beside the tolerances; empty unless ``sampling.method`` is ``importance``.
     sampling : Sampling
         How many, and how they are drawn.
     sweep : tuple of SweepAxis
-        Axes of a grid, the last running fastest; empty unless ``sampling.method`` is ``sweep``.
+        Axes of a grid, the last varying fastest; empty unless ``sampling.method`` is ``sweep``.
     listed : Design, optional
         The joints listed one by one; None unless ``sampling.method`` is ``cases``.
     limits : dict
         Result name (``cross1.F``, ``fork2.T``, ``pin1.contact``, ``psi``) to limit (SI).
     fatigue : Fatigue
-        What the cycles of the loads are judged by.
+        Settings for the evaluation of load cycles.
     output : Output
-        What is stored beside the results.
+        What is stored of each joint.
     groups : tuple of Group
-        Errors that ``sampling.method`` ``pick_freeze`` moves together; empty for other methods.
+        Errors that ``sampling.method`` ``pick_freeze`` exchanges together; empty for other methods.
     """
 
     sampling: Sampling
@@ -111,7 +111,7 @@ class Study(Case):
 
     @property
     def variants(self) -> tuple[Variant, ...]:
-        """What makes each of `joints`; empty where joints are not listed."""
+        """Variant of each of `joints`; empty where joints are not listed."""
         return self.listed.variants if self.listed else ()
 
     @property
@@ -140,7 +140,7 @@ class Study(Case):
 
     @property
     def asked(self) -> list[str]:
-        """Loads asked for: those with limits, else those that the study selects to keep; empty if it does neither."""
+        """Loads of interest: those with limits, else those that ``output.results`` selects; else none."""
         if self.limits or self.output.results is None:
             return list(self.limits)
         return [load for load in LIMIT_UNITS if kept.holds(self.output.columns, load)]

@@ -1,4 +1,4 @@
-"""A study as subset simulation draws its joints."""
+"""The study of a subset simulation, made from a study with tolerances."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from tolstat.study.study import Study
 
 
 def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
-    """Make the study of a subset simulation from one whose tolerances it is about.
+    """Make the study of a subset simulation from the study whose tolerances it uses.
 
     Parameters
     ----------
     study : Study
-        Of any method that draws joints; histories are not kept.
+        Study with any sampling method that draws joints; its histories are not stored.
     sampling : mapping
-        Fields of `model.Subset` but those that are the study's own.
+        Fields of `model.Subset` except those that are taken from the study.
 
     Returns
     -------
     Study
-        Its ``sampling`` is a `model.Subset`; the joints of level 0, which it can draw, are those of a random campaign.
+        Study whose ``sampling`` is a `model.Subset`; it can draw the joints of level 0, which are those of a random
+        campaign.
 
     Raises
     ------
     InputError
-        When the study has no tolerances or does not keep the load, and with every fault of `sampling`.
+        When the study has no tolerances or does not store the load, and with every fault of `sampling`.
     """
     faults: list[Fault] = []
     if not study.tolerances:

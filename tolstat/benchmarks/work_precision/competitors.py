@@ -1,8 +1,8 @@
-"""What a user would take instead: integrators of scipy and SUNDIALS on the joint's compiled right-hand side.
+"""Alternative integrators: those of scipy and SUNDIALS on the joint's compiled right-hand side.
 
-The task is the solver's own: from the equilibrium that it starts from, which is a present here, over a given number of
-revolutions to the largest loads of the last one. A call of the right-hand side from Python costs little more than its
-arithmetic (`kernel.simd.jit.bare`).
+The task is that of tolstat's solver: from its initial equilibrium, which the competitors get at no cost, over a given
+number of revolutions to the largest loads of the last one. A call of the right-hand side from Python costs little more
+than its arithmetic (`kernel.simd.jit.bare`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Code = Literal["Radau", "BDF", "LSODA", "CVODE"]
 Outcome = Literal["ok", "failed", "over_time"]
 
 MAX_STEPS = 10**9
-"""CVODE stops after 500 steps otherwise; what bounds its work here is the time."""
+"""Step limit of CVODE, whose default is 500; here the CPU time limits its work."""
 
 
 class Competitor(NamedTuple):
@@ -33,7 +33,7 @@ class Competitor(NamedTuple):
     code : {"Radau", "BDF", "LSODA", "CVODE"}
         The first three from scipy, CVODE (BDF, dense linear algebra) from SUNDIALS through scikit-sundae.
     jacobian : bool
-        Whether it is given the compiled Jacobian; else it makes its own by differences.
+        Whether it is given the compiled Jacobian; else it uses finite differences.
     """
 
     code: Code
@@ -44,7 +44,7 @@ class Competitor(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """What became of a run.
+    """Outcome of a run.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class _Counted:
 
 
 def check_installed(codes: tuple[Code, ...]) -> None:
-    """Check that what the integrators need is there.
+    """Check that the packages of the integrators are installed.
 
     Raises
     ------
@@ -121,11 +121,11 @@ def solve(
     rtol : float
         Relative tolerance; the absolute one is `rtol` times ``system.scale``.
     revolutions : int
-        How many are integrated.
+        Number of revolutions to integrate.
     limit : float
         CPU time (s) after which the run is stopped.
     angles : int
-        Angles of the last revolution at which loads are looked at, by the integrator's own interpolation.
+        Number of angles of the last revolution at which loads are evaluated, by the integrator's own interpolation.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Timing joints: jobs that a worker process runs, and the runs that come of them.
+"""Timing joints: jobs that a worker process executes, and the runs that they return.
 
-A job is all settings of one contender for one joint. Times are CPU times of a process that computes with one thread;
-what is compiled, loaded or prepared is not in them.
+A job is all settings of one contender for one joint, or one block of joints. Times are CPU times of a process that
+computes with one thread; they exclude compilation, loading and preparation.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from tolstat.study import Study
 Params = NDArray[np.void]
 METHOD_NAMES = {"bdf2": "BDF2", "generalized_alpha": "generalised-α", "tr_bdf2": "TR-BDF2"}
 IDEAL_STEPS = 90
-"""The ideal joint has nothing to converge: the steps nearest to this are taken."""
+"""Steps a revolution of the ideal joint, which does not converge with them: the nearest setting is taken."""
 TRUTH = "truth"
 
 
@@ -36,7 +36,7 @@ class Run(NamedTuple):
     Attributes
     ----------
     contender : str
-        Its name; `TRUTH` and a setting of 0 or 1 for the reference and what it is compared with.
+        Its name; `TRUTH` with a setting of 0 for the reference, and of 1 for the looser one that it is compared with.
     ours : bool
         Whether it is tolstat.
     setting : float
@@ -44,11 +44,11 @@ class Run(NamedTuple):
     joint : int
         Row among `setup.parameters`.
     outcome : {"ok", "failed", "over_time"}
-        What became of it; a run that is left out because a looser one took too long is ``over_time`` too.
+        Outcome; a run that is skipped because a looser tolerance took too long is ``over_time`` too.
     seconds : float
         CPU time of the joint.
     largest : Largest or None
-        What was computed.
+        Largest loads computed.
     halvings, rates : int
         Steps halved by the solver; calls of the right-hand side by a competitor.
     """
@@ -75,7 +75,7 @@ class OwnJob(NamedTuple):
     measured: int
 
     def runs(self) -> list[Run]:
-        """Measure: once for the results, then `repeats` times for the time."""
+        """Simulate once for the results, then `repeats` times for the time."""
         runs = []
         for options in self.options:
             results = simulate_rows(self.params, options).results
@@ -102,7 +102,7 @@ class OtherJob(NamedTuple):
     limit: float
 
     def runs(self) -> list[Run]:
-        """Measure; when one run takes too long those that are tighter are not begun."""
+        """Integrate at each tolerance; after a run that takes too long, tighter ones are skipped."""
         system = first_order(self.params, self.options, from_start=True)
         prepare(system)
         solve(system, self.competitor, 0.1, 1, 1e-3)  # loads the integrator
@@ -117,7 +117,7 @@ class OtherJob(NamedTuple):
 
 
 class TruthJob(NamedTuple):
-    """The reference at two tolerances; there is none at the tighter one where largest loads do not repeat."""
+    """The reference at two tolerances; the tighter one has no result where the largest loads do not repeat."""
 
     contender: str
     rtols: tuple[float, float]
@@ -126,7 +126,7 @@ class TruthJob(NamedTuple):
     joint: int
 
     def runs(self) -> list[Run]:
-        """Solve tightly."""
+        """Compute the reference at both tolerances."""
         runs = []
         for k, rtol in enumerate(self.rtols):
             begin = time.process_time()
@@ -148,7 +148,7 @@ def largest_of(row: np.void) -> Largest | None:
 
 
 def prepare(system: FirstOrder) -> None:
-    """Call a system's functions once, so that the first run does not pay for what the first call costs."""
+    """Call a system's functions once, so that no run includes the cost of first calls."""
     system.rate(system.t0, system.y0)
     system.jacobian(system.t0, system.y0)
     system.largest(np.full(1, system.t0), system.y0[None])
@@ -162,7 +162,7 @@ def jobs(setup: Setup, base: Study, params: Params) -> Iterator[Job]:
     setup : Setup
         The study.
     base : Study
-        Where the joints come from.
+        Study that the joints are drawn from.
     params : ndarray of PARAM
         As `setup.parameters` makes them.
     """
@@ -202,14 +202,14 @@ def own_ladders(setup: Setup, options: Options) -> dict[str, tuple[Options, ...]
 def run(setup: Setup, base: Study, params: Params, tell: Callable[[str], None], more: Sequence[Job] = ()) -> list[Run]:
     """Run all jobs in worker processes, one a core.
 
-    The kernels are compiled before, in this process: two that compile at once could spoil the cache.
+    The kernels are compiled beforehand in this process: two processes that compile at once could corrupt the cache.
 
     Parameters
     ----------
     setup, base, params
         As for `jobs`.
     tell : callable
-        Told now and then how far it is, and of jobs whose process died.
+        Called with progress messages, and with each job whose process died.
     more : sequence of Job
         Jobs beside those of the setup.
 

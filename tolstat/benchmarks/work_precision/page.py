@@ -28,7 +28,7 @@ OTHERS = {"Radau": ("#D55E00", "^"), "BDF": ("#009E73", "<"), "LSODA": ("#CC79A7
 """Colours of Okabe and Ito (2008); each code has a marker of its own too."""
 LABELS = {"loads": "largest |F| and |T|", "contact": "largest contact force", "psi": "largest |Ψ|"}
 LEVELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-"""Errors whose cost is told, as far as the truth reaches."""
+"""Errors whose cost is tabulated, as far as they exceed the truth's own error."""
 TOP = 2.0
 """Errors above this are drawn at it, with a cross."""
 FLOOR = 1e-7
@@ -41,16 +41,16 @@ def write(runs: Sequence[Run], setup: Setup, base: Study, stem: Path) -> Report:
     Parameters
     ----------
     runs : sequence of Run
-        What was measured.
+        Measured runs.
     setup, base : Setup, Study
-        What was asked for.
+        Setup of the measurement, and study of the joints.
     stem : Path
         The files' name without ending.
 
     Returns
     -------
     Report
-        What an error costs, who is ahead, and the files.
+        Table of the fastest contenders at each error, and the files.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def write(runs: Sequence[Run], setup: Setup, base: Study, stem: Path) -> Report:
 
 
 def short(runs: Sequence[Run]) -> str:
-    """Table of who is ahead at each error of the median joint, and by how much for the worst joint; Markdown."""
+    """Markdown table of the fastest contenders at each error of the median joint, with ratios for the worst joint."""
     points, truth = build(runs)
     worst = _ahead(points, truth, "loads_worst")[["error", "times ahead"]]
     table = _ahead(points, truth, "loads").merge(worst, "left", "error", suffixes=("", ", worst joint"))
@@ -97,15 +97,15 @@ def figure(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str) -> Figure:
     Parameters
     ----------
     points, truth : DataFrame
-        As `comparison.table.build` makes them.
+        As `table.build` makes them.
     subtitle : str
-        What was measured.
+        Description of the measurement.
 
     Returns
     -------
     Figure
-        Loads large, contact force and Psi small. A ring marks settings at which steps were halved, a cross
-        those at which joints failed or ran over time (at the upper edge where no median is left).
+        Large panel for the loads, small ones for contact force and Psi. A ring marks settings at which steps were
+        halved, a cross those at which joints failed or ran over time (at the upper edge if the median is infinite).
     """
     with style.settings():
         page = Figure(figsize=(11.0, 7.6))
@@ -123,7 +123,7 @@ def figure(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str) -> Figure:
 
 
 def page(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str, image: str) -> str:
-    """Write the page in Markdown: the figure, who is ahead at each error, what an error costs, every point."""
+    """Compose the page in Markdown: figure, fastest contenders at each error, cost of an error, all points."""
     own_error = f"median {truth['loads'].median():.0e}, worst {truth['loads'].max():.0e}"
     costs = cost(points, "loads", _levels(truth, "loads")).drop(columns="ours")
     parts = [

@@ -22,7 +22,7 @@ Steps = Annotated[int, Field(strict=True, ge=12, le=20_000)]
 
 
 class Own(Strict):
-    """``[tolstat]``: settings of the solver. `block`: how many joints the block curve is given at once."""
+    """``[tolstat]``: settings of the solver. `block`: number of joints simulated together for the curve "at once"."""
 
     fidelities: Annotated[tuple[Literal["dynamic", "quasistatic", "ideal"], ...], Field(min_length=1)]
     methods: Annotated[tuple[Literal["bdf2", "generalized_alpha", "tr_bdf2"], ...], Field(min_length=1)]
@@ -31,7 +31,7 @@ class Own(Strict):
 
 
 class Others(Strict):
-    """``[others]``: the competitors and their tolerances, loosest first. `limit`: CPU time of a run, s."""
+    """``[others]``: the competitors and their tolerances, loosest first. `limit`: largest CPU time of a run, s."""
 
     codes: tuple[Code, ...]
     rtol: Annotated[tuple[Tolerance, ...], Field(min_length=1)]
@@ -55,7 +55,7 @@ class Setup(Strict):
     joints : int
         Random joints, beside the nominal one if the study has it.
     seed : int
-        Chooses them.
+        Seed of the choice of these joints.
     repeats : int
         Timings of tolstat; the median counts.
     tolstat, others, truth
@@ -71,7 +71,7 @@ class Setup(Strict):
     truth: Truth
 
     def quick(self) -> Setup:
-        """Fewer of everything: for a look at the machinery, not at the figures."""
+        """Reduced setup: to check that the study runs, not for the numbers."""
         own = self.tolstat.model_copy(update={"steps_per_rev": self.tolstat.steps_per_rev[1::3]})
         others = self.others.model_copy(update={"rtol": self.others.rtol[:3:2], "limit": min(self.others.limit, 2.0)})
         truth = Truth(rtol=(1e-6, 1e-5))
@@ -99,7 +99,7 @@ def load(path: Path, quick: bool = False) -> tuple[Setup, Study]:
 
 
 def parameters(setup: Setup, base: Study) -> NDArray[np.void]:
-    """Parameters of the joints that errors are measured on, then of others of the study that fill the block, PARAM."""
+    """Parameters, PARAM, of the joints with measured errors, then of further joints of the study to fill the block."""
     first = int(base.sampling.nominal_first)
     drawn = first + np.random.default_rng(setup.seed).permutation(base.rows - first)
     rows = np.concatenate([np.arange(first), drawn])[: max(setup.tolstat.block, first + setup.joints)]
@@ -107,5 +107,5 @@ def parameters(setup: Setup, base: Study) -> NDArray[np.void]:
 
 
 def measured(setup: Setup, base: Study) -> int:
-    """How many of `parameters` errors are measured on, from the first."""
+    """Number of joints with measured errors: the first ones of `parameters`."""
     return setup.joints + int(base.sampling.nominal_first)

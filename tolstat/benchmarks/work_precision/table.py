@@ -44,7 +44,7 @@ def build(runs: Sequence[Run]) -> tuple[pd.DataFrame, pd.DataFrame]:
     Parameters
     ----------
     runs : sequence of Run
-        With the reference of each joint among them.
+        Measured runs, with the references of each joint among them.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def build(runs: Sequence[Run]) -> tuple[pd.DataFrame, pd.DataFrame]:
         ``ms`` (median), then the median error of each of `KINDS`, ``loads_worst``, mean ``halvings`` and ``rates``.
         A run without a result has an infinite error; joints without a truth do not count.
     truth : DataFrame
-        One row a joint: what the two references differ by, by kind, and the seconds that the tighter one took.
+        One row a joint: difference of the two references, by kind, and CPU time of the tighter one, s.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def _point(group: pd.DataFrame) -> dict[str, object]:
 
 
 def cost(points: pd.DataFrame, error: str, levels: Sequence[float]) -> pd.DataFrame:
-    """What an error costs: time of the cheapest setting measured whose error is not larger.
+    """Cost of an error: time of the cheapest setting measured whose error is not larger.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def cost(points: pd.DataFrame, error: str, levels: Sequence[float]) -> pd.DataFr
     -------
     DataFrame
         One row a contender: ``contender``, ``ours``, then a column a level with milliseconds a joint, NaN where no
-        setting comes so far.
+        setting reaches the error.
     """
     rows = []
     for name, group in points.groupby("contender", sort=False):
@@ -128,7 +128,7 @@ def cost(points: pd.DataFrame, error: str, levels: Sequence[float]) -> pd.DataFr
 
 
 def leaders(costs: pd.DataFrame) -> pd.DataFrame:
-    """Who is ahead at each error.
+    """Find the fastest of tolstat's settings and of the others at each error.
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ def leaders(costs: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         One row a level: ``error``, the cheapest of tolstat's settings as ``tolstat`` and ``tolstat_ms``, the cheapest
-        of the others as ``other`` and ``other_ms``, and ``ratio`` of their times, above 1 where tolstat is ahead. Empty
-        text and NaN where nobody comes so far.
+        of the others as ``other`` and ``other_ms``, and ``ratio`` of their times, above 1 where tolstat is faster.
+        Empty text and NaN where none reaches the error.
     """
     rows = []
     for level in map(float, costs.columns[2:]):

@@ -1,4 +1,4 @@
-"""Blocks of work through a function: in this process, in supervised ones, or on a cluster. It knows no physics."""
+"""Apply a function to blocks of work: in this process, in supervised processes, or on a cluster; no physics."""
 
 from tolstat.campaign.executors.common import Lost, Work, WorkerDied, available_workers
 from tolstat.campaign.executors.processes import map_in_processes

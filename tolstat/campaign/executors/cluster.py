@@ -1,7 +1,7 @@
-"""Blocks through the workers of a Dask cluster; those that its workers do not survive end in supervised processes here.
+"""Executor on a Dask cluster; blocks that its workers do not survive are repeated in supervised processes here.
 
-The scheduler gives the blocks of a lost worker to others. A block over which several workers die is not given to the
-cluster again: its pieces are done on this machine at the end, where it shows which of them crash or hang.
+The scheduler reassigns the blocks of a lost worker. A block that kills several workers, or raises, is not submitted
+again: at the end its pieces are processed on this machine, which shows which of them crash or hang.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 FIRST_WORKER_S = 300.0
-"""How long the first worker of a cluster is waited for, in seconds: a queue may have to start it."""
+"""Time limit for the first worker of a cluster to appear, s: a batch queue may have to start it."""
 CONNECT_S = 15.0
-"""How long a scheduler is waited for, in seconds."""
+"""Time limit for connecting to a scheduler, s."""
 FETCH_S = 60.0
-"""How long a result is waited for, in seconds."""
+"""Time limit for fetching a result, s."""
 MAX_FAILURES = 3
-"""How many blocks may fail before the first one that does not."""
+"""Number of failed blocks, before any has succeeded, at which the cluster is given up."""
 
 Fingerprint = Callable[[], Mapping[str, str]]
 
 _ONE_AT_A_TIME = threading.Lock()
-"""Joints are simulated in work arrays of the process, which a worker with several threads must not share."""
+"""Lock: a simulation uses work arrays of the process, which the threads of a worker must not use at the same time."""
 
 
 def map_on_cluster(
@@ -46,24 +46,24 @@ def map_on_cluster(
     fingerprint: Fingerprint,
     stop: Callable[[], bool] = never,
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
-    """Apply the function to every block on a Dask cluster and yield the results as they come.
+    """Apply the function to every block on a Dask cluster and yield the results as they arrive.
 
     Close the generator (`contextlib.closing`) when leaving it early.
 
     Parameters
     ----------
     work : Work
-        What to do. A worker that exceeds the time limit is ended.
+        Function to apply, and how. A worker that exceeds the time limit is killed.
     blocks : iterable
-        Blocks; taken from it only as they are needed.
+        Blocks; consumed only as they are needed.
     scheduler : str, optional
         Address of the scheduler; without it a cluster is started on this machine.
     workers : int
-        Processes of a cluster on this machine.
+        Number of processes of a cluster on this machine.
     fingerprint : callable
-        What must be the same here and in every worker, such as versions, by name.
+        () -> values by name, such as versions, that must be equal here and in every worker.
     stop : callable, optional
-        Asked often; when it says True no block is begun any more, and those in work are finished.
+        Called often; once it returns True no further block is started, and blocks in work are finished.
 
     Yields
     ------
@@ -75,7 +75,7 @@ def map_on_cluster(
     InputError
         When Dask is not installed, the scheduler does not answer, or a worker's fingerprint differs.
     WorkerDied
-        When the scheduler is lost, has no workers, or pieces that are left make every process die.
+        When the scheduler is lost or has no workers, every block fails, or every remaining piece kills its process.
     """
     with _client(scheduler, workers) as client:
         _check_fingerprints(client, fingerprint)
@@ -87,7 +87,7 @@ def map_on_cluster(
 
 
 class _Cluster:
-    """Blocks under way on a cluster, at most twice as many as it has threads."""
+    """Blocks in work on a cluster, at most twice as many as it has threads."""
 
     def __init__(self, client: Client, work: Work[Any, Any], blocks: Iterator[Any], fingerprint: Fingerprint) -> None:
         self.client = client
@@ -116,7 +116,7 @@ class _Cluster:
             yield from self._take(future)
 
     def _hand_out(self) -> bool:
-        """Submit blocks; whether there may be more."""
+        """Submit blocks; return whether there may be more."""
         room = 2 * max(1, sum(self.client.nthreads().values())) - len(self.running)
         for _ in range(room):
             block = next(self.blocks, None)
@@ -132,7 +132,7 @@ class _Cluster:
 
     def _take(self, future: Future) -> Iterator[tuple[Any, Any]]:
         block = self.running.pop(future)
-        if future.status in ("lost", "pending"):  # lost with its worker, and on its way again
+        if future.status in ("lost", "pending"):  # lost with its worker; the scheduler runs it again
             self._watch(future, block)
             return
         if future.status not in ("finished", "error"):
@@ -141,7 +141,7 @@ class _Cluster:
             result = future.result(timeout=FETCH_S)
         except InputError:
             raise
-        except Exception as error:  # workers died over it, or with its result, or it raised this
+        except Exception as error:  # workers died on the block or with its result, or it raised this
             self.suspects.append(block)
             if not self.works and len(self.suspects) >= MAX_FAILURES:
                 raise WorkerDied(f"the Dask cluster does no block: {error!r}\n  hint: see its logs") from error
@@ -151,7 +151,7 @@ class _Cluster:
 
 
 def do(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
-    """Do a block in a worker, one at a time."""
+    """Process a block in a worker, one block at a time."""
     check(expected, _own(fingerprint), "a Dask worker")
     with _ONE_AT_A_TIME:
         _prepare(work.prepare)
@@ -169,7 +169,7 @@ def _own(fingerprint: Fingerprint) -> Mapping[str, str]:
 
 @cache
 def _prepare(prepare: Callable[[], object]) -> None:
-    """Prepare this process once, one process of a machine after the other: they may compile into one cache."""
+    """Prepare this process once; processes of a machine take turns, since they may compile into one cache."""
     with open(os.path.join(tempfile.gettempdir(), f"tolstat-{os.getuid()}.lock"), "w") as lock:
         import fcntl
 
@@ -178,12 +178,12 @@ def _prepare(prepare: Callable[[], object]) -> None:
 
 
 def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> None:
-    """Refuse a process that would give other numbers.
+    """Reject a process whose results could differ because its versions differ.
 
     Raises
     ------
     InputError
-        With all that differs.
+        With all differences.
     """
     lines = [
         f"{name}: {value} here, {found.get(name)} there" for name, value in expected.items() if found.get(name) != value

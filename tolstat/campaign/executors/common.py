@@ -1,4 +1,4 @@
-"""What all executors share: the work to be done, and what becomes of work that its process did not survive."""
+"""Definitions shared by all executors: the work to be done, and the record of a block that was given up."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BlockT = TypeVar("BlockT")
 ResultT = TypeVar("ResultT")
 
 POLL_S = 0.2
-"""How often a request to stop is looked for while workers are busy, in seconds."""
+"""Interval at which a request to stop is checked while workers are busy, s."""
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -25,18 +25,18 @@ THREAD_VARIABLES = (
 
 
 class WorkerDied(TolstatError):
-    """Worker processes end without answers, whatever they work at; what was finished has been handed over."""
+    """Worker processes die whichever block they work on; finished results have been yielded before."""
 
 
 class Lost(NamedTuple):
-    """In place of a result: the block, of one piece, was given up.
+    """Takes the place of a result when a block that cannot be split was given up.
 
     Attributes
     ----------
     kind : {"crashed", "timeout"}
-        Whether its process died or was too slow.
+        Whether the block crashed its process (or raised), or exceeded the time limit.
     reason : str
-        What happened the last time, as ``"killed by SIGKILL"``.
+        What happened at the last attempt, such as ``"killed by SIGKILL"``.
     """
 
     kind: Literal["crashed", "timeout"]
@@ -54,18 +54,18 @@ def nothing() -> None:
 
 @dataclass(frozen=True)
 class Work(Generic[BlockT, ResultT]):
-    """How blocks become results.
+    """A function of blocks, and how to apply it.
 
     Attributes
     ----------
     function : callable
-        Function of one block. It, the blocks and its results must be picklable where they go to other processes.
+        Function of one block. Function, blocks and results must be picklable if other processes are used.
     split : callable
-        Block -> its pieces. The pieces of a block whose process died or hung are done one by one.
+        Block -> its pieces, which are processed one by one if the block's process died or hung.
     prepare : callable
-        Done once in each process before the first block, outside the time limit.
+        Called once in each process before the first block, outside the time limit.
     limit_s : float, optional
-        Longest time for a block, in seconds. One that takes longer is split, a single piece given up in the end.
+        Time limit of a block, s. A block that exceeds it is split; a single piece is finally given up.
     """
 
     function: Callable[[BlockT], ResultT]

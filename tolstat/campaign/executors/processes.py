@@ -1,12 +1,12 @@
-"""Blocks through worker processes that may die or hang: they are replaced, and no block is lost with them.
+"""Executor in worker processes that may die or hang: such workers are replaced, and their blocks are repeated.
 
 Neither pool of the standard library does this: `multiprocessing.Pool` waits for ever for the task of a killed worker,
 and `ProcessPoolExecutor` fails every task once one worker is gone. Here each worker has a pipe and one block at a time.
 
-A block whose worker died, hung or raised is split, and its pieces come after all other blocks, one by one. A piece
-that fails twice alone is given up as `Lost`, but only once another block has come through since, if need be one that
-did before: when the machine is what is wrong (no memory left, a broken installation) all blocks fail, and none of them
-is to blame.
+A block whose worker died, hung or raised is split, and its pieces are processed one by one after all other blocks. A
+piece that fails twice alone is given up as `Lost`, but only after another block has succeeded since; if none is left, a
+block that succeeded before is repeated as a control. The reason: when the machine is at fault (no memory left, a broken
+installation) all blocks fail, and none of them is the cause.
 
 Workers are spawned, because a forked child inherits locks of threads that it does not have.
 """
@@ -29,13 +29,13 @@ from tolstat.campaign.executors.common import POLL_S, THREAD_VARIABLES, BlockT, 
 from tolstat.campaign.executors.worker import RAISED, READY, serve
 
 TRIES = 2
-"""How often a single piece may fail before it is given up."""
+"""Number of failures at which a single piece is given up."""
 DOUBT = 3
-"""After how many failures in a row a block that came through before is done again, to see if workers still can."""
+"""Number of consecutive failures after which a block that succeeded before is repeated, to test the workers."""
 MAX_FAILED_STARTS = 3
-"""How many workers in a row may end before they are ready."""
+"""Number of consecutive workers ending before they are ready at which `WorkerDied` is raised."""
 START_LIMIT_S = 600.0
-"""Longest time for a worker to get ready, in seconds: it may have to compile."""
+"""Time limit for a worker to get ready, s: it may have to compile."""
 
 HINT = (
     "hint: use fewer workers if memory is short; in a script of your own, start the campaign "
@@ -46,20 +46,20 @@ HINT = (
 def map_in_processes(
     work: Work[BlockT, ResultT], blocks: Iterable[BlockT], workers: int, stop: Callable[[], bool] = never
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
-    """Apply the function to every block in worker processes and yield the results as they come.
+    """Apply the function to every block in worker processes and yield the results as they arrive.
 
     Close the generator (`contextlib.closing`) when leaving it early: that ends the workers at once.
 
     Parameters
     ----------
     work : Work
-        What to do.
+        Function to apply, and how.
     blocks : iterable
-        Blocks; taken from it only as they are needed.
+        Blocks; consumed only as they are needed.
     workers : int
         Number of processes.
     stop : callable, optional
-        Asked often; when it says True no block is begun any more, and those in work are finished.
+        Called often; once it returns True no further block is started, and blocks in work are finished.
 
     Yields
     ------
@@ -72,7 +72,7 @@ def map_in_processes(
     WorkerDied
         When workers cannot be started, or die one after the other without finishing anything.
     Exception
-        When every block raises it.
+        The function's own, when block after block fails and the last one raised it.
     """
     team: _Team[BlockT, ResultT] = _Team(work, iter(blocks), workers)
     try:
@@ -83,7 +83,7 @@ def map_in_processes(
 
 
 class _Task(NamedTuple, Generic[BlockT]):
-    """A block, how often it has failed alone, and whether it is only to show that workers can still do one."""
+    """A block, how often it failed alone, and whether it is a control that only tests if workers still work."""
 
     block: BlockT
     failures: int = 0
@@ -100,7 +100,7 @@ class _Worker(Generic[BlockT]):
 
 
 class _Team(Generic[BlockT, ResultT]):
-    """Workers and what is left for them to do."""
+    """Worker processes, and the tasks that are left for them."""
 
     def __init__(self, work: Work[BlockT, ResultT], blocks: Iterator[BlockT], size: int) -> None:
         self.work = work
@@ -122,7 +122,7 @@ class _Team(Generic[BlockT, ResultT]):
             self._hand_out()
             if not any(worker.task for worker in self.workers) and not self._has_task():
                 break
-            # All messages first, then new blocks, then the caller, who may take his time with the results.
+            # Read all messages, then hand out blocks, then yield: the caller may take long with the results.
             finished = [result for worker in self._heard_from() for result in self._listen(worker)]
             self._hand_out()
             yield from finished
@@ -167,11 +167,11 @@ class _Team(Generic[BlockT, ResultT]):
         worker.task = task
         limit = self.work.limit_s
         worker.deadline = time.monotonic() + limit if limit else float("inf")
-        with suppress(OSError):  # it has died meanwhile: its end of the pipe will be found closed
+        with suppress(OSError):  # the worker has died: `_listen` will find its pipe closed
             worker.connection.send(task.block)
 
     def _heard_from(self) -> list[_Worker[BlockT]]:
-        """Wait for workers with a message; those that have died have one, too: the end of the pipe."""
+        """Wait for workers and return those with a message, a closed pipe (the worker died) or an expired deadline."""
         nearest = min(worker.deadline for worker in self.workers) - time.monotonic()
         ready = wait([w.connection for w in self.workers], timeout=max(0.0, min(POLL_S, nearest)))
         now = time.monotonic()
@@ -240,7 +240,7 @@ class _Team(Generic[BlockT, ResultT]):
 
 
 def _start(work: Work[Any, Any]) -> _Worker[Any]:
-    """Start a worker; it inherits blocked signals until it can ignore them."""
+    """Start a worker; it inherits a mask that blocks signals until `serve` ignores them."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=serve, args=(there, work), daemon=True)
@@ -262,7 +262,7 @@ def _cause(exit_code: int | None) -> str:
 
 @contextmanager
 def signals_blocked() -> Iterator[None]:
-    """Have processes that are started meanwhile inherit blocked signals: to stop is for this process to decide."""
+    """Let processes started inside inherit blocked SIGINT and SIGTERM: only this process decides when to stop."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -275,7 +275,7 @@ def signals_blocked() -> Iterator[None]:
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Have workers that are started meanwhile compute with one thread; libraries ask when they are loaded."""
+    """Limit workers started inside to one thread each; libraries read these variables when they are loaded."""
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:

@@ -1,4 +1,4 @@
-"""Blocks one after the other in this process, which nothing protects."""
+"""Serial executor in this process, without protection against crashes and hangs."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from tolstat.campaign.executors.common import BlockT, ResultT, Work, never
 def map_here(
     work: Work[BlockT, ResultT], blocks: Iterable[BlockT], stop: Callable[[], bool] = never
 ) -> Generator[tuple[BlockT, ResultT], None, None]:
-    """Apply the function to every block and yield the results in their order.
+    """Apply the function to every block and yield the results in the order of the blocks.
 
     Parameters
     ----------
     work : Work
-        What to do; of it only the function counts.
+        Work to do; only its function is used.
     blocks : iterable
-        Blocks; taken from it only as they are needed.
+        Blocks; consumed only as they are needed.
     stop : callable, optional
-        Asked before each block; when it says True none is begun any more.
+        Called before each block; once it returns True no further block is started.
     """
     for block in blocks:
         if stop():

@@ -1,4 +1,4 @@
-"""What runs in a worker process: it takes blocks from a pipe until the other end is closed."""
+"""Main loop of a worker process: take blocks from a pipe until the other end is closed."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ READY, RESULT, RAISED = "ready", "result", "raised"
 """Kinds of messages from a worker."""
 
 ORPHAN_GRACE_S = 10.0
-"""How much longer than the time limit a worker lets itself run: the parent, if there is one, ends it before."""
+"""Time beyond the time limit after which a worker kills itself, s; a living parent kills it earlier."""
 
 
 def serve(connection: Connection, work: Work[Any, Any]) -> None:
-    """Do blocks until the parent closes the pipe or is gone; whether to stop is for the parent to decide."""
+    """Process blocks until the parent closes the pipe or ends; signals are ignored, the parent decides when to stop."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -39,10 +39,10 @@ def serve(connection: Connection, work: Work[Any, Any]) -> None:
 
 
 def alarm(seconds: float | None) -> None:
-    """Have the system end this process after some time, None for never.
+    """Let the operating system kill this process after some time; None cancels the timer.
 
-    Compiled code keeps Python's threads and signal handlers waiting, so a joint that loops for ever would outlive a
-    parent that was killed. The system's own timer needs neither.
+    Compiled code blocks Python's threads and signal handlers, so a joint in an endless loop would outlive a parent
+    that was killed. The operating system's timer needs neither.
     """
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, seconds or 0.0)

@@ -1,8 +1,8 @@
 """Closure of the RCCC linkage: the loop is cut at the output fork.
 
-Its pose through input fork and cross must be its pose on the output shaft. Newton's method solves these six equations
-for three angles and three slides, at all input angles at once. Its Jacobian holds the screws of the pairs, which give
-the rates of angles and slides too.
+The pose of the output fork through input fork and cross must equal its pose on the output shaft. Newton's method solves
+these six equations for three angles and three slides, at all input angles at once. The Jacobian consists of the screws
+of the pairs, which also give the rates of angles and slides.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tolstat.joint import ideal
 from tolstat.joint.rccc.constraints import Array, Lines
 
 CLOSED = 1e-12
-"""A loop is closed when its gap is below this, in rad and in units of ``cross.R``."""
+"""A loop is closed when all components of its gap are below this, in rad and in units of ``cross.R``."""
 
 MAX_ITERATIONS = 25
 
@@ -24,8 +24,8 @@ MAX_ITERATIONS = 25
 class Side(NamedTuple):
     """The kept pin and hole of one fork: number of the pin, then point (m) and direction of both axes, (3,) each.
 
-    The pin's are in axes of the cross, the hole's in axes of its fork; directions point away from O. `sign` is +1 where
-    that is the frame's own x or y, else -1.
+    Pin point and axis are in axes of the cross, hole point and axis in axes of the fork; directions point away from O.
+    `sign` is +1 where the nominal direction is the frame's x or y, -1 where it is the opposite.
     """
 
     pin: int
@@ -57,7 +57,7 @@ def _turn(axis: Array, angle: Array) -> Array:
 
 
 def _aligning(start: Array, end: Array) -> Array:
-    """The shortest rotation that takes one unit vector into another, not its opposite, shape (3, 3)."""
+    """The shortest rotation from unit vector `start` to `end`, which must not be opposite, shape (3, 3)."""
     skew = np.cross(np.eye(3), np.cross(start, end))
     return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + start @ end))
 
@@ -65,8 +65,8 @@ def _aligning(start: Array, end: Array) -> Array:
 def forward(sides: tuple[Side, Side], alpha: float, theta: Array, q: Array, radius: float) -> tuple[Pose, Lines, Array]:
     """Pose of the links and axes of the pairs at coordinates `q` (k, 6), and the gap of the loop (k, 6).
 
-    Coordinates are pair angles, output angle and slides, in the order of `Revolution`. The gap is the rotation
-    (to first order, rad) and the displacement (m) from the output fork on its shaft to the one at the end of the chain.
+    Coordinates are pair angles, output angle and slides, in the order of `Revolution`. The gap is the rotation (to
+    first order, rad) and the displacement (m) from the output fork's pose on its shaft to its pose through the chain.
     """
     into, out = sides
     beta, gamma, output_angle, slide_in, slide_out, slide_shaft = q.T
@@ -99,7 +99,7 @@ def forward(sides: tuple[Side, Side], alpha: float, theta: Array, q: Array, radi
 
 
 def _screws(sides: tuple[Side, Side], lines: Lines, pose: Pose) -> Array:
-    """Change of the loop's gap with each coordinate: the pairs' screws at the output fork's centre, (k, 6, 6)."""
+    """Jacobian of the loop's gap in the coordinates: the pairs' screws at the output fork's centre, (k, 6, 6)."""
     screws = np.zeros((len(lines.point), 6, 6))
     for k, side in enumerate(sides):
         axis, arm = lines.axis[:, k + 1], pose.origin[:, 2] - lines.point[:, k + 1]
@@ -113,19 +113,19 @@ def _screws(sides: tuple[Side, Side], lines: Lines, pose: Pose) -> Array:
 
 
 def _input_screw(pose: Pose) -> Array:
-    """Change of the loop's gap with the input angle, (k, 6, 1)."""
+    """Derivative of the loop's gap with respect to the input angle, (k, 6, 1)."""
     z = np.zeros_like(pose.origin[:, 2])
     z[:, 2] = 1.0
     return np.concatenate([z, np.cross(z, pose.origin[:, 2])], axis=1)[..., None]
 
 
 def rates(sides: tuple[Side, Side], lines: Lines, pose: Pose) -> Array:
-    """Rates of the six coordinates with the input angle, (k, 6): pure numbers, slides m/rad."""
+    """Derivatives of the six coordinates with respect to the input angle, (k, 6): pure numbers, slides m/rad."""
     return np.asarray(np.linalg.solve(_screws(sides, lines, pose), -_input_screw(pose))[..., 0], float)
 
 
 def close(sides: tuple[Side, Side], alpha: float, theta: Array, radius: float) -> Array:
-    """Coordinates (k, 6) at which the loop is closed, by Newton's method from the ideal joint's; NaN where it fails."""
+    """Solve for the coordinates (k, 6) that close the loop, by Newton's method from the ideal joint; NaN on failure."""
     q = np.zeros((len(theta), 6))
     q[:, 0] = ideal.cross_angle(theta, alpha)
     q[:, 1] = np.arcsin(np.sin(alpha) * np.cos(theta))

@@ -1,8 +1,9 @@
-"""Axes of the four pairs of the loop frame, input fork, cross, output fork, and what the pairs forbid.
+"""Axes of the four pairs of the loop frame, input fork, cross, output fork, and the constraints of the pairs.
 
 Links are numbered 0 frame, 1 input fork, 2 cross, 3 output fork; pair i joins link i to the next (3 to the frame).
 Twists and wrenches are taken about O in axes of the ground frame G, lengths in units of `Lines.length`: a twist is
-(v / length, ω), a wrench (force, moment / length). That keeps both halves of one size, for ranks and for conditioning.
+(v / length, ω), a wrench (force, moment / length). Both halves then have similar magnitude, which ranks and
+conditioning need.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def kinds(pairs: str) -> str:
 
 
 def pair_wrenches(lines: Lines, pair: int, kind: str) -> Array:
-    """Unit wrenches that a pair can pass on, from link `pair` to the next: reciprocal to the twists it allows.
+    """Unit wrenches that a pair can transmit from link `pair` to the next: reciprocal to the twists it allows.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def pair_wrenches(lines: Lines, pair: int, kind: str) -> Array:
 def constraint_jacobian(lines: Lines, pairs: str = "RCCC") -> Array:
     """Jacobian of the constraints with respect to the twists of the three moving links.
 
-    A row is one direction in which a pair lets its two links have no relative velocity. Transposed it takes the
+    Each row is one direction in which a pair allows no relative velocity of its two links. The transpose maps the
     pairs' reactions to the wrenches on the links.
 
     Parameters

@@ -23,7 +23,7 @@ class Revolution(NamedTuple):
     theta : ndarray, shape (k,)
         Input angle, rad.
     output_angle : ndarray, shape (k,)
-        Angle of the output shaft, rad, following theta without jumps.
+        Angle of the output shaft, rad, continuous in theta.
     speed_ratio : ndarray, shape (k,)
         d output_angle / d theta.
     psi : ndarray, shape (k,)
@@ -39,11 +39,11 @@ class Revolution(NamedTuple):
     driving_torque : ndarray, shape (k,)
         Torque that drives the input shaft, N m.
     reactions : ndarray, shape (k, 4, 6)
-        Force (N) and moment about the pair's point (N m), axes of G, that each pair passes from its link to the next:
-        frame to input fork, input fork to cross, cross to output fork, output fork to frame.
+        Force (N) and moment about the pair's point (N m), axes of G, that each pair transmits from its link to the
+        next: frame to input fork, input fork to cross, cross to output fork, output fork to frame.
     cross_loads : ndarray, shape (k, 2, 6)
-        Force (N) and moment (N m) of input fork and of output fork on the cross, at the kept pin's
-        point in its (e, t, z). The kept pin stands for both pins of its fork: compare with the sum of both pins' loads.
+        Force (N) and moment (N m) of input fork and of output fork on the cross, at the kept pin's point, in the pin's
+        axes (e, t, z). The kept pin replaces both pins of its fork: compare with the sum of both pins' loads.
     pose : Pose
         Attitudes and positions of the links.
     lines : Lines
@@ -67,12 +67,12 @@ class Revolution(NamedTuple):
 def solve(
     joint: Joint, errors: NDArray[np.void], theta: ArrayLike, *, input_pin: int = 3, output_pin: int = 1
 ) -> Revolution:
-    """Run the RCCC linkage of one joint, quasi-statically.
+    """Solve the RCCC linkage of one joint over input angles, quasi-statically.
 
     Parameters
     ----------
     joint : Joint
-        The nominal joint; of it only ``cross.R`` matters.
+        The nominal joint; only its ``cross.R`` is used.
     errors : ndarray, shape () or (1,), dtype ERROR
         Errors and operating point (``operation.alpha`` and ``operation.torque``) of the joint: one row.
     theta : array_like, shape (k,)
@@ -85,7 +85,7 @@ def solve(
     Returns
     -------
     Revolution
-        Motion and reactions at each input angle; NaN where errors leave the loop no solution (close to 90 degrees).
+        Motion and reactions at each input angle; NaN where the loop has no solution (alpha close to 90 degrees).
 
     Raises
     ------

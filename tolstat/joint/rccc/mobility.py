@@ -1,7 +1,7 @@
-"""Degrees of freedom of the joint: Kutzbach's count, and the rank that the count leaves out.
+"""Degrees of freedom of the joint: Kutzbach's count, and the rank of the constraints, which the count ignores.
 
-The count, eq. (1), takes the constraints for independent. Four revolute pairs whose axes meet in one point are not, so
-the count says -2 and the joint turns; with errors the axes miss each other, and the joint of rigid parts locks.
+The count, eq. (1), assumes independent constraints. Those of four revolute pairs whose axes meet in one point are
+dependent: the count gives -2, yet the joint turns. With errors the axes do not meet, and a joint of rigid parts locks.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ RANK_TOL = 1e-9
 """Singular values below this share of the largest count as zero.
 
 Rounding leaves 1e-15. Tilts of the order ε (rad, or position errors in units of ``cross.R``) leave values of the order
-ε, so errors down to some 1e-8 are told from none.
+ε, so errors down to some 1e-8 are distinguished from zero.
 """
 
 
@@ -37,7 +37,7 @@ class Mobility(NamedTuple):
     redundant : ndarray of int, shape (k,)
         Equations less rank: reactions that statics cannot determine.
     singular_values : ndarray, shape (k, min(equations, 18))
-        Of the Jacobian, falling, pure numbers.
+        Singular values of the Jacobian, descending, pure numbers.
     """
 
     kutzbach: int
@@ -61,7 +61,7 @@ def kutzbach(links: int, freedoms: list[int] | tuple[int, ...]) -> int:
     Returns
     -------
     int
-        -2 for the RRRR joint, 1 for the RCCC linkage; negative when the count finds constraints to spare.
+        -2 for the RRRR joint, 1 for the RCCC linkage; negative when there are more constraints than velocities.
     """
     return 6 * (links - len(freedoms) - 1) + sum(freedoms)
 
@@ -69,12 +69,12 @@ def kutzbach(links: int, freedoms: list[int] | tuple[int, ...]) -> int:
 def mobility(lines: Lines, pairs: str = "RCCC") -> Mobility:
     """Degrees of freedom of the chain whose pairs have these axes, by count and by rank.
 
-    For a revolute joint with errors give the axes of a closed RCCC linkage with those errors, as `solve` returns them:
-    the pose in which the parts can be put together, here with pairs that cannot slide. An error locks them where it
-    makes an axis miss the next (a pin of the cross moved along z or tilted about t, a hole moved along t or tilted
-    about z). Where the four axes still meet once cross and output shaft have slid it does not, nor does any error at
-    alpha = 0, where both shafts and the cross turn as one piece. With errors on the output side alone a freedom to
-    first order remains at the input angles where the axes of both shafts and of the input pin lie in one plane.
+    For an RRRR joint with errors give the axes of a closed RCCC linkage with the same errors, as `solve` returns them:
+    the pose in which the parts can be assembled, here with pairs that cannot slide. An error locks the joint where an
+    axis no longer meets the next (a pin of the cross moved along z or tilted about t, a hole moved along t or tilted
+    about z). An error does not lock the joint where the four axes still meet after cross and output shaft have slid,
+    nor at alpha = 0, where both shafts and the cross turn as one piece. With errors on the output side alone a freedom
+    to first order remains at input angles where the axes of both shafts and of the input pin lie in one plane.
 
     Parameters
     ----------

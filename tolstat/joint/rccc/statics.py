@@ -1,7 +1,7 @@
-"""Reactions of the RCCC linkage: statically determinate, one linear system a pose.
+"""Reactions of the RCCC linkage: statically determinate, one linear system per pose.
 
-Three moving links give 18 equations of equilibrium; the pairs pass on 5 + 4 + 4 + 4 = 17 components, and the
-eighteenth unknown is the torque that holds the input shaft.
+Three moving links give 18 equations of equilibrium; the pairs transmit 5 + 4 + 4 + 4 = 17 components, and the
+eighteenth unknown is the torque that drives the input shaft.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class Reactions(NamedTuple):
     Attributes
     ----------
     at_centre : ndarray, shape (k, 4, 6)
-        Force (N) and moment about O (N m) that each pair passes from its link to the next: frame to input fork, input
-        fork to cross, cross to output fork, output fork to frame. The next link exerts the opposite.
+        Force (N) and moment about O (N m) that each pair transmits from its link to the next: frame to input fork,
+        input fork to cross, cross to output fork, output fork to frame. The next link exerts the opposite.
     at_point : ndarray, shape (k, 4, 6)
         The same with the moment about the pair's own point, `Lines.point`.
     driving_torque : ndarray, shape (k,)
@@ -38,7 +38,7 @@ class Reactions(NamedTuple):
 def react(lines: Lines, external: Array) -> Reactions:
     """Reactions that hold the RCCC linkage in equilibrium under wrenches on its links.
 
-    With inertial wrenches (d'Alembert) among them these are the Newton-Euler equations.
+    If `external` includes inertial wrenches (d'Alembert), the equilibrium is the Newton-Euler equations.
 
     Parameters
     ----------

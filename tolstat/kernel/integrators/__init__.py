@@ -1,1 +1,1 @@
-"""Methods of integration in time, and the steps that they take."""
+"""Time integration methods and control of their steps."""

@@ -1,6 +1,6 @@
 """BDF2 with variable step, applied to q' = v and v' = a (Hairer, Wanner: Solving ODEs I, III.5).
 
-At the new point (3 y_2 - 4 y_1 + y_0) / (2 h) stands for y', for equal steps; with r the ratio of the step to the one
+At the new point (3 y_2 - 4 y_1 + y_0) / (2 h) approximates y', for equal steps; with r the ratio of the step to the one
 before, ((1+2r)/(1+r) y_2 - (1+r) y_1 + r^2/(1+r) y_0) / h. Zero-stable for r < 1 + sqrt(2). The first step is implicit
 Euler. Algebraic order 2, L-stable.
 """
@@ -12,17 +12,25 @@ from tolstat.kernel.simd.lane import where
 
 @njit
 def formula(h, h_old):
-    """Return cv = dv/dq of a step `h`, and how much of the last point and of the one before a derivative has."""
+    """Return cv = dv/dq of a step `h` (s), and the weights (1/s) of the last two points in a derivative."""
     r = where(h_old > 0, h / h_old, 0.0)
     return (1 + 2 * r) / (1 + r) / h, -(1 + r) / h, r * r / (1 + r) / h
 
 
 @njit
 def trial(h, of, last, before, known, ahead):
-    """Trial values of an unknown and its derivatives that obey the formula.
+    """Trial values (q, v, a) of an unknown that satisfy the formula.
 
-    `of`: what `formula` has returned; `last`: (q, v, a) of the last accepted point; `before`: (q, v) of the one before;
-    `ahead`: change of q to expect where one is `known`, else a Taylor series.
+    Parameters
+    ----------
+    h : float
+        Step, s.
+    of : tuple
+        Values returned by `formula`.
+    last, before : tuple
+        (q, v, a) of the last accepted point, (q, v) of the one before.
+    known, ahead : bool, float
+        Whether q is predicted by its expected change `ahead`, or else by a Taylor series.
     """
     cv, b1, b2 = of
     q = last[0] + where(known, ahead, h * (last[1] + 0.5 * h * last[2]))
@@ -32,7 +40,7 @@ def trial(h, of, last, before, known, ahead):
 
 @njit
 def predict(h, state, options):
-    """Write a trial point that obeys the formula; return cv = dv/dq and ca = da/dq."""
+    """Write a trial point that satisfies the formula of a step `h` (s); return cv = dv/dq and ca = da/dq."""
     of = formula(h, state.memory[H_OLD])
     known = state.memory[AHEAD] > 0
     for i in range(state.q.size):

@@ -1,7 +1,7 @@
-"""Any second-order system M q'' = f(t, q, q') with a dense tangent: textbook equations, small problems.
+"""Any second-order system M q'' = f(t, q, q') with a dense tangent, for textbook equations and small problems.
 
-With a mass the equations are solved as q'' = M^-1 f, so that Newton's iteration sees accelerations whatever the units
-of the equations are. M is a matrix, whose factors ``work.mass`` holds from the start, or a function of t and q.
+With a mass the equations are solved as q'' = M^-1 f, so that residuals are accelerations whatever the units of the
+equations are. M is a constant matrix, factorised into ``work.mass`` before the first step, or a function of t and q.
 """
 
 from typing import NamedTuple
@@ -13,29 +13,29 @@ from tolstat.kernel.mechanics.vector import copy, larger
 from tolstat.kernel.simd.jit import closure, njit
 
 DIFFERENCE = 2.0**-26
-"""Increment of one-sided differences relative to the motion in a step, the root of the unit roundoff."""
+"""Increment of one-sided differences relative to the motion in a step: the square root of 2^-52."""
 SMALLEST_DIFFERENCE = 2.0**-40
-"""Least increment relative to the unknown, or to 1 where that is larger: above the rounding of sums such as 1 + q."""
+"""Smallest increment relative to max(|q|, 1): above the rounding of sums such as 1 + q."""
 STALL = 1e4
-"""Change in a Newton step, in units of what its tolerance allows, up to which a residual that stays is rounding."""
+"""Newton change, in units of newton_tol times the motion, up to which a residual that does not fall is rounding."""
 
 
 class DenseWork(NamedTuple):
-    """Scratch for n unknowns."""
+    """Work arrays for n unknowns."""
 
     solution: np.ndarray  # (n,)
     matrix: np.ndarray  # (n, n) tangent, factorised in place
     pivots: np.ndarray  # (n,)
-    dv: np.ndarray  # (n, n) derivative by the velocities, where a tangent is given
-    shifted: np.ndarray  # (2, n) q and v of a difference
-    change: np.ndarray  # (n,)
-    base: np.ndarray  # (n,)
-    mass: np.ndarray  # (n, n) factors of the mass last evaluated
+    dv: np.ndarray  # (n, n) df/dv, where a tangent is given
+    shifted: np.ndarray  # (2, n) q and v with the increment of a difference
+    change: np.ndarray  # (n,) q'' with the increment
+    base: np.ndarray  # (n,) q'' without the increment
+    mass: np.ndarray  # (n, n) factors of the last mass matrix
     mass_pivots: np.ndarray  # (n,)
 
 
 def make_dense_work(n: int) -> DenseWork:
-    """Allocate for `n` unknowns."""
+    """Allocate work arrays for `n` unknowns."""
     vector, square = (n,), (n, n)
     arrays = [np.full(shape, np.nan) for shape in (vector, square, square, (2, n), vector, vector, square)]
     return DenseWork(arrays[0], arrays[1], np.zeros(n, np.int64), *arrays[2:], np.zeros(n, np.int64))
@@ -43,7 +43,7 @@ def make_dense_work(n: int) -> DenseWork:
 
 @njit
 def lu(matrix, pivots):
-    """Factorise in place with row exchanges; False when singular or not finite."""
+    """LU factorisation in place with row exchanges; False when singular or not finite."""
     n = pivots.size
     for k in range(n):
         best = k
@@ -85,13 +85,13 @@ def dense_solve(q, work):
 
 @njit
 def motion(i, cv, largest, state):
-    """How unknown `i` moves in the step, as an acceleration; at least a thousandth of the one that moves most."""
+    """Motion of unknown `i` in the step, cv |v| + |a|; at least a thousandth of the `largest` one of all unknowns."""
     return max(cv * abs(state.v[i]) + abs(state.a[i]), 1e-3 * largest, 1e-300)
 
 
 @njit
 def largest_motion(cv, state):
-    """Motion in the step of the unknown that moves most, as an acceleration."""
+    """Largest cv |v| + |a| of all unknowns: the motion in the step, as an acceleration."""
     largest = 0.0
     for i in range(state.q.size):
         largest = max(largest, cv * abs(state.v[i]) + abs(state.a[i]))
@@ -100,7 +100,7 @@ def largest_motion(cv, state):
 
 @njit
 def motion_size(cv, ca, state):
-    """Residual of the accelerations relative to the motion in the step."""
+    """Largest residual of the accelerations relative to the motion in the step; see `integrate.build_integrator`."""
     largest = largest_motion(cv, state)
     worst = 0.0
     for i in range(state.q.size):
@@ -110,10 +110,11 @@ def motion_size(cv, ca, state):
 
 @njit
 def small_change(cv, ca, fresh, options, work, state):
-    """Whether the last change is rounding, or so small against the motion in the step that a stall must be rounding.
+    """`YES` if the last change is rounding, `IF_STALLED` if it is so small that a stalled residual must be rounding.
 
-    Where stiff forces cancel, their rounding keeps the residual above any tolerance while the unknowns are exact: a
-    Newton step with a new tangent then moves next to nothing and the residual stays.
+    Where large stiff forces cancel, their rounding keeps the residual above any tolerance although the unknowns are
+    exact: a Newton step with a new tangent then changes them very little, and the residual does not fall. Arguments as
+    of `small` in `integrate.build_integrator`.
     """
     if at_rounding(cv, ca, fresh, options, work, state) == YES:
         return YES
@@ -127,14 +128,11 @@ def small_change(cv, ca, fresh, options, work, state):
 
 
 def build_acceleration(force, mass=None, divided=False):
-    """Bind what gives q'': returns a jitted function (t, q, v, work, out).
-
-    `force` is q'' itself when there is no mass; `divided` tells that ``work.mass`` holds the factors of a matrix.
-    """
+    """Build the jitted function (t, q, v, work, out) that evaluates q''; arguments as in `build_dense`."""
 
     @closure
     def plain(t, q, v, work, out):
-        out[:] = np.nan  # an entry left unwritten shows
+        out[:] = np.nan  # exposes entries that `force` does not write
         force(t, q, v, out)
 
     @closure
@@ -162,12 +160,12 @@ def build_acceleration(force, mass=None, divided=False):
 
 @njit
 def increment(j, q, v, a, cv, ca):
-    """Increment of unknown `j` for a difference."""
+    """Increment of unknown `j` for a one-sided difference; `cv`, `ca`: dv/dq (1/s), da/dq (1/s^2)."""
     return max(DIFFERENCE * max(abs(v[j]) / cv, abs(a[j]) / ca), SMALLEST_DIFFERENCE * max(abs(q[j]), 1.0))
 
 
 def build_differences(acceleration):
-    """Bind a tangent by differences; arguments as `integrate.build_integrator` wants them."""
+    """Build `factorise` of `integrate.build_integrator` with a tangent by one-sided differences of `acceleration`."""
 
     @closure
     def by_differences(t, q, v, a, cv, ca, par, options, work):
@@ -190,7 +188,7 @@ def build_differences(acceleration):
 
 
 def build_given(acceleration, force, tangent, mass=None, divided=False):
-    """Bind the tangent of `force` that the user gives; arguments as `integrate.build_integrator` wants them."""
+    """Build `factorise` of `integrate.build_integrator` with the user's `tangent`; arguments as in `build_dense`."""
 
     @closure
     def mass_moves(t, q, v, a, cv, ca, work):
@@ -237,20 +235,24 @@ def build_given(acceleration, force, tangent, mass=None, divided=False):
 
 
 def build_dense(force, tangent=None, mass=None, divided=False):
-    """Bind a jitted ``force(t, q, v, out)``, and a ``tangent(t, q, v, dq, dv)`` of it if there is one.
+    """Bind a system to the functions that `integrate.build_integrator` needs.
 
     Parameters
     ----------
+    force : jitted function (t, q, v, out)
+        Writes f, shape (n,); without a mass this is q'' itself.
+    tangent : jitted function (t, q, v, dq, dv), optional
+        Writes df/dq and df/dv, shape (n, n); without it the tangent comes from differences.
     mass : jitted function (t, q, out), optional
-        Writes M. Without a mass `force` is q'' itself.
+        Writes M, shape (n, n).
     divided : bool
-        That there is a mass: `mass`, or the matrix whose factors stand in ``work.mass``.
+        Whether there is a mass: `mass`, or a constant matrix whose factors are in ``work.mass``.
 
     Returns
     -------
     acceleration : jitted function (t, q, v, work, out) -> None
     residual, factorise, solve : jitted functions
-        As `integrate.build_integrator` wants them.
+        Arguments of `integrate.build_integrator`.
     """
     acceleration = build_acceleration(force, mass, divided)
 

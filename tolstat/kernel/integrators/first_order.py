@@ -1,4 +1,4 @@
-"""The joint as a system of first order, y = (q, q'), for integrators of other people: rate, Jacobian, loads."""
+"""The joint as a first-order system, y = (q, q'), for third-party integrators: rate, Jacobian, loads."""
 
 from tolstat.kernel.mechanics.dynamics import acceleration, forces
 from tolstat.kernel.mechanics.motion import speed_ratio
@@ -7,12 +7,24 @@ from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.simd.jit import njit
 
 POSITION_STEP, VELOCITY_STEP = 1e-10, 1e-6
-"""Differences of the Jacobian (m and rad, per s): above rounding, below the micrometre over which contacts rise."""
+"""Increments of the Jacobian's differences (m, rad; per s): above rounding, below the micrometre of contact onset."""
 
 
 @njit
 def rate(t, y, par, options, work, out):
-    """Write y' to `out`, (110,), at time `t` (s); `y` holds unknowns, then velocities."""
+    """Evaluate y'.
+
+    Parameters
+    ----------
+    t : float
+        Time, s.
+    y : ndarray, shape (110,)
+        Unknowns, then their velocities; m and rad, per s.
+    par, options, work
+        As in `dynamics.residual`.
+    out : ndarray, shape (110,)
+        Written: y'.
+    """
     for i in range(N_DOF):
         out[i] = y[N_DOF + i]
     acceleration(t, y[:N_DOF], y[N_DOF:], par, options, work, out[N_DOF:])
@@ -20,7 +32,7 @@ def rate(t, y, par, options, work, out):
 
 @njit
 def jacobian(t, y, par, options, work, column, out):
-    """Write d(rate)/dy to `out`, (110, 110), by forward differences; `column`, (3, 110), is scratch."""
+    """Write d(rate)/dy to `out`, (110, 110), by forward differences; `column`, (3, 110), is scratch; see `rate`."""
     base, moved, there = column[0], column[1], column[2]
     rate(t, y, par, options, work, base)
     copy(y, moved)
@@ -35,13 +47,13 @@ def jacobian(t, y, par, options, work, column, out):
 
 @njit
 def rate_of_row(t, y, params, options, works, out):
-    """`rate` of the first row of `params`, (1,), with ``works``, (1,): arrays cross from Python faster than records."""
+    """`rate` with `params` and `works` of shape (1,): Python passes arrays to kernels faster than records."""
     rate(t, y, params[0], options, works[0], out)
 
 
 @njit
 def jacobian_of_row(t, y, params, options, works, column, out):
-    """`jacobian` in the same way."""
+    """`jacobian` with `params` and `works` of shape (1,), as in `rate_of_row`."""
     jacobian(t, y, params[0], options, works[0], column, out)
 
 
@@ -54,9 +66,9 @@ def sample(times, states, par, work, loads, contact, psi):
     times, states : ndarray, shapes (m,) and (m, 110)
         The solution, s; m and rad, per s.
     par, work : records of PARAM and WORK
-        As elsewhere.
+        The joint; scratch.
     loads, contact, psi : ndarray, shapes (m, 8, 6), (m, 4, 3) and (m,)
-        Written as in `settle.Ring`: N, N m; N; Psi of eq. (13).
+        Written: N, N m; N; Psi of eq. (13).
     """
     for k in range(times.size):
         forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)

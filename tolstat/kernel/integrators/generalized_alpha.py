@@ -1,7 +1,7 @@
 """Generalised-alpha (Chung, Hulbert 1993) in the form of Arnold and Bruels (2007).
 
-It meets the equations of motion at the new point itself and is of order 2 in q, v and a. rho_inf is the spectral
-radius at infinite frequency.
+The equations of motion are satisfied at the new point; q, v and a are of order 2. rho_inf is the spectral radius at
+infinite frequency.
 """
 
 from tolstat.kernel.simd.jit import njit
@@ -17,7 +17,7 @@ def parameters(rho):
 
 @njit
 def predict(h, state, options):
-    """Write a trial point that obeys the formulas; return cv = dv/dq and ca = da/dq."""
+    """Write a trial point that satisfies the formulas of a step `h` (s); return cv = dv/dq and ca = da/dq."""
     alpha_m, alpha_f, gamma_nm, beta_nm = parameters(options.rho_inf)
     for i in range(state.q.size):
         aux = state.aux[i]
@@ -29,7 +29,7 @@ def predict(h, state, options):
 
 @njit
 def accept(h, state, options):
-    """Advance the algorithmic acceleration."""
+    """Update the algorithmic acceleration ``state.aux`` after an accepted step."""
     alpha_m, alpha_f, _, _ = parameters(options.rho_inf)
     for i in range(state.q.size):
         state.aux[i] = ((1 - alpha_f) * state.a[i] + alpha_f * state.a0[i] - alpha_m * state.aux[i]) / (1 - alpha_m)

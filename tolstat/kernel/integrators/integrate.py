@@ -1,12 +1,12 @@
 """Fixed-step implicit integration of second-order systems, with bounded halving inside a step.
 
 `build_integrator` binds the equations of any system to one Newton iteration and one stepping scheme. A method is a file
-with `predict` (write a trial point that obeys the method's formulas, return how velocity and acceleration follow the
-unknowns) and, where it remembers more than the last points, what it does when a stage or a step is accepted.
+with `predict`, which writes a trial point that satisfies the method's formulas and returns cv = dv/dq and ca = da/dq. A
+method that keeps more than the last points also has a function that updates them when a stage or a step is accepted.
 
-The output grid is kept: a step that Newton cannot solve, or whose estimated error is above the tolerance where the
-method has an estimate, is halved, at most ``options.max_halvings`` times; steps grow again by factors of two where the
-grid allows. An unconverged point is never accepted.
+The output grid is kept. A step is halved, at most ``options.max_halvings`` times, if Newton's iteration fails or, with
+error control, if the estimated error is above the tolerance; steps grow again by factors of two where the grid allows.
+An unconverged point is never accepted.
 """
 
 from tolstat.common.tables import Method
@@ -28,16 +28,16 @@ from tolstat.kernel.simd.lane import where
 
 BDF2, GENERALIZED_ALPHA, TR_BDF2 = int(Method.BDF2), int(Method.GENERALIZED_ALPHA), int(Method.TR_BDF2)
 SLOW = 0.2
-"""Contraction per iteration above which the tangent is renewed."""
+"""Ratio of successive residuals above which the tangent is renewed."""
 ROUNDOFF = 10 * 2.0**-52
 NO, IF_STALLED, YES, LOST = range(4)
-"""Whether a change of the unknowns ends Newton's iteration."""
+"""Does a change end Newton's iteration: no; if the residual stalls; yes; yes, as a failure."""
 ERROR_TO_GROW = 0.1
 """Estimated error, in units of the tolerance, below which a step may be doubled."""
 MAX_RATIO = 2.0
-"""Largest ratio of a step to the one before, for BDF2's stability and where the error is controlled."""
+"""Largest ratio of a step to the one before, for the stability of BDF2 and with error control."""
 START_LEVEL = 4
-"""BDF2 has no past at its first step, which is implicit Euler over 1/16 of the step."""
+"""Level of the first sub-step of BDF2, 1/2^4 of the step: without earlier points it is implicit Euler."""
 
 bdf2_predict = bdf2.predict
 alpha_predict, alpha_accept = generalized_alpha.predict, generalized_alpha.accept
@@ -54,7 +54,7 @@ def stages(options):
 
 @njit
 def predict(h, stage, state, options):
-    """Trial point of the method in use; returns cv, ca and the share of the step that the stage reaches."""
+    """Write the trial point of a step `h` (s); return cv, ca and the share of the step at the end of the stage."""
     if options.method == TR_BDF2:
         if stage > 0:
             keep_stage(state)
@@ -82,7 +82,7 @@ def accept(h, state, options):
 
 @njit
 def fitting(level, h, h_old, options):
-    """Least level from `level` on whose sub-step of h / 2^level is not too long after a step of `h_old`."""
+    """Smallest level, from `level` on, with a sub-step h / 2^level of at most `MAX_RATIO` times the last, `h_old`."""
     while level < options.max_halvings and h_old > 0 and h / (1 << level) > 1.0001 * MAX_RATIO * h_old:
         level += 1
     return level
@@ -90,9 +90,9 @@ def fitting(level, h, h_old, options):
 
 @njit
 def grown(level, done, whole, error):
-    """Level of the next sub-step: longer ones where the grid allows them, and where they would not be refused.
+    """Level of the next sub-step: lower where the grid allows a longer one and its predicted error is accepted.
 
-    `done`: parts of the step that are behind, of `whole`; `error`: of the last sub-step, in units of the tolerance.
+    `done` of `whole` parts of the step are complete; `error`: of the last sub-step, in units of the tolerance.
     """
     while level > 0 and done % (whole >> (level - 1)) == 0 and error < ERROR_TO_GROW:
         level -= 1
@@ -102,7 +102,7 @@ def grown(level, done, whole, error):
 
 @njit
 def reset(state):
-    """Forget everything but the last accepted point."""
+    """Clear memory and counters; keep only the last accepted point."""
     state.memory[:] = 0.0
     state.counters[:] = 0
     state.counters[ATTEMPTS_LEFT] = UNLIMITED
@@ -113,7 +113,7 @@ def reset(state):
 
 @njit
 def estimate(h, state, options):
-    """Estimated error of the step in units of the tolerance; 0 where none is kept."""
+    """Estimated error of the step in units of the tolerance; 0 without error control."""
     if options.rtol <= 0:
         return 0.0
     if options.method == TR_BDF2:
@@ -123,17 +123,17 @@ def estimate(h, state, options):
 
 @njit
 def scaled_size(cv, ca, state):
-    """Largest residual, weighted; NaN if one is."""
+    """Largest weighted residual; NaN if any residual is NaN."""
     size = total = 0.0
     for i in range(state.q.size):
         one = abs(state.residual[i]) * state.weight[i]
         size, total = max(size, one), total + one
-    return where(total == total, size, total)  # a comparison a value, instead of two of which the next one waits
+    return where(total == total, size, total)  # the sum detects NaN; a NaN-safe maximum is slower
 
 
 @njit
 def at_rounding(cv, ca, fresh, options, work, state):
-    """`YES` when the last change of the unknowns is no more than their rounding."""
+    """`YES` if the last change of the unknowns is no more than their rounding, else `NO`; see `build_integrator`."""
     step = largest = 0.0
     for i in range(state.q.size):
         step, largest = max(step, abs(work.solution[i])), max(largest, abs(state.q[i]))
@@ -141,7 +141,7 @@ def at_rounding(cv, ca, fresh, options, work, state):
 
 
 def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding):
-    """Bind a system to Newton's iteration; arguments and the function returned as in `build_integrator`."""
+    """Bind a system to Newton's iteration; arguments and returned function as in `build_integrator`."""
 
     @closure
     def newton(t, cv, ca, par, options, work, state):
@@ -191,9 +191,10 @@ def build_advance(newton):
     Returns
     -------
     substeps : jitted function (t, h, level, par, options, work, state) -> bool
-        One step of the output grid, tried first in sub-steps of h / 2^level; False when it failed at the smallest.
+        Take one step of the output grid, at first in sub-steps of h / 2^level; False when the smallest one failed, or
+        no attempt is left.
     advance : jitted function (t, h, par, options, work, state) -> bool
-        The same, tried first as a whole.
+        The same, at first as a whole; the first step of BDF2 at `START_LEVEL`.
     """
 
     @closure
@@ -207,7 +208,7 @@ def build_advance(newton):
 
     @closure
     def substeps(t, h, level, par, options, work, state):
-        whole = 1 << options.max_halvings  # the step is counted in parts of its smallest sub-step
+        whole = 1 << options.max_halvings  # progress is counted in sub-steps of the smallest size
         done = 0
         while done < whole:
             if options.method == BDF2 or options.rtol > 0:
@@ -245,23 +246,23 @@ def build_integrator(residual, factorise, solve, size=scaled_size, small=at_roun
     Parameters
     ----------
     residual : jitted function (t, q, v, a, par, options, work, out) -> None
-        Equations of motion, zero when met.
+        Residual of the equations of motion.
     factorise : jitted function (t, q, v, a, cv, ca, par, options, work) -> bool
-        Makes and factorises d(residual)/dq + cv d/dv + ca d/da at the point last evaluated; False when singular.
+        Assembles and factorises d(residual)/dq + cv d/dv + ca d/da at the point last evaluated; False when singular.
     solve : jitted function (q, work) -> None
         Solves for ``work.solution`` in place.
     size : jitted function (cv, ca, state) -> float
         Norm of ``state.residual`` that is compared with ``options.newton_tol``.
     small : jitted function (cv, ca, fresh, options, work, state) -> int
-        Whether the change just made, ``work.solution``, leaves nothing to gain: `NO`, `YES`, or `IF_STALLED` when it
-        does so only if the residual did not fall, `LOST` when there is no hope; `fresh` tells that its tangent is new.
+        Whether the last change, ``work.solution``, ends the iteration: `NO`; `YES`, converged; `IF_STALLED`, converged
+        only if the residual does not fall; `LOST`, failed. `fresh`: the change was made with a new tangent.
 
     Returns
     -------
     newton : jitted function (t, cv, ca, par, options, work, state) -> bool
         Solves for the trial point; True when converged.
     advance : jitted function (t, h, par, options, work, state) -> bool
-        One step of the output grid; False when it failed at the smallest sub-step, or no attempt is left.
+        Take one step of the output grid; False when the smallest sub-step failed, or no attempt is left.
     """
     newton = build_newton(residual, factorise, solve, size, small)
     return newton, build_advance(newton)[1]

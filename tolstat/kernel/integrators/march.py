@@ -1,4 +1,4 @@
-"""A whole trajectory of a system given by its forces."""
+"""Trajectory of a second-order system given by its forces, on equally spaced points."""
 
 import numpy as np
 
@@ -13,13 +13,13 @@ OK, NEWTON_FAILED, NOT_FINITE = int(Status.OK), int(Status.NEWTON_FAILED), int(S
 
 
 def build_march(force, tangent=None, mass=None, divided=False):
-    """Bind a system; arguments as for `dense.build_dense`.
+    """Bind a system to the integrator; arguments as for `dense.build_dense`.
 
     Returns
     -------
     run : function (t0, t1, options, attempts, matrix, points) -> (status, counters)
         ``points[0]`` holds q and v at the start; ``points``, shape (steps + 1, 3, n), is filled with q, v, a.
-        `attempts` bounds the sub-steps tried; `matrix` is a constant mass or None.
+        `attempts` is the largest number of sub-steps tried; `matrix` is a constant mass or None.
     """
     acceleration, residual, factorise, solve = build_dense(force, tangent, mass, divided)
     _, advance = build_integrator(residual, factorise, solve, motion_size, small_change)

@@ -1,13 +1,13 @@
-"""Steps that follow the error, on a mesh that one revolution leaves to the next.
+"""Steps that follow the error, on a mesh over the revolution that is kept from one revolution to the next.
 
-A revolution has some `CELLS` cells, whole numbers of which make a step of the output grid. A cell is taken in 2^level
-equal parts by TR-BDF2. Where the estimated error of a part is above the tolerance, the cell is begun anew with twice as
-many. The next revolution begins with the levels of this one, or with lower ones where the error was far below the
-tolerance; a cell that has once been refused keeps its level. So the mesh of a motion that repeats comes to rest, and
-impacts that happen at the same angles meet fine parts there at once.
+A revolution has about `CELLS` cells, a whole number of them per step of the output grid. TR-BDF2 takes a cell in
+2^level equal parts. Where the estimated error of a part is above the tolerance, the cell is repeated with twice as many
+parts. The next revolution starts with the levels of this one, or with lower ones where the error was far below the
+tolerance; a cell that was refused after the first two revolutions never gets a lower level again. The mesh of a
+periodic motion thus becomes constant, and has fine parts at once where impacts recur at the same angles.
 
-The error of a part is told as a load: that of a displacement by the stiffness k of the lump's bushing, that of a
-velocity by sqrt(k m), both relative to the joint's largest load.
+The error of a part is expressed as a load: that of a displacement times the stiffness k of the lump's bushing, that of
+a velocity times sqrt(k m), both relative to the joint's largest load.
 """
 
 import math
@@ -23,28 +23,28 @@ from tolstat.kernel.simd.jit import njit
 
 errors = trbdf2.errors
 CELLS = 720
-"""Of a revolution, about: an impact and its ringing take a degree or two."""
+"""Approximate number of cells of a revolution: an impact and its ringing take a degree or two."""
 CELL = np.dtype([("level", "u1"), ("pinned", "u1"), ("worst", "f8")], align=True)
-"""How a cell was taken last: its level, whether it keeps it, and the error of its worst part."""
+"""How a cell was taken last: its level, whether that may not be lowered, and the largest error of its parts."""
 LOW = 1 / 16
-"""Error of a cell's worst part, in units of the tolerance, below which half as many parts will do: the error of a part
-goes with the third power of its length, or less where contacts switch."""
+"""Largest error of a cell's parts, in units of the tolerance, below which half as many parts suffice: the error of a
+part grows with the third power of its length, or less where contacts switch."""
 FIRST_LEVEL = 2
-"""Of the first cell of the first revolution."""
+"""Level of the first cell of the first revolution."""
 SHAPING = 3
-"""Revolutions with one tolerance after which cells get finer only: a mesh that changes disturbs a settling motion."""
+"""Revolutions with one tolerance after which levels only rise: a changing mesh disturbs a settling motion."""
 UNKNOWN = 255
 """Level of a cell that has not been taken yet."""
 NEWTON_SHARE, SETTLE_SHARE = 0.01, 0.3
-"""Residual that ends Newton's iteration relative to the joint's largest force, the smaller one: in units of the
-tolerance, and of the closure error that is to be seen."""
+"""Residual that ends Newton's iteration, relative to the joint's largest force: the smaller one of `NEWTON_SHARE` times
+the tolerance and `SETTLE_SHARE` times the closure error that is to be detected."""
 LAST = 3.0
-"""Residual, in units of that one, from which one more iteration is the last."""
+"""Residual, in units of the one above, up to which one more iteration with the same tangent is the last."""
 
 
 @njit
 def load_error(h, par, state):
-    """Estimated error of a part of length `h` as a load, in units of the tolerance; the largest of all unknowns."""
+    """Estimated error of a part of length `h` (s) as a load, in units of the tolerance; the largest of all unknowns."""
     force = 1 / (state.memory[TOLERANCE] * state.memory[FORCE])
     torque = 1 / (state.memory[TOLERANCE] * state.memory[TORQUE])
     worst = 0.0 * force
@@ -64,13 +64,13 @@ def load_error(h, par, state):
 
 @njit
 def cells_of(steps_per_rev):
-    """Cells of a step of the output grid."""
+    """Number of cells per step of the output grid."""
     return max(1, CELLS // steps_per_rev)
 
 
 @njit
 def next_level(revolutions, own, before):
-    """Level to begin a cell with, after so many `revolutions` with this tolerance; `before` is the cell before it."""
+    """Level to start a cell with, `own`, after `revolutions` with this tolerance; `before`: the preceding cell."""
     one = before if own.level == UNKNOWN else own
     if one.level == UNKNOWN:
         return FIRST_LEVEL
@@ -82,7 +82,21 @@ def next_level(revolutions, own, before):
 
 @njit
 def note_cell(level, refused, worst, revolution, cell):
-    """Keep how a cell has gone; from the second `revolution` on a refused one is pinned."""
+    """Store the outcome of a cell, and pin it if it was refused.
+
+    Parameters
+    ----------
+    level : int
+        Level at which it was accepted.
+    refused : bool
+        Whether it was refused at a lower level.
+    worst : float
+        Largest error of its parts, in units of the tolerance.
+    revolution : int
+        Completed revolutions; cells are pinned after the second.
+    cell : record of CELL
+        Written.
+    """
     cell.level, cell.worst = level, worst
     if refused and revolution > 1:
         cell.pinned = 1
@@ -90,21 +104,21 @@ def note_cell(level, refused, worst, revolution, cell):
 
 @njit
 def refine_mesh(mesh):
-    """Halve the parts of all cells."""
+    """Halve the length of the parts of all cells."""
     for c in range(mesh.size):
         mesh[c].level += 1
 
 
 @njit
 def forget_mesh(mesh):
-    """Know nothing of any cell."""
+    """Mark all cells as not taken yet."""
     for c in range(mesh.size):
         mesh[c].level, mesh[c].pinned, mesh[c].worst = UNKNOWN, 0, 0.0
 
 
 @njit
 def parts_of(mesh):
-    """Parts of the revolution."""
+    """Number of parts of the revolution."""
     total = 0
     for c in range(mesh.size):
         if mesh[c].level != UNKNOWN:
@@ -114,7 +128,19 @@ def parts_of(mesh):
 
 @njit
 def set_scale(largest_force, largest_torque, closure, options, par, memory, weight):
-    """Let errors be relative to these loads (N, N m), and residuals as small as it takes to see a `closure` error."""
+    """Set the loads that errors are relative to, and the weights of residuals for a given closure error.
+
+    Parameters
+    ----------
+    largest_force, largest_torque : float
+        Largest loads of the joint, N and N m.
+    closure : float
+        Closure error that is to be detected.
+    options, par
+        Settings and record of PARAM.
+    memory, weight : ndarray
+        As in State, with the tolerance in `memory`; written.
+    """
     memory[FORCE], memory[TORQUE] = largest_force, largest_torque
     share = min(NEWTON_SHARE * memory[TOLERANCE], SETTLE_SHARE * closure)
     small = max(options.newton_tol * typical_force(par), share * largest_force)

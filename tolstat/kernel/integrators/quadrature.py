@@ -1,17 +1,18 @@
-"""Error of a step of any method of order 2, from quadrature of its own velocities and accelerations."""
+"""Error estimate for a step of any method of order 2, from quadrature of its velocities and accelerations."""
 
 from tolstat.kernel.integrators.state import H_OLD
 from tolstat.kernel.simd.jit import njit
 
 ROUNDING = 2.0**-49
-"""Rounding of an unknown relative to its size, with what a step makes of it."""
+"""Rounding error of an unknown relative to its size, including that of the operations of a step."""
 
 
 @njit
 def relative(i, h, of_q, of_v, state, options):
-    """Error of unknown `i` and its velocity in units of ``atol + rtol |y|`` and the rounding of both, the larger one.
+    """Larger one of the errors of unknown `i` and its velocity, in units of ``atol + rtol |y|`` plus rounding.
 
-    A velocity is a difference of unknowns over the step: a shorter step cannot better what rounding makes of it.
+    A velocity is a difference of unknowns divided by `h` (s), so its rounding error grows as the step gets shorter.
+    `of_q`, `of_v`: the two errors.
     """
     rounding = ROUNDING * max(abs(state.q0[i]), abs(state.q[i]))
     size_q = options.atol + options.rtol * max(abs(state.q0[i]), abs(state.q[i])) + rounding
@@ -23,10 +24,10 @@ def relative(i, h, of_q, of_v, state, options):
 def error(h, state, options):
     """Estimated error of q and v at the end of the step, in units of ``atol + rtol |y|``; the largest of all.
 
-    What the step moved an unknown by, less Hermite's rule on its velocity and acceleration at both ends; what it moved
-    a velocity by, less the integral of the parabola through the last three accelerations. Both rules are of a higher
-    order than the step, so that the difference is the step's own error. A method with a memory counts what its past
-    adds in this step too.
+    For an unknown: its increment minus Hermite's rule on its velocity and acceleration at both ends. For a velocity:
+    its increment minus the integral of the parabola through the last three accelerations. Both rules are of a higher
+    order than the method, so that the difference estimates the error of the step. For a method with memory it includes
+    what earlier points contribute to this step.
     """
     h_old = state.memory[H_OLD]
     worst = 0.0

@@ -1,4 +1,4 @@
-"""What an integrator remembers of a second-order system: the trial point, the accepted ones, and counters."""
+"""State of an integrator of a second-order system: the trial point, the accepted points, and counters."""
 
 from typing import NamedTuple
 
@@ -7,9 +7,9 @@ import numpy as np
 STEPS, ITERATIONS, HALVINGS, FACTORISATIONS, ATTEMPTS_LEFT = 0, 1, 2, 3, 4
 H_OLD, CV_FACTORISED, AHEAD, STAGED, CLOSE, TOLERANCE, FORCE, TORQUE = range(8)
 MEMORY = 8
-"""Places in ``State.memory``: last accepted step; cv of the tangent in use (0: none); whether to use `ahead` (1);
-length of that step if its first stage is kept (else 0); residual that one more iteration is sure to make small enough;
-of steps that follow the error: tolerance, and the force (N) and the torque (N m) that errors are relative to."""
+"""Indices into ``State.memory``: last accepted step, s; cv of the tangent in use (0: none); whether `ahead` is used
+(1); length of the last step if its first stage is kept (else 0); weighted residual up to which one more iteration needs
+no check; for steps that follow the error: tolerance, and the force (N) and torque (N m) that errors are relative to."""
 
 
 class State(NamedTuple):
@@ -26,14 +26,14 @@ class State(NamedTuple):
     a1: np.ndarray
     aux: np.ndarray  # algorithmic acceleration of generalised-alpha at the last accepted point
     residual: np.ndarray
-    weight: np.ndarray  # 1 / the size of each residual that counts as 1
-    ahead: np.ndarray  # change of q to expect of the next step, where something better than a Taylor series is known
-    memory: np.ndarray  # (8,) see `H_OLD` and so on
+    weight: np.ndarray  # factors that make residuals dimensionless
+    ahead: np.ndarray  # expected change of q in the next step, where a better prediction than a Taylor series is known
+    memory: np.ndarray  # (8,) indices `H_OLD` to `TORQUE`
     counters: np.ndarray  # (5,) steps, Newton iterations, halvings, factorisations, attempts at a step still allowed
 
 
 def make_state(n: int) -> State:
-    """Allocate for `n` unknowns, filled with NaN so that reading before writing shows."""
+    """Allocate for `n` unknowns, filled with NaN to expose values that are read before they are written."""
     arrays = {name: np.zeros(shape, dtype) for name, (dtype, shape) in layout(n).items()}
     for name in State._fields[:13]:
         arrays[name][...] = np.nan
@@ -47,7 +47,7 @@ def layout(n: int) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 
 def make_state_record(n: int) -> np.record:
-    """Allocate the same as one record: what passes it on counts no references, and its shapes are constants."""
+    """Allocate the same arrays as one record: passing it counts no references, and its shapes are constants."""
     state = np.zeros(1, [(name, *kind) for name, kind in layout(n).items()]).view(np.recarray)[0]
     for name in State._fields[:13]:
         state[name][...] = np.nan

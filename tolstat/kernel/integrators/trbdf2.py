@@ -17,21 +17,21 @@ GAMMA = 2 - math.sqrt(2)
 D = GAMMA / 2
 W = math.sqrt(2) / 4
 E0, E1, E2 = (1 - W) / 3 - W, (3 * W + 1) / 3 - W, D / 3 - D
-"""Weights of the error estimate: embedded less advancing formula."""
+"""Weights of the error estimate: embedded formula minus advancing formula."""
 
 
 @njit
 def formula(h, staged):
-    """What the trial points of a step `h` need; `staged`: the last step, if its first stage is kept, else 0.
+    """Coefficients of the trial points of a step `h` (s); `staged`: the last step if its first stage is kept, else 0.
 
     Returns
     -------
     cv : float
         dv/dq of both stages.
     first : tuple
-        Way to the first stage; a sixth of its square; 1 over the time since the first stage of the last step.
+        Time g from the start to the first stage; g^2 / 6; 1 / time from the last step's first stage to the start.
     second : tuple
-        Way on to the second stage; a sixth of its square over the time since the start; weight of both points before.
+        Time k from the first to the second stage; k^2 / (6 g); weight of the derivatives at the start and first stage.
     """
     ahead, on = GAMMA * h, (1 - GAMMA) * h
     since = where(staged > 0, 1 / where(staged > 0, (1 - GAMMA) * staged, 1.0), 0.0)
@@ -40,9 +40,9 @@ def formula(h, staged):
 
 @njit
 def first(of, last, staged):
-    """Trial values (q, v, a) of an unknown in the first stage that obey its formula.
+    """Trial values (q, v, a) of an unknown in the first stage that satisfy its formula.
 
-    `of`: what `formula` has returned; `last`: values at the start; `staged`: acceleration at the first stage of the
+    `of`: values returned by `formula`; `last`: (q, v, a) at the start; `staged`: acceleration at the first stage of the
     last step.
     """
     cv, (ahead, cubic, since), _ = of
@@ -53,7 +53,7 @@ def first(of, last, staged):
 
 @njit
 def second(of, last, stage):
-    """The same in the second stage; `stage`: (q, v, a) of the first one."""
+    """Trial values (q, v, a) in the second stage, as in `first`; `stage`: (q, v, a) of the first stage."""
     cv, _, (on, cubic, weight) = of
     q = stage[0] + on * (stage[1] + (0.5 * on * stage[2] + cubic * (stage[2] - last[2])))
     v = cv * (q - last[0] - weight * (last[1] + stage[1]))
@@ -62,7 +62,7 @@ def second(of, last, stage):
 
 @njit
 def predict(h, stage, state, options):
-    """Write a trial point that obeys the stage's formula; return cv = dv/dq and ca = da/dq.
+    """Write a trial point that satisfies the formula of `stage` (0 or 1); return cv = dv/dq and ca = da/dq.
 
     ``state.v1`` and ``state.aux`` hold velocity and acceleration of the first stage.
     """
@@ -78,7 +78,7 @@ def predict(h, stage, state, options):
 
 @njit
 def keep_stage(state):
-    """Remember the first stage, which the second one starts from."""
+    """Store velocity and acceleration of the first stage for the second one."""
     for i in range(state.q.size):
         state.v1[i], state.aux[i] = state.v[i], state.a[i]
 

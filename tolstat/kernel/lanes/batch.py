@@ -1,6 +1,6 @@
-"""Memory of the joints that go in lock-step: everything in a few records, whose floats are lanes.
+"""Memory of the joints simulated in lock-step: a few records whose float fields have one value per lane.
 
-Joints come into a lane through the State of one joint.
+The start of a joint is computed in the State of a single joint and copied to a lane.
 """
 
 from typing import NamedTuple
@@ -33,11 +33,12 @@ MOTION = np.dtype(
     + [(name, "f8", N_DOF) for name in ("residual", "weight", "ahead")]
     + [("memory", "f8", MEMORY)]
 )
-"""What `state.State` is to one joint."""
+"""The arrays of `state.State`, for all lanes."""
 
 HOLD, RELAX, CHECK, STEP, LOOK, ANGLE, PART = range(7)
-"""What a lane is at: equilibrium by Newton's iteration; in pseudo-time; whether it is there; a step; a step of the
-recorded revolution once more, in parts (`closeup`); the next angle; a part of a cell of the `mesh`."""
+"""Phases of a lane. Equilibrium: Newton's iteration (`HOLD`), step of pseudo-time (`RELAX`), test of the static
+residual after it (`CHECK`). Dynamics: sub-step of the output grid (`STEP`), step of the recorded revolution again, in
+parts (`LOOK`, see `closeup`), part of a cell of the `mesh` (`PART`). Quasi-statics: input angle (`ANGLE`)."""
 
 CONTROL = np.dtype(
     [(name, "f8") for name in ("t", "h", "cv", "ca", "before", "iteration", "factorised", "at_roundoff")]
@@ -48,24 +49,32 @@ CONTROL = np.dtype(
     + [(name, "f8") for name in ("steps", "iterations", "halvings", "factorisations")]
     + [(name, "i8", WIDTH) for name in ("joint", "k", "level", "done", "tries", "left", "part", "looked", "began")]
 )
-"""Where a lane is in its joint.
+"""State machine of one lane: phase, step, Newton iteration.
 
-Time and step, Newton's iteration; what it is at; whether it has a joint (1 or 0), is to begin a step or angle, and has
-its trial point accepted then; time at which the step of the output grid began, its length, and the step of pseudo-time,
-s; stage of a part of a cell (0 or 1), its error, and that of the cell's worst part; counters as of State. Row of the
-joint; grid point, cell or angle that it is on the way to, and there the level of its sub-step (of an angle or an
-equilibrium: ways that have failed) and what is done: parts of a step, revolutions of angles; steps in pseudo-time. Of a
-closer look: steps left to take, the part of the step it is at, and parts recorded. Level that a cell began with.
+- ``t``, ``h``: time that the trial point belongs to, length of the step or part, s
+- ``cv``, ``ca``: dv/dq (1/s) and da/dq (1/s^2); ``factorised``: cv of the tangent in use, 0 if there is none
+- ``before``, ``iteration``: last residual, number of iterations; ``at_roundoff``: 1 if the last change was rounding
+- ``phase``: `HOLD` to `PART`; ``live``: 1 if the lane has a joint; ``fresh``: 1 if it is to begin a step or angle;
+  ``passed``: 1 if its trial point is accepted then
+- ``origin``, ``grid``: start and length of the step of the output grid, cell, or part of a closer look, s
+- ``pseudo``: step of pseudo-time, s; ``tries``: number of such steps
+- ``stage``: of a part of a cell, 0 or 1; ``error``: of that part; ``worst``: of the cell's worst part
+- ``steps``, ``iterations``, ``halvings``, ``factorisations``: counters as of State
+- ``joint``: index of the joint; ``k``: grid point, cell or angle that is being solved
+- ``level``: halvings of the sub-step or part; at an angle, attempts that failed; in pseudo-time, as `course.FROM_GUESS`
+- ``done``: smallest sub-steps that are done of the step; for angles, revolutions that are done
+- ``left``, ``looked``: closer look, steps left and parts recorded; ``part``: current part of its step, or of a cell
+- ``began``: level that the cell began with
 """
 
 
 class Batch(NamedTuple):
-    """Memory of all lanes; the same bytes are records of lanes and, through ``[..., lane]``, of single joints."""
+    """Memory of all lanes, read as records of lanes or, through ``[..., lane]``, as those of single joints."""
 
     par: np.record
     par_words: np.ndarray  # the same memory as doubles
     work: np.record
-    kept: np.record  # of the fields of the tangent, those in use: a lane renews its own only
+    kept: np.record  # factorised tangents in use; each lane replaces only its own
     motion: np.record
     control: np.record
     samples: np.recarray  # (WIDTH, steps_per_rev) SAMPLE
@@ -75,7 +84,7 @@ class Batch(NamedTuple):
 
 
 def _places():
-    """Where each word of a row of PARAM goes among the words of its lanes; -1 for integers, which all lanes share."""
+    """Index of each word of a row of PARAM among the words of its lanes; -1 for integers, which all lanes share."""
     lanes = lane_dtype(PARAM)
     places = np.full(PARAM.itemsize // 8, -1)
     for name in PARAM.names:
@@ -112,7 +121,7 @@ def put_joint(lane, words, batch):
 
 @njit
 def put_points(lane, state, control, motion):
-    """Copy the last accepted points of a joint to a lane, without a tangent."""
+    """Copy the last accepted points of a joint to a lane, and mark its tangent as missing."""
     for i in range(N_DOF):
         motion.q0[i, lane], motion.v0[i, lane], motion.a0[i, lane] = state.q0[i], state.v0[i], state.a0[i]
         motion.q1[i, lane], motion.v1[i, lane] = state.q1[i], state.v1[i]
@@ -123,7 +132,7 @@ def put_points(lane, state, control, motion):
 
 @njit
 def put_start(lane, state, control, motion):
-    """Copy the start of a joint to a lane."""
+    """Copy the start of a joint to a lane, and reset its counters."""
     put_points(lane, state, control, motion)
     for i in range(N_DOF):
         motion.weight[i, lane] = state.weight[i]
@@ -133,7 +142,10 @@ def put_start(lane, state, control, motion):
 
 @njit
 def rest(lane, cv, ca, control, motion):
-    """Let a lane begin Newton's iteration from its last accepted point, at rest."""
+    """Start Newton's iteration in a lane from its last accepted point, at rest.
+
+    `cv` (1/s) and `ca` (1/s^2) are dv/dq and da/dq of the iteration.
+    """
     for i in range(N_DOF):
         motion.q[i, lane] = motion.q0[i, lane]
         motion.v[i, lane] = motion.a[i, lane] = 0.0
@@ -143,10 +155,10 @@ def rest(lane, cv, ca, control, motion):
 
 @njit
 def empty(lane, batch):
-    """Leave a lane without a joint."""
+    """Mark a lane as empty."""
     motion, control = batch.motion, batch.control
     control.live[lane] = control.fresh[lane] = control.passed[lane] = 0.0
-    for i in range(N_DOF):  # no NaN: it would take all lanes to the paths of large rotations
+    for i in range(N_DOF):  # no NaN: it would send all lanes through the branch for large rotations
         motion.q[i, lane] = motion.v[i, lane] = motion.a[i, lane] = 0.0
 
 

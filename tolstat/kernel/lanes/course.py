@@ -1,8 +1,18 @@
-"""The way of a lane's joint: through its equilibrium, sub-steps, grid points and angles, one lane at a time.
+"""Transitions of one lane: through equilibrium, sub-steps, grid points, input angles, and cells.
 
-Each function sends a lane on to its next trial point, or says how the joint has ended: `NOT_SETTLED` while it is to go
-on, `OK`, or `NEWTON_FAILED` when it is to be begun anew. `control` and `motion` are a batch's records read joint by
-joint; `lanes` are its joints, work and motion read as lanes.
+Each function sets up the next trial point of a lane, or returns how the joint has ended: `NOT_SETTLED` while it
+continues, `OK`, `GIVEN_UP`, or `NEWTON_FAILED`. Arguments:
+
+lane : int
+    Number of the lane.
+par : record of PARAM
+    The lane's joint.
+lanes : tuple
+    Parameters, work and motion of all joints, read as lanes.
+control, motion : records of CONTROL and MOTION
+    Those of the batch, read joint by joint.
+samples, notes, fine, past, out
+    Those of the lane's joint, as in `settle.Ring` and `resolve.Past`, and its row of RESULT.
 """
 
 from tolstat.common.tables import MAX_ITERATIONS
@@ -21,23 +31,24 @@ from tolstat.kernel.revolution.simulate import NEWTON_FAILED, NOT_SETTLED, OK, Q
 from tolstat.kernel.simd.jit import njit
 
 GIVEN_UP = -1
-"""Beside the states of a joint: it has made all its revolutions and has not settled."""
+"""Status, in addition to those of a joint, after the last revolution without settling."""
 FROM_GUESS, FROM_ZERO, AT_ANGLE = range(3)
-"""From where a lane goes in pseudo-time; at an angle, the third way to hold it: from the angle before, relaxed."""
+"""Levels of pseudo-transient continuation: from the guess; from zero; from the solution at the previous angle, as the
+third attempt at an input angle."""
 
 
 @njit
 def stand(lane, motion):
-    """Let the trial point of a lane be its last accepted one."""
+    """Accept the unknowns of the trial point of a lane."""
     for i in range(N_DOF):
         motion.q0[i, lane] = motion.q[i, lane]
 
 
 @njit
 def relax(lane, par, options, control, motion):
-    """Send a lane a step on in pseudo-time, as `equilibrium` does: at its start from the guess, else from zero.
+    """Set up the next step of pseudo-time in a lane, as in `equilibrium`: first from the guess, then from zero.
 
-    In vain it goes on from where it has got, and at an angle tries once more to hold.
+    After `MAX_STEPS`, or at the smallest step, keep the last iterate; at an input angle, retry the equilibrium once.
     """
     if control.tries[lane] == MAX_STEPS or control.pseudo[lane] < SMALLEST:
         control.factorised[lane] = 0.0
@@ -55,13 +66,13 @@ def relax(lane, par, options, control, motion):
 
 @njit
 def start_relaxing(lane, level, control):
-    """Begin pseudo-time in a lane."""
+    """Start pseudo-transient continuation in a lane at a level, `FROM_GUESS` to `AT_ANGLE`."""
     control.level[lane], control.tries[lane], control.pseudo[lane] = level, 0, FIRST
 
 
 @njit
 def resume(lane, par, options, control, motion):
-    """Send a lane on from where pseudo-time has brought it: to its first step or angle, or to an angle once more."""
+    """Continue a lane after pseudo-time: with the first step or angle, or with another attempt at its angle."""
     if control.level[lane] == AT_ANGLE:
         control.phase[lane] = ANGLE
         rest(lane, HELD, 0.0, control, motion)
@@ -71,7 +82,7 @@ def resume(lane, par, options, control, motion):
 
 @njit
 def depart(lane, par, options, control, motion):
-    """Send a lane from its start to its first grid point, or its first angle."""
+    """Set up the first grid point, cell or angle of a lane that is at its start."""
     control.done[lane] = 0
     if options.fidelity == QUASISTATIC:
         control.phase[lane] = ANGLE
@@ -82,21 +93,21 @@ def depart(lane, par, options, control, motion):
         control.phase[lane], control.factorised[lane], control.k[lane] = STEP, 0.0, 1
         control.level[lane] = min(START_LEVEL, options.max_halvings)
         if follows_error(options):
-            control.phase[lane], control.k[lane] = PART, 0  # for `set_out` to go on with
+            control.phase[lane], control.k[lane] = PART, 0  # `set_out` continues from here
         else:
             aim(lane, options, control, motion)
 
 
 @njit
 def face(lane, k, par, options, control):
-    """Send a lane to angle `k`."""
+    """Set up angle `k` in a lane."""
     control.k[lane], control.level[lane], control.fresh[lane] = k, 0, 1.0
     control.t[lane] = angle_time(k, options.steps_per_rev, par)
 
 
 @njit
 def aim(lane, options, control, motion):
-    """Send a lane to the end of its next sub-step."""
+    """Set up the next sub-step of a lane."""
     grid, whole = control.grid[lane], 1 << options.max_halvings
     level = fitting(control.level[lane], grid, motion.memory[H_OLD, lane], options)
     h = grid / (1 << level)
@@ -106,7 +117,7 @@ def aim(lane, options, control, motion):
 
 @njit
 def advance(lane, options, control, motion):
-    """Accept a lane's sub-step; returns whether it was the last of its step, else sends the lane on."""
+    """Accept the sub-step of a lane; return whether its step is complete, else set up the next sub-step."""
     whole = 1 << options.max_halvings
     control.steps[lane] += 1
     control.passed[lane] = 1.0
@@ -122,7 +133,7 @@ def advance(lane, options, control, motion):
 
 @njit
 def step(lane, lanes, options, control, motion, samples, notes, out):
-    """Record the grid point that a lane has reached, and send it on; returns a status as `judge` does."""
+    """Record the grid point that a lane has reached and set up the next step; return the status."""
     k = control.k[lane]
     record(k, lane, k > options.steps_per_rev, lanes[0], lanes[1], lanes[2].v, samples)
     motion.memory[AHEAD, lane] = foresee(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
@@ -138,7 +149,7 @@ def step(lane, lanes, options, control, motion, samples, notes, out):
 
 @njit
 def glance(lane, par, lanes, options, control, motion, fine, out):
-    """Record a part of a step that a lane has taken again, and send it on; `OK` after the last part."""
+    """Record a part of a closer look and set up the next one; return `OK` after the last part of the step."""
     j, part = control.looked[lane], control.grid[lane]
     record(j, lane, True, lanes[0], lanes[1], lanes[2].v, fine)
     count_in(j, fine, out)
@@ -154,7 +165,7 @@ def glance(lane, par, lanes, options, control, motion, fine, out):
 
 @njit
 def turn(lane, par, lanes, options, control, motion, samples, out):
-    """Record the angle that a lane has solved, and send it on to the next."""
+    """Record the angle that a lane has solved and set up the next one; return the status."""
     k, n = control.k[lane], options.steps_per_rev
     control.steps[lane] += 1
     control.passed[lane] = 1.0
@@ -175,7 +186,7 @@ def turn(lane, par, lanes, options, control, motion, samples, out):
 
 @njit
 def find(lane, par, options, control, motion):
-    """Send a lane on that has found its equilibrium, or come nearer in pseudo-time."""
+    """Select the next phase after success in the search for equilibrium, or in a step of pseudo-time."""
     phase = control.phase[lane]
     if phase != CHECK:
         stand(lane, motion)
@@ -190,7 +201,7 @@ def find(lane, par, options, control, motion):
 
 @njit
 def retry(lane, par, options, control, motion):
-    """Let a lane try otherwise that has failed at what it was at; returns a status as `step` and `turn` do."""
+    """Select the fallback after Newton failed in this lane, or `CHECK` did; return the status."""
     phase = control.phase[lane]
     if phase == CHECK:
         control.pseudo[lane] = min(GROWTH * control.pseudo[lane], LARGEST)
@@ -225,7 +236,7 @@ def retry(lane, par, options, control, motion):
 
 @njit
 def set_out(lane, par, options, control, motion, past):
-    """Send a lane from its start into the steps that follow the error."""
+    """Start error-controlled steps in a lane."""
     begin_turns(par, options, motion.memory[:, lane], motion.weight[:, lane], past)
     control.grid[lane] = grid_step(par, options) / cells_of(options.steps_per_rev)
     leave_for(lane, 1, options, control, motion, past)
@@ -233,7 +244,7 @@ def set_out(lane, par, options, control, motion, past):
 
 @njit
 def leave_for(lane, c, options, control, motion, past):
-    """Send a lane that stands at the end of a cell to that of the next one, `c`."""
+    """Set up cell `c` in a lane that is at the end of the previous cell."""
     own, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
     for i in range(N_DOF):
         past.begun[0, i], past.begun[1, i] = motion.q0[i, lane], motion.v0[i, lane]
@@ -248,7 +259,7 @@ def leave_for(lane, c, options, control, motion, past):
 
 @njit
 def divide(lane, options, control, past):
-    """Send a lane into the first part of a cell."""
+    """Set up the first part of a cell."""
     control.done[lane] = control.part[lane] = 0
     control.worst[lane] = 0.0
     clear_extremes(past.extremes[0])
@@ -257,7 +268,7 @@ def divide(lane, options, control, past):
 
 @njit
 def head(lane, stage, options, control):
-    """Send a lane to the end of a stage of the part that it is at."""
+    """Set up a stage of the current part of a cell."""
     grid, whole = control.grid[lane], 1 << options.max_halvings
     h = grid / (1 << control.level[lane])
     reach = GAMMA if stage == 0 else 1.0
@@ -267,7 +278,7 @@ def head(lane, stage, options, control):
 
 @njit
 def refuse(lane, options, control, motion, past):
-    """Begin a lane's cell anew in smaller parts; returns a status as `step` does."""
+    """Reject a cell and set it up again with parts half as long; return the status."""
     control.halvings[lane] += 1
     control.level[lane] += 1
     control.factorised[lane] = control.passed[lane] = motion.memory[STAGED, lane] = 0.0
@@ -282,7 +293,7 @@ def refuse(lane, options, control, motion, past):
 
 @njit
 def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
-    """Go on with a lane that has solved a stage of a part; returns its status, and whether it goes on."""
+    """Evaluate a solved stage of a part and set up the next one; return the status and whether the joint continues."""
     if control.stage[lane] == 0:
         head(lane, 1, options, control)
         return NOT_SETTLED, True
@@ -307,7 +318,7 @@ def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
 
 @njit
 def arrive(lane, par, lanes, options, control, motion, samples, past, out):
-    """Send a lane on that has reached the end of a cell; a grid point there is recorded. Returns as `part` does."""
+    """Complete a cell, record the grid point at its end if there is one, and continue; return values as of `part`."""
     c, turns, status, goes_on = control.k[lane], past.turns, NOT_SETTLED, True
     for i in range(N_DOF):
         motion.q0[i, lane], motion.v0[i, lane] = motion.q[i, lane], motion.v[i, lane]

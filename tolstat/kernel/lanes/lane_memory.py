@@ -9,7 +9,7 @@ from numba.np.arrayobj import make_array, populate_array
 from tolstat.kernel.simd.lane import DOUBLES, LANE, WIDTH
 
 ALIGNMENT = 8 * WIDTH
-"""Bytes, of every lane in memory."""
+"""Alignment of every lane in memory, bytes."""
 
 
 class LaneRecord(types.Record):
@@ -17,13 +17,13 @@ class LaneRecord(types.Record):
 
     @property
     def dtype(self):
-        """What NumPy would make of it: bytes."""
+        """Equivalent NumPy type: bytes without structure."""
         return np.dtype((np.void, self.size))
 
 
 @register_model(LaneRecord)
 class LaneRecordModel(models.RecordModel):
-    """A pointer, as of any record."""
+    """A pointer, as for any record."""
 
 
 def record_of_lanes(record):
@@ -40,7 +40,7 @@ def record_of_lanes(record):
 
 @intrinsic
 def as_lanes(typingctx, memory):
-    """Read a NumPy record or array, whose last axis holds the joints, as one of lanes. It must be aligned."""
+    """View a NumPy record or array, whose last axis holds the joints, as one of lanes; it must be aligned."""
     if isinstance(memory, types.Record):
         out = record_of_lanes(memory)
 
@@ -69,7 +69,7 @@ def as_lanes(typingctx, memory):
 
 
 def aligned_zeros(shape, dtype):
-    """Zeros at an address that is a multiple of `ALIGNMENT`."""
+    """Array of zeros at an address that is a multiple of `ALIGNMENT`."""
     dtype = np.dtype(dtype)
     nbytes = int(np.prod(shape)) * dtype.itemsize
     raw = np.zeros(nbytes + ALIGNMENT, np.uint8)

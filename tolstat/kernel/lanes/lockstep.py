@@ -1,11 +1,11 @@
-"""Joints in lock-step: as many as there are lanes go through Newton's iteration together, each at its own time.
+"""Simulation of joints in lock-step: one joint per lane, one Newton iteration of all lanes per round.
 
-A round evaluates the residual of every lane once, at whatever trial point the lane has arrived at; then each lane is
-corrected, gets a new tangent, or goes on: from the search for an equilibrium to its first step, from sub-step to
-sub-step, from grid point to grid point, or from angle to angle. Lanes never wait for each other's convergence, and a
-lane whose joint is finished takes the next one from the queue. A joint whose step or angle has failed for good is begun
-anew alone, as `simulate` does it, unless its steps follow the error. What a lane does depends on its own joint only;
-so does every bit of the result.
+A round evaluates the residual of every lane once, at the lane's own time and trial point. Each lane is then corrected,
+gets a new tangent, or continues: from the search for equilibrium to its first step, to the next sub-step, grid point,
+cell or angle. Lanes never wait for each other's convergence, and a lane whose joint is finished takes the next one from
+the queue. A joint in which a step or angle has finally failed is simulated again from its start, alone, as in
+`simulate`, unless its steps are error-controlled. What a lane does depends only on its own joint, and so does every bit
+of the result.
 """
 
 from tolstat.kernel.integrators.mesh import cells_of, load_error
@@ -70,21 +70,23 @@ from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import WIDTH, any_of, bits_of, count_of, where
 
 PATIENCE = 3
-"""Lanes that make a new tangent together: it costs as much for one as for all, and those that wait stand still."""
+"""Number of lanes in need of a new tangent at which it is computed: it costs as much for one lane as for all, and lanes
+that wait stand still."""
 
 
 @njit
 def samples_of(lane, batch, samples):
-    """Where the samples of a lane's joint are kept."""
+    """Samples of the lane's joint: its row of `samples` if the caller keeps them, else those of the batch."""
     return samples[batch.control.joint[lane]] if len(samples) > 0 else batch.samples[lane]
 
 
 @njit
 def leave(lane, status, rows, options, alone, batch, samples, results):
-    """Go on with a lane whose joint has settled, or has taken a step once more: to its next closer look, or out.
+    """Continue a lane whose joint has ended, or whose step of a closer look has: next closer look, or results.
 
-    A joint that has not settled goes as it is. Where a step has failed, the joint is begun anew, alone; a closer look
-    is ended.
+    A joint that has not settled gets no closer look. A joint in which a step has failed is simulated again, alone; a
+    failed step of a closer look ends that look. `status` is that of the joint or step; for the other arguments see
+    `lockstep`.
     """
     _, state, ring, _ = alone
     control, joint, own = batch.control, batch.control.joint[lane], samples_of(lane, batch, samples)
@@ -117,7 +119,10 @@ def leave(lane, status, rows, options, alone, batch, samples, results):
 
 @njit
 def end(lane, status, options, alone, batch, blocks, results):
-    """Empty a lane whose joint has come to its end with steps that follow the error."""
+    """Write the results of a joint with error-controlled steps that has ended, and empty its lane.
+
+    `status` is that of the joint; for the other arguments see `lockstep`.
+    """
     joint, counters = batch.control.joint[lane], alone.state.counters
     cells = cells_of(options.steps_per_rev)
     get_counters(lane, batch, counters)
@@ -131,7 +136,19 @@ def end(lane, status, options, alone, batch, blocks, results):
 
 @njit
 def look(lane, k, par, options, alone, batch, samples, out):
-    """Send a lane to the next step, from the one to sample `k` on, that `closeup.look_closer` takes again, if any."""
+    """Set up the next step that `closeup.look_closer` would integrate again; return whether there is one.
+
+    Parameters
+    ----------
+    lane, k : int
+        Number of the lane; first step to consider, the one to sample `k`.
+    par, out
+        The lane's joint and its row of RESULT.
+    options, alone, batch
+        As in `lockstep`.
+    samples : ndarray of SAMPLE, shape (steps_per_rev,)
+        Recorded revolution of the joint.
+    """
     work, state, _, _ = alone
     control, n, h = batch.control, options.steps_per_rev, grid_step(par, options)
     while k <= n:
@@ -154,7 +171,10 @@ def look(lane, k, par, options, alone, batch, samples, out):
 
 @njit
 def enter(lane, joint, rows, words, options, alone, batch, samples, results):
-    """Put a joint into a lane, to find its equilibrium from where all pins just touch."""
+    """Put a joint into a lane and set up its start: equilibrium from the pose where all pins just touch, or ramp.
+
+    A joint outside the model ends at once. For the arguments see `lockstep`.
+    """
     work, state, _, _ = alone
     par, control, motion = rows[joint], batch.control, batch.motion
     clear_results(results[joint])
@@ -183,7 +203,10 @@ def enter(lane, joint, rows, words, options, alone, batch, samples, results):
 
 @njit
 def fill(lane, queued, rows, words, options, alone, batch, samples, results):
-    """Give an empty lane its next joint, if there is one; returns how many have left the queue."""
+    """Give an empty lane the next joint of the queue, if there is one; return how many have left the queue.
+
+    `queued` is the number that had left it before; for the other arguments see `lockstep`.
+    """
     while queued < len(rows) and batch.control.live[lane] == 0:
         enter(lane, queued, rows, words, options, alone, batch, samples, results)
         queued += 1
@@ -192,7 +215,7 @@ def fill(lane, queued, rows, words, options, alone, batch, samples, results):
 
 @njit
 def lockstep(rows, words, options, patience, alone, batch, samples, blocks, results, tally):
-    """Simulate joints with one number of contact stations; row i of the results is joint i.
+    """Simulate joints with equal numbers of contact stations; row i of the results is joint i.
 
     Parameters
     ----------
@@ -201,22 +224,22 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
     words : ndarray, shape (n, words)
         The same memory as doubles.
     options : Options
-        Numerical settings; quasi-static, or dynamic with BDF2 or with steps that follow the error.
+        Numerical settings; quasi-static, or dynamic with BDF2 or with error-controlled steps.
     patience : int
-        Lanes that need a new tangent wait until there are so many of them; no result depends on it.
+        Number of lanes in need of a new tangent at which it is computed; no result depends on it.
     alone : Scratch
-        Of one joint.
+        Work arrays of one joint.
     batch : Batch
-        Of the lanes; nothing is carried over from one call to the next.
+        Memory of the lanes; nothing is carried over from one call to the next.
     samples : ndarray of SAMPLE, shape (n, steps_per_rev) or (0, steps_per_rev)
-        Written where there is room: the last revolution of every joint.
+        Written unless empty: the last revolution of every joint.
     blocks : ndarray of RESULT, shape (n, revolutions) or (0, revolutions)
-        Written where there is room: statistics of the last revolutions of every joint whose steps follow the error;
-        revolution r (from 0) at r modulo their number.
+        Written unless empty: statistics of the last revolutions of every joint with error-controlled steps; revolution
+        r (from 0) at r modulo their number.
     results : ndarray of RESULT, shape (n,)
         Written.
     tally : ndarray of int, shape (3,)
-        Added to: rounds, lanes with a joint in them, rounds with new tangents.
+        Counters, increased: rounds; lanes with a joint, summed over rounds; rounds with new tangents.
     """
     rows, words, samples, results = borrowed(rows), borrowed(words), borrowed(samples), borrowed(results)
     blocks = borrowed(blocks)

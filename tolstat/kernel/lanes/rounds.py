@@ -1,4 +1,8 @@
-"""What a round of the lock-step does to all lanes at once: trial points, verdicts, tangents, corrections."""
+"""Operations of a lock-step round on all lanes at once: predictor, convergence test, tangent, correction.
+
+`motion` and `control` are the batch's records of MOTION and CONTROL, read as lanes. `begins` and `passed` are masks:
+lanes that begin a step, stage or angle, and lanes whose trial point is accepted before that.
+"""
 
 from tolstat.kernel.integrators import bdf2, trbdf2
 from tolstat.kernel.integrators.integrate import ROUNDOFF, SLOW, scaled_size
@@ -18,7 +22,7 @@ first_and_second, first, second = trbdf2.formula, trbdf2.first, trbdf2.second
 
 @njit
 def begin_steps(begins, passed, motion, control):
-    """Make trial points in the lanes that begin a step, accepting those of the step before that has `passed`."""
+    """Accept the last sub-step where it passed; predict the trial point of the next one where one begins (BDF2)."""
     h = control.h
     of = formula(h, motion.memory[H_OLD])
     known = motion.memory[AHEAD] > 0
@@ -38,7 +42,7 @@ def begin_steps(begins, passed, motion, control):
 
 @njit
 def begin_parts(begins, passed, motion, control):
-    """The same in lanes that begin a stage of a part of a step that follows the error."""
+    """Accept the last part where it passed; predict the trial point of a stage where one begins (TR-BDF2)."""
     of, later = first_and_second(control.h, motion.memory[STAGED]), control.stage > 0
     held = begins & later
     for i in range(N_DOF):
@@ -56,7 +60,7 @@ def begin_parts(begins, passed, motion, control):
 
 @njit
 def begin_angles(begins, passed, motion, control):
-    """The same in lanes that begin an angle."""
+    """Accept the last angle where it passed; predict the trial point of the next one where one begins."""
     keep(passed, motion)
     extrapolate(begins, control.steps, motion)
     for i in range(N_DOF):
@@ -66,7 +70,7 @@ def begin_angles(begins, passed, motion, control):
 
 @njit
 def begin(options, motion, control):
-    """Begin a step, or an angle, in the lanes that are to."""
+    """Begin a step, a stage or an angle in the lanes that are to."""
     begins, passed = control.fresh > 0, control.passed > 0
     if options.fidelity == QUASISTATIC:
         begin_angles(begins, passed, motion, control)
@@ -81,9 +85,16 @@ def begin(options, motion, control):
 
 @njit
 def verdict(options, motion, control):
-    """Which lanes have solved what they are at, have failed to, need a new tangent, or are to be corrected: four masks.
+    """Classify the lanes by their residuals.
 
-    The fifth mask tells which of the last need no other look; the sixth value is the size of the residuals.
+    Returns
+    -------
+    solved, failed, stale, moving : masks
+        Lanes whose trial point is solved; has failed; needs a new tangent; is to be corrected with the tangent in use.
+    last : mask
+        Lanes of `moving` that one correction solves, without another residual.
+    now : lane
+        Scaled size of the residuals.
     """
     now = scaled_size(control.cv, control.ca, motion)
     finite, live, checked = now < 1e300, control.live > 0, control.phase == CHECK
@@ -117,7 +128,7 @@ def keep_rows(mask, new, old):
 
 @njit
 def renew(mask, control, par, work, kept):
-    """Make a new tangent in the lanes of the mask; returns in which of all lanes that can be done."""
+    """Compute new tangents in the lanes of the mask; return where, of all lanes, the factorisation succeeded."""
     held = control.cv == HELD
     assemble(where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca), par, work)
     good = eliminate(work)
@@ -138,7 +149,7 @@ def renew(mask, control, par, work, kept):
 
 @njit
 def correct(mask, kept, motion, control):
-    """Newton's correction in the lanes of the mask; returns in which of them it is lost."""
+    """Apply Newton's correction in the lanes of the mask; return in which of them an equilibrium has diverged."""
     for i in range(N_DOF):
         kept.solution[i] = -motion.residual[i]
     solve(motion.q, kept)

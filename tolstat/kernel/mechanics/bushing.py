@@ -9,7 +9,7 @@ from tolstat.kernel.simd.jit import njit
 
 @njit
 def markers(i, par):
-    """Marker of bushing `i` in body axes: on the lump (from its reference point), on the base (from O)."""
+    """Marker of bushing `i`, m, in body axes: on the lump (from its reference point), on the base (from O)."""
     lump = BUSHING_LUMP[i]
     e = row(TRIAD[lump], 0)
     if BUSHING_BASE[i] == HUB:
@@ -20,7 +20,7 @@ def markers(i, par):
 
 @njit
 def accumulate(force, body, f, torque):
-    """Add a force and a torque to row `body`."""
+    """Add a force `f` (N) and a `torque` (N m), in axes of the body's frame, to row `body`."""
     for k in range(3):
         force[body, k] += f[k]
         force[body, 3 + k] += torque[k]
@@ -28,7 +28,7 @@ def accumulate(force, body, f, torque):
 
 @njit
 def bushing_load(i, par, work):
-    """Load of bushing `i` from the bodies' state; added to the bodies, and kept in ``work.load[i]``."""
+    """Evaluate the load of bushing `i`, eq. (8): write it to ``work.load[i]`` and add it to lump and base."""
     base, lump = BUSHING_BASE[i], BUSHING_LUMP[i]
     on_lump, on_base = markers(i, par)
     lever = turn(work.rot, lump, on_lump)

@@ -1,8 +1,8 @@
-"""Pins in holes: penetration, contact forces and contact modes (model, section 5; Cirelli et al. 2021, eqs. 3-7).
+"""Pins in holes: penetration, contact forces and modes (docs/model.md, "Contacts"; Cirelli et al. 2021, eqs. 3-7).
 
-A pin touches its hole at stations along its axis, each a spring of its own: whatever the contact law, the forces have
-a potential. At each station n is the direction of the pin's displacement in the hole, h the hole axis and m = h x n;
-f acts on the pin along -n, the film's drag along -m.
+A pin touches its hole at stations along its axis, each with its own spring: with every contact law the elastic forces
+have a potential. At each station n is the direction of the pin's displacement in the hole, h the hole axis and
+m = h x n; f acts on the pin along -n, the film's drag along -m.
 """
 
 import math
@@ -18,7 +18,7 @@ from tolstat.kernel.simd.lane import all_of, any_of, where
 
 NONE, ONE_POINT, TWO_POINT, UNIFORM = (float(m) for m in ContactMode)
 SMALLEST_RHO = 1e-15
-"""Below it (m) the pin is centred and has no direction of displacement."""
+"""Displacement (m) up to which the pin counts as centred, without a direction of displacement."""
 
 
 @njit
@@ -35,7 +35,7 @@ def smooth_step_slope(x):
 
 @njit
 def locate(pin, par, work):
-    """Find where each station of `pin` stands in its hole; written to ``work.station[pin]``."""
+    """Write position, normal, penetration and velocity of each station of `pin` to ``work.station[pin]``."""
     body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
     frame = FRAME[arm]
     axis = turn(work.rot, arm, row(par.hole_axis, ARM_OF_PIN[pin]))
@@ -44,7 +44,7 @@ def locate(pin, par, work):
     direction = turn(work.rot, body, row(par.pin_axis, pin))
     for j in range(par.n_stations):
         lever = axpy(par.station_s[j], direction, origin)
-        # the pin's point and its velocity against the arm's ideal frame, in axes of that frame
+        # the station and its velocity relative to the arm's ideal frame, in axes of that frame
         point = turn(work.relative, frame, add(row(work.pos, body), lever))
         velocity = turn(work.relative, frame, add(row(work.vel, body), cross(row(work.spin, body), lever)))
         velocity = add(velocity, cross(row(work.relative_w, frame), point))
@@ -56,7 +56,7 @@ def locate(pin, par, work):
         rho = math.sqrt(dot(gap, gap))
         displaced = rho > SMALLEST_RHO
         n = scale(1 / where(displaced, rho, 1.0), gap)
-        if not all_of(displaced):  # else any direction across the hole: no force acts
+        if not all_of(displaced):  # centred: any normal of the hole axis will do, as no force acts
             across = cross(axis, direction)
             length = math.sqrt(dot(across, across))
             oblique = length > 0
@@ -72,7 +72,7 @@ def locate(pin, par, work):
 
 @njit
 def press(pin, par, work):
-    """Normal force of each station and its slope by delta at constant rate, eq. (5); to ``work.station[pin]``."""
+    """Write each station's normal force, eq. (5), and its slope by delta at constant rate to ``work.station[pin]``."""
     for j in range(par.n_stations):
         station = work.station[pin, j]
         delta = station[DELTA]
@@ -93,7 +93,7 @@ def press(pin, par, work):
 
 @njit
 def classify(pin, par, work):
-    """Contact mode of `pin`, by its two end stations: which of them touch, and whether on the same side."""
+    """Contact mode of `pin` from its two end stations: which of them touch, and whether on the same side."""
     outer, inner = work.station[pin, 0], work.station[pin, par.n_stations - 1]
     cosine = 0.0
     for k in range(3):
@@ -105,7 +105,7 @@ def classify(pin, par, work):
 
 @njit
 def contact_load(pin, par, work):
-    """Contact forces of `pin`: added to pin and arm; ``work.contact[pin]`` and ``work.mode[pin]`` are written."""
+    """Add the contact forces of `pin` to pin and arm; write ``work.contact[pin]`` and ``work.mode[pin]``."""
     body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
     locate(pin, par, work)
     press(pin, par, work)

@@ -1,7 +1,7 @@
-"""The joint as a second-order system: forces of one state, residual of the equations of motion, accelerations.
+"""The joint as a second-order system: forces at one state, residual of the equations of motion, accelerations.
 
-Equations of motion of model section 3. Residuals are forces and torques about the reference points in axes of the
-ideal frames, in the order of the unknowns.
+The equations of motion are in docs/model.md, "Coordinates and equations of motion". Residuals are forces and torques
+about the reference points in axes of the ideal frames, in the order of the unknowns.
 """
 
 import math
@@ -31,7 +31,7 @@ def mass_of(body, par):
 
 @njit
 def place(q, v, par, work):
-    """Position, attitude and velocity of every body against its ideal frame."""
+    """Write position, attitude and velocity of every body relative to its ideal frame to `work`; `q`, `v`: (55,)."""
     for body in range(N_LUMPS):
         i = 6 * body
         distance = 0.0 if body == HUB else par.R
@@ -46,7 +46,7 @@ def place(q, v, par, work):
 
 @njit
 def place_shaft(body, angle, rate, work):
-    """Attitude and angular velocity of a shaft that turns about z."""
+    """Write attitude and angular velocity of a shaft turned about z by `angle` (rad), at `rate` (rad/s)."""
     put(work.pos, body, (0.0, 0.0, 0.0))
     put(work.vel, body, (0.0, 0.0, 0.0))
     exponential((0.0, 0.0, angle), work.rot, body)
@@ -55,7 +55,7 @@ def place_shaft(body, angle, rate, work):
 
 @njit
 def forces(t, q, v, par, work):
-    """Evaluate all bushings and contacts at one state; ``work.force`` and the loads are written."""
+    """Evaluate all bushings and contacts at one state; write ``work.force`` and loads; arguments as in `residual`."""
     ideal_motion(par.omega * t, par.alpha, par.omega, work)
     place(q, v, par, work)
     for body in range(N_BODIES):
@@ -69,7 +69,7 @@ def forces(t, q, v, par, work):
 
 @njit
 def resisting_torque(t, par, ramped):
-    """T_r, risen by the cubic step over the first quarter revolution when `ramped`."""
+    """Resisting torque T_r, N m; with `ramped` it rises by the cubic step over the first quarter revolution."""
     if not ramped:
         return par.torque
     return par.torque * smooth_step(t * abs(par.omega) / (0.5 * math.pi))
@@ -77,9 +77,9 @@ def resisting_torque(t, par, ramped):
 
 @njit
 def body_inertia(body, a, par, work):
-    """Inertia force and rate of angular momentum of a lump at absolute accelerations.
+    """Mass times absolute acceleration of a lump (N), and the rate of its angular momentum (N m).
 
-    `a`: its acceleration against the ideal frame, and angular acceleration in the same sense, (u'', w').
+    `a`: acceleration and angular acceleration relative to the ideal frame, (u'', w'), m/s^2 and rad/s^2.
     """
     mass, inertia = mass_of(body, par)
     omega, domega = row(work.frame_w, FRAME[body]), row(work.frame_dw, FRAME[body])
@@ -98,7 +98,7 @@ def body_inertia(body, a, par, work):
 
 @njit
 def residual(t, q, v, a, par, options, work, out):
-    """Inertia less forces at one state; zero when `a` is the acceleration.
+    """Inertia terms minus forces at one state; zero when `a` is the acceleration.
 
     Parameters
     ----------
@@ -111,9 +111,9 @@ def residual(t, q, v, a, par, options, work, out):
     options : Options
         ``start`` decides whether the resisting torque is ramped.
     work : record of WORK
-        Rewritten.
+        Scratch; holds the state and the loads afterwards.
     out : ndarray, shape (55,)
-        N and N m.
+        Written: N and N m.
     """
     forces(t, q, v, par, work)
     for body in range(N_LUMPS):
@@ -130,7 +130,7 @@ def residual(t, q, v, a, par, options, work, out):
 
 @njit
 def acceleration(t, q, v, par, options, work, out):
-    """Second derivatives of the unknowns, for integrators that want q'' = f(t, q, q'); arguments as in `residual`."""
+    """Second derivatives of the unknowns, for integrators of q'' = f(t, q, q'); arguments as in `residual`."""
     forces(t, q, v, par, work)
     zero = (0.0, 0.0, 0.0)
     for body in range(N_LUMPS):

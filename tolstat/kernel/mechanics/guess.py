@@ -1,7 +1,8 @@
-"""Where the bodies stand when all four pins just touch: the rigid cross in rigid forks, as a start for equilibrium.
+"""Initial guess for the equilibrium: a rigid cross in rigid forks, placed so that all four pins just touch.
 
-A turn of the cross, a shift of it and a turn of the output shaft bring four pins to their holes; across the plane of
-the cross equal forces on all pins centre them but for what a rigid cross cannot follow. Small rotations.
+In the plane of the cross, a rotation and a displacement of the cross and a rotation of the output shaft bring the four
+pins into contact. Across that plane, the cross tilts and moves so that the pins are centred, up to a part of their
+displacements that a rigid cross cannot remove, of the same size for all pins. Rotations are small.
 """
 
 import math
@@ -16,12 +17,12 @@ from tolstat.kernel.simd.jit import njit
 
 Z = (0.0, 0.0, 1.0)
 LEAST = 0.1
-"""Least share of the clearance by which a pin that is far off across the plane is moved within it."""
+"""Smallest displacement of a pin in the plane of the cross, as a share of its displacement at contact."""
 
 
 @njit
 def offset(pin, j, work):
-    """Displacement of station `j` in its hole along t and z of the cross, as `locate` found it."""
+    """Displacement (m) of station `j` in its hole, from `locate`, along the pin's t and along z of the cross."""
     station = work.station[pin, j]
     n = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
     d = scale(station[RHO], turn_back(work.relative, FRAME[ARM + ARM_OF_PIN[pin]], n))
@@ -30,14 +31,31 @@ def offset(pin, j, work):
 
 @njit
 def depth(load, k1, k2):
-    """Penetration at which a station carries `load`, eq. (5); 0 for a station without stiffness."""
+    """Penetration (m) at which a station carries `load` (N), eq. (5); 0 for a station without stiffness."""
     slope = k2 + math.sqrt(k2 * k2 + 4 * k1 * load)
     return 2 * load / slope if slope > 0 else 0.0
 
 
 @njit
 def need(pin, side, across, par, work):
-    """Displacement along t at which `pin` carries on `side`, and the radius of the end station that touches first."""
+    """Displacement along t that brings `pin` into contact, and the radius of the end station that touches first.
+
+    Parameters
+    ----------
+    pin : int
+        Pin, 0 to 3.
+    side : float
+        1 for contact in the direction of t, -1 for the opposite one.
+    across : float
+        Displacement across the plane of the cross that remains, m.
+    par, work : records of PARAM and WORK
+        The joint, and its stations as `locate` wrote them.
+
+    Returns
+    -------
+    tuple of float
+        Displacement and distance of the station from O, m.
+    """
     load = abs(par.torque) / (2 * par.R)
     best, radius = 0.0, 0.0
     for j in (0, par.n_stations - 1):
@@ -52,7 +70,7 @@ def need(pin, side, across, par, work):
 
 @njit
 def rigid_guess(t, par, work, state):
-    """Write the bodies' places at time `t` to ``state.q0``."""
+    """Write the guess of the unknowns at time `t` (s) to ``state.q0``, and zero to ``state.v0``; `work` is scratch."""
     q = state.q0
     q[:] = 0.0
     state.v0[:] = 0.0
@@ -85,7 +103,7 @@ def rigid_guess(t, par, work, state):
 
 @njit
 def middle(pin, par, work):
-    """Displacement of `pin` along z of the cross, mean over its stations."""
+    """Displacement (m) of `pin` along z of the cross, mean over its stations."""
     total = 0.0
     for j in range(par.n_stations):
         total += offset(pin, j, work)[1]
@@ -94,6 +112,6 @@ def middle(pin, par, work):
 
 @njit
 def put_body(q, body, u, phi):
-    """Write displacement and rotation vector of a lump."""
+    """Write displacement `u` and rotation vector `phi` of a lump to the unknowns `q`."""
     for k in range(3):
         q[6 * body + k], q[6 * body + 3 + k] = u[k], phi[k]

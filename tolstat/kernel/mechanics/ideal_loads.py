@@ -1,14 +1,15 @@
-"""Loads of the ideal joint in closed form: rigid bodies without errors, each pin in touch at the outer end of its hole.
+"""Loads of the ideal joint in closed form: rigid bodies without errors, each pin in contact at the outer station.
 
-The cross turns about O, so the forces across the two pins of an axis are opposite. With R' the distance of the contacts
-from O, M the moment that moves hub and pins (C axes), T the load's torque and what moves shaft and output arms:
+The cross turns about O, so the forces on the two pins of an axis are opposite. R' is the distance of the contacts from
+O, M the rate of angular momentum of hub and pins (C axes), T the resisting torque plus the rate of angular momentum of
+output shaft and output arms:
 
-    2 R' F_t cos(gamma) = T + M_x sin(gamma)    each output pin, in the plane of the cross
-    2 R' F_t = the same + M_z                   each input pin
+    2 R' F_t cos(gamma) = T + M_x sin(gamma)             each output pin, in the plane of the cross
+    2 R' F_t = (T + M_x sin(gamma)) / cos(gamma) + M_z   each input pin
     2 R' F_z = M_x on the output pins, M_y on the input pins, across that plane
 
-Without inertia it is the statics of Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and Driveshafts, ch. 4: the
-couple on the cross T / cos(gamma) along its normal, and the secondary couples on the forks that tilt with it.
+Without inertia these are the statics of Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and Driveshafts, ch. 4:
+the couple T / cos(gamma) on the cross along its normal, and the secondary couples on the forks that tilt with it.
 """
 
 import math
@@ -38,15 +39,16 @@ ZERO = (0.0, 0.0, 0.0)
 
 @njit
 def contact_radius(par):
-    """Distance R' (m) of the contacts from O: the hole's centre and the outermost station."""
+    """Distance R' (m) of the contacts from O: distance R of the reference points plus the outermost station's s."""
     return par.R + par.station_s[0]
 
 
 @njit
 def moving_moments(par, work):
-    """Moment that moves the cross, about O in C axes, and the one about z that moves shaft and output arms.
+    """Rates of angular momentum, N m: of the cross about O in C axes; of output shaft and output arms about z.
 
-    Force and torque that move each lump go to ``work.force``, which contacts are taken off later.
+    Writes the resultant force and torque that each lump needs for its motion to ``work.force``; `touch` subtracts the
+    contact forces from it.
     """
     on_cross, on_shaft = ZERO, par.Js * work.shaft[1]
     for body in range(N_BODIES):
@@ -72,11 +74,11 @@ def ideal_loads(theta, par, state, work):
     theta : float
         Input angle, rad.
     par : record of PARAM
-        The joint; its errors and clearances are not looked at.
+        The joint; its errors and clearances are not used.
     state : State
         Its ``q0`` and ``v0`` are set to zero.
     work : record of WORK
-        ``load``, ``contact`` and ``mode`` are written, and whatever leads to them.
+        ``load``, ``contact`` and ``mode`` are written; other fields are scratch.
     """
     state.q0[:] = 0.0
     state.v0[:] = 0.0
@@ -88,7 +90,7 @@ def ideal_loads(theta, par, state, work):
     output = (par.torque + torque + moment[0] * sin_gamma) / cos_gamma
     for pin in range(4):
         e, t = row(TRIAD[PIN + pin], 0), row(TRIAD[PIN + pin], 1)
-        # about O: output pins give -output about z and M_x, input pins the rest
+        # moments of the contact forces about O: output pins -output about z and M_x about x, input pins the rest
         couple = -output if pin < 2 else output + moment[2]
         along_t = couple / (2 * radius)
         along_z = (moment[0] * e[1] if pin < 2 else -moment[1] * e[0]) / (2 * radius)
@@ -100,7 +102,19 @@ def ideal_loads(theta, par, state, work):
 
 @njit
 def touch(pin, radius, force, par, work):
-    """Contact force on `pin`, in C axes: kept, and taken off what moves pin and arm."""
+    """Write the contact force of `pin` and subtract it from the resultants that pin and arm need.
+
+    Parameters
+    ----------
+    pin : int
+        Pin, 0 to 3.
+    radius : float
+        Distance of the contact from O, m.
+    force : tuple of 3 float
+        Force on the pin, N, in C axes.
+    par, work : records of PARAM and WORK
+        The joint; ``contact``, ``mode`` and ``force`` are written.
+    """
     arm = ARM + ARM_OF_PIN[pin]
     size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
     work.contact[pin, OUTER] = work.contact[pin, RESULTANT] = size
@@ -114,7 +128,7 @@ def touch(pin, radius, force, par, work):
 
 @njit
 def carry(i, par, work):
-    """Load of bushing `i`: what its lump still needs, about the marker and in its triad."""
+    """Write the load of bushing `i`: the resultant that its lump still needs, about the marker, in the triad."""
     lump = BUSHING_LUMP[i]
     lever, _ = markers(i, par)
     f = row(work.force, lump)

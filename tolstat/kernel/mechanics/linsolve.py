@@ -1,9 +1,9 @@
-"""Direct solution of the tangent system along the joint's structure.
+"""Direct solution of the tangent system by block elimination along the joint's structure.
 
-Four chains pin - arm hang on the hub; the arms of the output fork also hang on psi. Arms are eliminated into pins and
-psi, pins into hub and psi, and the hub and psi remain. Each 6 x 6 block on the diagonal is inverted: products with it
-are six sums side by side, where substitutions are one long chain. Bushing stiffness stands on every diagonal, so the
-blocks are inverted without pivoting; a zero or NaN pivot is reported.
+Four chains pin - arm are connected to the hub; the arms of the output fork also to psi. Arms are eliminated into pins
+and psi, pins into hub and psi, and the hub and psi remain. Each 6 x 6 block on the diagonal is inverted: a product with
+the inverse is six independent sums, while substitutions are one long chain of dependent operations. Every diagonal has
+bushing stiffness, so the blocks are inverted without pivoting; a zero or NaN pivot is reported.
 """
 
 from tolstat.kernel.mechanics.rotation import unspin
@@ -15,63 +15,63 @@ from tolstat.kernel.simd.lane import fma
 
 @njit
 def six(x, i):
-    """Six numbers of a vector, from `i` on."""
+    """Entries `i` to `i` + 5 of a vector."""
     return (x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4], x[i + 5])
 
 
 @njit
 def put_six(x, i, a):
-    """Write six numbers to a vector, from `i` on."""
+    """Write `a` to entries `i` to `i` + 5 of a vector."""
     x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4], x[i + 5] = a
 
 
 @njit
 def row(m, b, i):
-    """Row `i` of matrix `b`."""
+    """Row `i` of matrix `b` of `m`, shape (n, 6, 6)."""
     return (m[b, i, 0], m[b, i, 1], m[b, i, 2], m[b, i, 3], m[b, i, 4], m[b, i, 5])
 
 
 @njit
 def put_row(m, b, i, a):
-    """Write row `i` of matrix `b`."""
+    """Write `a` to row `i` of matrix `b` of `m`."""
     m[b, i, 0], m[b, i, 1], m[b, i, 2], m[b, i, 3], m[b, i, 4], m[b, i, 5] = a
 
 
 @njit
 def column(m, b, j):
-    """Column `j` of matrix `b`."""
+    """Column `j` of matrix `b` of `m`."""
     return (m[b, 0, j], m[b, 1, j], m[b, 2, j], m[b, 3, j], m[b, 4, j], m[b, 5, j])
 
 
 @njit
 def put_column(m, b, j, a):
-    """Write column `j` of matrix `b`."""
+    """Write `a` to column `j` of matrix `b` of `m`."""
     m[b, 0, j], m[b, 1, j], m[b, 2, j], m[b, 3, j], m[b, 4, j], m[b, 5, j] = a
 
 
 @njit
 def dot(a, b):
-    """Scalar product of six numbers with six."""
+    """Scalar product of two vectors of six."""
     low = fma(a[2], b[2], fma(a[1], b[1], a[0] * b[0]))
     return low + fma(a[5], b[5], fma(a[4], b[4], a[3] * b[3]))
 
 
 @njit
 def of_row(m, b, i, a, c):
-    """Row `i` of matrix `b` times `a`, added to `c`."""
+    """Row `i` of matrix `b` of `m` times `a`, plus `c`."""
     low = fma(m[b, i, 2], a[2], fma(m[b, i, 1], a[1], fma(m[b, i, 0], a[0], c)))
     return fma(m[b, i, 5], a[5], fma(m[b, i, 4], a[4], fma(m[b, i, 3], a[3], low)))
 
 
 @njit
 def product(m, b, a):
-    """Matrix `b` times `a`."""
+    """Matrix `b` of `m` times `a`."""
     return plus_product((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), m, b, a)
 
 
 @njit
 def plus_product(c, m, b, a):
-    """Return c plus matrix `b` times `a`."""
+    """Return `c` plus matrix `b` of `m` times `a`."""
     return (
         of_row(m, b, 0, a, c[0]),
         of_row(m, b, 1, a, c[1]),
@@ -110,7 +110,7 @@ def less(a, s, b):
 
 @njit
 def invert(m, b):
-    """Replace the 6 x 6 matrix `b` by its inverse (Gauss-Jordan).
+    """Replace the 6 x 6 matrix `b` of `m` by its inverse (Gauss-Jordan).
 
     Returns
     -------
@@ -148,7 +148,7 @@ def subtract_product(out, o, left, a, right, b):
 
 @njit
 def factorise(work):
-    """Eliminate arms and pins and invert what stands on the diagonal; all in place.
+    """Factorise the tangent in place: eliminate arms and pins, invert the diagonal blocks.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def factorise(work):
 
 @njit
 def minus_row_product(c, a, m, b):
-    """Return c minus the row `a` times matrix `b`."""
+    """Return `c` minus the row `a` times matrix `b` of `m`."""
     return (
         c[0] - dot(a, column(m, b, 0)),
         c[1] - dot(a, column(m, b, 1)),

@@ -1,4 +1,4 @@
-"""Ideal motion of the frames I, C and F (model, section 1): the large motion that the unknowns are measured from."""
+"""Ideal motion of the frames I, C and F (docs/model.md, "Frames"); the unknowns are deviations from it."""
 
 import math
 
@@ -17,7 +17,7 @@ def speed_ratio(theta, alpha):
 
 @njit
 def ideal_motion(theta, alpha, omega, work):
-    """Write the frames' angular velocities and accelerations, and the rotations between them, to `work`.
+    """Write the frames' angular velocities and accelerations, and the rotations between the frames, to `work`.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def ideal_motion(theta, alpha, omega, work):
     """
     sa, ca = sine_cosine(alpha)
     st, ct = sine_cosine(theta)
-    # cross against input fork: tan(beta) = tan(alpha) sin(theta)
+    # cross relative to input fork: tan(beta) = tan(alpha) sin(theta)
     ta = sa / ca
     tb = ta * st
     sec2 = 1 + tb * tb
@@ -38,7 +38,7 @@ def ideal_motion(theta, alpha, omega, work):
     sb = tb * cb
     db = omega * ta * ct / sec2
     ddb = -omega * omega * ta * st / sec2 - 2 * ta * st * db * db
-    # output fork against cross: sin(gamma) = sin(alpha) cos(theta)
+    # output fork relative to cross: sin(gamma) = sin(alpha) cos(theta)
     sg = sa * ct
     cg = math.sqrt(1 - sg * sg)
     dg = -sa * st * omega / cg
@@ -63,7 +63,7 @@ def ideal_motion(theta, alpha, omega, work):
     rel[FRAME_F, 0, 0], rel[FRAME_F, 0, 1], rel[FRAME_F, 0, 2] = cg, 0.0, -sg
     rel[FRAME_F, 1, 0], rel[FRAME_F, 1, 1], rel[FRAME_F, 1, 2] = 0.0, 1.0, 0.0
     rel[FRAME_F, 2, 0], rel[FRAME_F, 2, 1], rel[FRAME_F, 2, 2] = sg, 0.0, cg
-    # angular velocity of C against the arm's frame, in axes of the latter
+    # angular velocity of C relative to the arm's frame, in axes of the arm's frame
     rel_w[FRAME_I, 0], rel_w[FRAME_I, 1], rel_w[FRAME_I, 2] = db, 0.0, 0.0
     rel_w[FRAME_F, 0], rel_w[FRAME_F, 1], rel_w[FRAME_F, 2] = 0.0, -dg, 0.0
     work.shaft[0], work.shaft[1] = dto, ddto

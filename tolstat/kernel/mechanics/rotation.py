@@ -79,7 +79,7 @@ def unspin(phi, w):
 
 @njit
 def spin_bias(phi, rate):
-    """Part of the angular acceleration that the rates alone make: dT/dt rate, so that w' = T phi'' + bias."""
+    """Velocity-dependent part of the angular acceleration: dT/dt rate, so that w' = T phi'' + bias."""
     x = dot(phi, phi)
     return _bias(x, coefficients(x), phi, rate)
 
@@ -96,7 +96,7 @@ def spin_rate(phi, rate, change):
 
 @njit
 def _bias(x, s, phi, rate):
-    """`spin_bias`, x = |phi|^2 and its coefficients given."""
+    """`spin_bias` with given x = |phi|^2 and coefficients `s` = (s1, s2, s3) at x."""
     s1, s2, s3 = s
     small = x < SERIES_BELOW
     ds2 = -1 / 24 + x * (1 / 360 - x * (1 / 13440 - x * (1 / 907200 - x * (1 / 95800320))))
@@ -113,7 +113,7 @@ def _bias(x, s, phi, rate):
 
 @njit
 def relative_vector(rot, i, j):
-    """Rotation vector of R_i^T R_j, matrices `i` and `j` of `rot`, shape (n, 3, 3), in axes i; below half a turn."""
+    """Rotation vector of R_i^T R_j in axes i, for angles below pi; R_i: matrix `i` of `rot`, shape (n, 3, 3)."""
     r21 = r12 = r02 = r20 = r10 = r01 = trace = 0.0
     for k in range(3):
         r21 += rot[i, k, 2] * rot[j, k, 1]

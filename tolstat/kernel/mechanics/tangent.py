@@ -1,9 +1,9 @@
-"""Tangent of the residual: S = d(residual) / d(unknowns) when velocity and acceleration follow as cv dq and ca dq.
+"""Tangent of the residual: S = d(residual) / d(unknowns) with dv = cv dq and da = ca dq.
 
 Columns are increments of displacement and of attitude (du, dtheta in the frame's axes, attitude exp(dtheta x) R),
 not of the rotation vector; `linsolve.solve` converts. Levers and attitudes are the actual ones, so that a rigid
-motion of pins and hub together costs exactly nothing. Left out, each a few per cent of what stands beside it at most:
-turning of the loads themselves with the bodies, gyroscopic terms (2 Omega / cv of the inertia), and rates of levers.
+motion of pins and hub together changes no cross bushing load. Neglected terms, each at most a few per cent of the term
+beside it: rotation of the loads with the bodies, gyroscopic terms (2 Omega / cv of the inertia), and rates of levers.
 """
 
 from tolstat.kernel.mechanics.bushing import markers
@@ -42,7 +42,7 @@ def clear(work):
 
 @njit
 def spread(matrices, i, body, k):
-    """Columns of R diag(k) R^T, R being matrix `i` and k given along the triad of `body`: a symmetric tensor turned."""
+    """Columns of R diag(k) R^T, R being matrix `i` of `matrices`; `k`: along the triad of `body`."""
     x, y = (k[1], k[0]) if QUARTERS[body] % 2 == 1 else (k[0], k[1])
     columns = of_column(matrices, i, 0), of_column(matrices, i, 1), of_column(matrices, i, 2)
     return (
@@ -59,7 +59,7 @@ def _spread_column(columns, s):
 
 @njit
 def turning(a, lever):
-    """Columns of the displacements u x lever of small turns about the axes, after the tensor with columns `a`."""
+    """Columns of A X: A has columns `a`, X takes a small rotation to its displacement, rotation x `lever`."""
     x, y, z = lever
     return (
         axpy(y, a[2], scale(-z, a[1])),
@@ -70,7 +70,7 @@ def turning(a, lever):
 
 @njit
 def crossed(lever, a):
-    """Columns of lever x a."""
+    """Columns of `lever` x A, A having columns `a`."""
     return cross(lever, a[0]), cross(lever, a[1]), cross(lever, a[2])
 
 
@@ -101,7 +101,7 @@ def put(blocks, b, i, j, a):
 
 @njit
 def take(blocks, b, i, j, a):
-    """As `put`, subtracted."""
+    """Subtract the 3 x 3 matrix with columns `a` from block `b` from row `i` and column `j` on."""
     for k in range(3):
         blocks[b, i + k, j] -= a[0][k]
         blocks[b, i + k, j + 1] -= a[1][k]
@@ -110,7 +110,7 @@ def take(blocks, b, i, j, a):
 
 @njit
 def inertia_tangent(body, ca, par, work):
-    """Add ca M of a lump to its diagonal block."""
+    """Add `ca` (1/s^2) times the mass matrix of a lump to its diagonal block."""
     mass, inertia = mass_of(body, par)
     for j in range(3):
         work.lump_block[body, j, j] += ca * mass
@@ -119,10 +119,10 @@ def inertia_tangent(body, ca, par, work):
 
 @njit
 def bushing_tangent(i, cv, par, work):
-    """Add bushing `i`: stiffness and cv times damping between lump and base.
+    """Add stiffness plus `cv` (1/s) times damping of bushing `i`, between lump and base.
 
-    With a and b the stiffness against displacements and turns in axes of the frame, the lump's lever l and the base's
-    m, columns and rows of a turn are those of the displacement that it makes: the tangent is symmetric.
+    a and b are that sum for displacements and for rotations in axes of the frame. A small rotation of lump or base also
+    displaces the marker by rotation x lever: its columns, and by symmetry its rows, have that displacement times a.
     """
     base, lump = BUSHING_BASE[i], BUSHING_LUMP[i]
     k, c = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
@@ -152,7 +152,7 @@ def bushing_tangent(i, cv, par, work):
         take(work.hub_pin, pin, 0, 3, by_lump)
         take(work.hub_pin, pin, 3, 0, transposed(by_base))
         take(work.hub_pin, pin, 3, 3, transposed(between))
-    elif base == OUTPUT_SHAFT:  # of the shaft only rotation about z is free
+    elif base == OUTPUT_SHAFT:  # the only unknown of the shaft is its rotation about z
         arm = lump - ARM
         for n in range(3):
             work.arm_psi[arm, n] -= by_base[2][n]
@@ -164,7 +164,7 @@ def bushing_tangent(i, cv, par, work):
 
 @njit
 def _directions(pin, j, work):
-    """Write how a displacement along n and m at a station follows from pin and arm; ``work.vectors``."""
+    """Write d(displacements of a station along n and m) / d(pin, arm) to ``work.vectors``."""
     body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
     frame = FRAME[arm]
     station = work.station[pin, j]
@@ -182,7 +182,7 @@ def _directions(pin, j, work):
 
 @njit
 def _add_dyads(pin, n, by_n, m, by_m, work):
-    """Add n by_n^T + m by_m^T, all over (pin, arm), to the four blocks of a pin and its arm."""
+    """Add n by_n^T + m by_m^T to the four blocks of a pin and its arm; vectors of 12: the pin's six, the arm's six."""
     body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
     for i in range(6):
         for j in range(6):
@@ -196,7 +196,7 @@ def _add_dyads(pin, n, by_n, m, by_m, work):
 
 @njit
 def contact_tangent(pin, cv, par, work):
-    """Add the contact of `pin`: elastic, damping, film. Symmetric but for what film and damping add."""
+    """Add the contact of `pin`: elastic force, damping, film (`cv`: 1/s). Without damping and film it is symmetric."""
     by_n, by_m = work.by_n, work.by_m
     for j in range(par.n_stations):
         station = work.station[pin, j]
@@ -206,7 +206,7 @@ def contact_tangent(pin, cv, par, work):
         x, weight = station[DELTA] / par.delta_d, par.station_weight[j]
         film = par.c_t * weight * smooth_step(x)
         damping = where(station[FORCE] > 0, par.c_d * weight * smooth_step(x), 0.0)
-        # zero where nothing touches: film, damping and force are, but the pin may be centred
+        # zero where nothing touches: film, damping and force are zero there, and rho can be 0
         by_rho = where(touching, 1 / station[RHO], 0.0)
         turning = station[V_TANGENT] * by_rho
         nn = station[SLOPE] + cv * damping
@@ -223,7 +223,17 @@ def contact_tangent(pin, cv, par, work):
 
 @njit
 def assemble(cv, ca, par, work):
-    """Assemble the tangent at the state that ``dynamics.forces`` was last evaluated at."""
+    """Assemble the tangent at the state that ``dynamics.forces`` was last evaluated at.
+
+    Parameters
+    ----------
+    cv, ca : float
+        dv/dq (1/s) and da/dq (1/s^2) of the integration formula.
+    par : record of PARAM
+        The joint.
+    work : record of WORK
+        Bodies and stations are read; the blocks of the tangent are written.
+    """
     clear(work)
     for body in range(N_LUMPS):
         inertia_tangent(body, ca, par, work)

@@ -1,4 +1,4 @@
-"""Who is joined to whom: the fixed layout of the joint (model, section 2) as constant arrays.
+"""Topology of the joint as constant arrays (docs/model.md, "Parts" and "Frames").
 
 Bodies 0 hub, 1-4 pins 1-4, 5-8 arms 1-4, 9 input shaft, 10 output shaft. The unknowns are six per lump
 (three displacements, three rotations, in axes of the lump's ideal frame), then psi: 9 * 6 + 1 = 55.

@@ -1,4 +1,4 @@
-"""Components along the bodies' triads (e, t, z), which are quarter turns of their frames' axes about z: no products."""
+"""Components along the bodies' triads (e, t, z): frame axes after quarter turns about z, so nothing is multiplied."""
 
 from tolstat.kernel.mechanics.topology import QUARTERS
 from tolstat.kernel.simd.jit import njit

@@ -1,7 +1,7 @@
-"""Sine and cosine without a call of the C library: the same few sums for a plain number and for lanes.
+"""Sine and cosine without a call of the C library: the same operations for a plain number and for lanes.
 
-The angle less the nearest multiple of a right angle, subtracted in three parts (Cody and Waite 1980), then power series
-to the terms that are below half a unit in the last place at 45 degrees. Off by 2e-16 at most while |x| < 1e6.
+The nearest multiple of a right angle is subtracted in three parts (Cody and Waite 1980). The power series end where
+terms are below half a unit in the last place at 45 degrees. The error is at most 2e-16 while |x| < 1e6.
 """
 
 import math
@@ -10,7 +10,7 @@ from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import fma, where
 
 ROUNDING = 1.5 * 2.0**52
-"""A number whose sum with another has that one rounded to an integer in its last places."""
+"""Adding this number to another one and subtracting it again rounds the other one to an integer."""
 RIGHT_ANGLES = 2 / math.pi
 HIGH, MIDDLE, LOW = 1.5707963109016418, 1.5893254712295857e-08, 6.123233995736766e-17
 """pi/2 in parts: products of the first two, of 26 bits each, with integers below 2^27 are exact."""

@@ -1,4 +1,4 @@
-"""Vectors of three as tuples: they live in registers and nothing is allocated."""
+"""Vectors of three as tuples: they stay in registers, and nothing is allocated."""
 
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import fma, where
@@ -88,12 +88,12 @@ def turn_back(matrices, i, a):
 
 @njit
 def copy(values, out):
-    """Write the numbers of one array to another, of the same shape and one axis; NumPy's way allocates."""
+    """Copy `values` to `out`, both of shape (n,); NumPy's assignment would allocate."""
     for i in range(out.size):
         out[i] = values[i]
 
 
 @njit
 def larger(a, b):
-    """The larger of two numbers; NaN if one of them is."""
+    """The larger of two numbers; NaN if one of them is NaN."""
     return where((b > a) | (b != b), b, a)

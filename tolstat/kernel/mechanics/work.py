@@ -1,8 +1,8 @@
-"""Work arrays of one joint: made once per process, rewritten for every joint, nothing is allocated per step.
+"""Work arrays of one joint: allocated once per process, rewritten for every joint; no step allocates.
 
 They are the fields of one record: it passes between kernels as one pointer, and the shapes are constants to the
-compiler. (As some thirty arrays in a NamedTuple every call copied their descriptors, and a residual took five times
-as long.)
+compiler. (With some thirty arrays in a NamedTuple instead, every call copied the arrays' descriptors, and a residual
+took five times as long.)
 """
 
 import numpy as np
@@ -22,12 +22,12 @@ FIELDS = {
     "frame_w": (3, 3),  # angular velocity of I, C, F in their own axes
     "frame_dw": (3, 3),  # its derivative
     "relative": (3, 3, 3),  # components in C to components in I, -, F
-    "relative_w": (3, 3),  # angular velocity of C against I, -, F
+    "relative_w": (3, 3),  # angular velocity of C relative to I, -, F
     "shaft": (2,),  # ideal speed and acceleration of the output shaft
     "pos": (N_BODIES, 3),  # X + u
     "vel": (N_BODIES, 3),  # u'
     "rot": (N_BODIES, 3, 3),  # exp(phi x)
-    "spin": (N_BODIES, 3),  # angular velocity against the ideal frame
+    "spin": (N_BODIES, 3),  # angular velocity relative to the ideal frame
     "force": (N_BODIES, 6),  # force, torque about the reference point
     "load": (8, 6),  # bushing loads on the lump, in the base marker's (e, t, z)
     "contact": (4, 3),  # normal force at the outer and inner end station of each pin, resultant of all its stations
@@ -42,9 +42,9 @@ FIELDS = {
     "psi_arm": (4, 6),  # row psi
     "pin_psi": (4, 6),  # fill-in
     "psi_pin": (4, 6),  # fill-in
-    "core": (1, 3, 6),  # psi: its column in the rows of the hub, its row, itself; after elimination their factors
-    "vectors": (2, 12),  # n and m of a contact station as displacements of pin and arm
-    "by_n": (12,),  # scratch of contact_tangent: forces along n and m of that station by these displacements
+    "core": (1, 3, 6),  # psi: column in the rows of the hub, row, diagonal; after elimination their factors
+    "vectors": (2, 12),  # d(displacements of a station along n and m) / d(pin, arm)
+    "by_n": (12,),  # scratch of contact_tangent: d(forces of that station along n and m) / d(pin, arm)
     "by_m": (12,),
     "solution": (N_DOF,),  # right-hand side, then solution, of the linear system
 }
@@ -57,7 +57,7 @@ WORK = np.dtype([(name, np.float64, shape) for name, shape in FIELDS.items()])
 
 
 def make_work():
-    """Allocate the work record of a process, filled with NaN so that reading before writing shows."""
+    """Allocate the work record of a process, filled with NaN to expose values that are read before they are written."""
     work = np.zeros(1, WORK).view(np.recarray)[0]
     for name in FIELDS:
         work[name][...] = np.nan

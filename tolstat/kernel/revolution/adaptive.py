@@ -1,4 +1,4 @@
-"""One joint whose steps follow the error (`mesh`), from its start to its end (`resolve`)."""
+"""Simulation of one joint with error-controlled steps (`mesh`); `resolve` decides after each revolution."""
 
 from tolstat.kernel.integrators import integrate
 from tolstat.kernel.integrators.mesh import cells_of, load_error, next_level, note_cell
@@ -17,21 +17,43 @@ from tolstat.kernel.simd.jit import closure
 
 predict, accept, stages = integrate.predict, integrate.accept, integrate.stages
 REFUSED = 1e300
-"""Error of a part that Newton's iteration has not solved."""
+"""Error of a cell in which Newton's iteration failed."""
 
 
 def build_resolve(newton, begin):
-    """Bind Newton's iteration for the joint, and its start.
+    """Bind Newton's iteration for the joint, and its start, to the integration over cells.
+
+    Parameters
+    ----------
+    newton : jitted function
+        As `integrate.build_newton` returns it.
+    begin : jitted function (par, options, work, state) -> None
+        Initialises the joint at theta = 0.
 
     Returns
     -------
     resolve : jitted function (par, options, work, state, ring, past, out) -> status
-        Fills the ring; writes `out` where the joint has results, and ``out.failed_step`` where a step failed.
+        Simulates a joint and fills the ring with its last revolution; writes `out` if the joint has results, and
+        ``out.failed_step`` if a step failed.
     """
 
     @closure
     def parts(origin, length, level, controlled, par, options, work, state, fine, extremes):
-        """Take a cell in 2^level parts; returns the error of the worst, above 1 where one is refused."""
+        """Integrate a cell in 2^level parts; return the error of the worst part, above 1 if a part was rejected.
+
+        Parameters
+        ----------
+        origin, length : float
+            Time at the start of the cell, and its duration, s.
+        level : int
+            Number of halvings of the cell.
+        controlled : bool
+            Whether errors are checked and loads recorded; False for the neighbouring motion of `resolve`.
+        fine : ndarray of SAMPLE, shape (3,)
+            Scratch: the last parts.
+        extremes : record of RESULT
+            Written: largest and smallest loads of the cell.
+        """
         whole = 1 << options.max_halvings
         h, share = length / (1 << level), whole >> level
         worst, done, j = 0.0, 0, 0
@@ -55,7 +77,10 @@ def build_resolve(newton, begin):
 
     @closure
     def cell(c, length, par, options, work, state, ring, past):
-        """Take cell `c`; False when it failed with the smallest parts."""
+        """Integrate cell `c` (from 1), in smaller parts until accepted; return False if the smallest parts failed.
+
+        `length` is the duration of a cell, s.
+        """
         mesh, begun, turns = past.mesh, past.begun, past.turns
         own, before = mesh[c % mesh.size], mesh[(c - 1) % mesh.size]
         for i in range(state.q0.size):

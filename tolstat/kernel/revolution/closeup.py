@@ -1,9 +1,9 @@
-"""A closer look at the peaks of loads where contacts switch.
+"""Closer look: finer integration of load peaks at which a contact switches.
 
-When a contact opens or closes the bodies ring at kilohertz. Steps that a revolution needs do not resolve that, nor must
-they: it decays within a few degrees. But where it stands on top of a peak it decides the largest load. There the two
-steps about the switch are taken again, from the recorded motion and in parts; what they show counts among the largest
-and smallest loads, while the recorded samples stay as they are.
+When a contact opens or closes, the bodies ring at kilohertz. The steps of the output grid do not resolve the ringing,
+and need not: it decays within a few degrees. On top of a load's peak, however, it decides the largest load. There the
+step with the switch and the next one are integrated again in smaller parts, from the recorded motion. The parts count
+among the largest and smallest loads; the recorded samples stay as they are.
 """
 
 import math
@@ -17,14 +17,15 @@ from tolstat.kernel.simd.jit import closure, njit
 NEAR = 0.005
 """Distance of a load from its largest value, in units of the largest of its kind, that ringing may bridge."""
 KINK = 5e-4
-"""Third difference of a load's samples, in the same units, below which a switch is too soft to ring that far."""
+"""Third difference of a load's samples, in the units of `NEAR`, up to which ringing is too weak to bridge that
+distance."""
 STEPS = 2
-"""Steps of the grid that are taken again: the one in which the contact switches, and the next."""
+"""Steps of the grid that are integrated again: the one in which the contact switches, and the next."""
 
 
 @njit
 def switches(s, samples):
-    """Whether a contact station has begun or ceased to carry between samples `s - 1` and `s`."""
+    """Whether any contact station opened or closed between samples `s - 1` and `s`."""
     switched = False
     for pin in range(4):
         switched |= samples[s].pressed[pin] != samples[s - 1].pressed[pin]
@@ -33,7 +34,7 @@ def switches(s, samples):
 
 @njit
 def on_a_peak(s, samples, out):
-    """Whether a load has a kink between samples `s - 1` and `s`, and is near its largest value there."""
+    """Whether any load has a kink between samples `s - 1` and `s` and is near its largest value there."""
     n = samples.size
     for kind in (0, 1):
         largest = out.F_max if kind == 0 else out.T_max
@@ -52,7 +53,7 @@ def on_a_peak(s, samples, out):
 
 @njit
 def extend(load, top, reach):
-    """Largest value and range of a curve that has a further value."""
+    """Return largest value and range of a curve, formerly `top` and `reach`, after adding the value `load`."""
     low = min(top - reach, load)
     top = max(top, load)
     return top, top - low
@@ -60,13 +61,13 @@ def extend(load, top, reach):
 
 @njit
 def height(before, here, ahead):
-    """Height of a peak that the middle one of three samples is; its own value elsewhere."""
+    """Return the interpolated height of a peak if the middle sample is a local maximum, else that sample."""
     return peak(before, here, ahead) if here >= before and here >= ahead else here
 
 
 @njit
 def count_in(j, fine, out):
-    """Let sample `j` of the closer look, and the peak that the one before may be, count among the extremes."""
+    """Update the extremes in `out` with sample `j` of the finer integration and the peak at sample `j - 1`, if any."""
     here, before, first = fine[j % 3], fine[(j - 1) % 3], fine[(j - 2) % 3]
     for b in range(8):
         for kind in (0, 1):
@@ -92,16 +93,18 @@ def build_closeup(advance, acceleration):
     Parameters
     ----------
     advance : jitted function
-        As `integrate.build_advance` makes it.
+        As `integrate.build_advance` returns it.
     acceleration : jitted function (t, q, v, par, options, work, out) -> None
+        Writes the accelerations that meet the equations of motion.
 
     Returns
     -------
     recall : jitted function (s, h, par, options, work, state, samples) -> None
-        Makes recorded sample `s` the last accepted point, the grid's steps being `h` long.
+        Restores recorded sample `s` as the last accepted point; `h` is the step of the output grid, s.
     look_closer : jitted function (par, options, work, state, samples, fine, out) -> None
-        Takes the steps about switches on peaks of the recorded revolution again, each in ``options.peak_substeps``, and
-        extends the extremes in `out`, a row of RESULT. What it takes is counted in ``state.counters``.
+        Integrates the steps around switches on peaks of the recorded revolution again, each in
+        ``options.peak_substeps`` parts, and extends the extremes in `out`, a row of RESULT. The work is added to
+        ``state.counters``.
     """
 
     @closure

@@ -1,9 +1,10 @@
 """Static equilibrium of the loaded joint at one input angle: Newton's iteration, or pseudo-transient continuation.
 
-From bodies that stand where all pins just touch, three joints of four need some nine iterations. The others take
-implicit Euler steps at fixed theta, each from rest, with a step that grows while Newton converges (Kelley, Keyes 1998):
-while contacts find each other the inertia terms bound each step; once they carry, the steps become Newton steps for the
-equilibrium. Where there is none (no torque), the bound on steps ends it; what follows starts from where it got.
+Newton's iteration starts from the pose in which all pins just touch, and needs some nine iterations for three joints of
+four. The others take pseudo-transient continuation (Kelley, Keyes 1998): implicit Euler steps at fixed theta, each from
+rest, with a step that grows while Newton converges. Until contacts carry, the inertia terms bound each step; then the
+steps become Newton steps for the equilibrium. Where there is no equilibrium (no torque), the number of steps is
+bounded, and the simulation continues from the last iterate.
 """
 
 from tolstat.kernel.integrators.integrate import LOST, at_rounding
@@ -12,25 +13,31 @@ from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.simd.jit import closure, njit
 
 HELD = 1e-200
-"""cv = dv/dq of an equilibrium: nothing to a force, but not the zero that stands for no tangent."""
+"""cv = dv/dq of an equilibrium: so small that rate terms vanish, but not zero, which would mean that no tangent is
+stored."""
 CV_REGULAR, CA_REGULAR = 10.0, 100.0
-"""cv (1/s) and ca (1/s^2) in the tangent of an equilibrium, as of an implicit step of 0.1 s: damping and inertia hold a
-direction that nothing else holds, and are a thousandth of what a loaded contact has. The residual has neither."""
+"""cv (1/s) and ca (1/s^2) in the tangent of an equilibrium, those of an implicit step of 0.1 s: damping and inertia
+regularise directions without stiffness, and are a thousandth of the stiffness of a loaded contact. The residual
+contains neither."""
 
 FAR = 1.0
-"""Size of an unknown, m or rad, beyond which no equilibrium is looked for: Newton's iteration has left the joint."""
+"""Size of an unknown, m or rad, above which Newton's iteration for an equilibrium has diverged."""
 
 FIRST, LARGEST, SMALLEST = 3e-4, 1e-1, 1e-9
-"""Pseudo-time steps, s."""
+"""First, largest and smallest step of pseudo-time, s."""
 GROWTH, SHRINK = 3.0, 0.3
+"""Factors on the step of pseudo-time after a converged and after a failed step."""
 MAX_STEPS = 60
 ENOUGH = 1e-4
-"""Static residual, in units of its scale, at which the start is good enough."""
+"""Scaled static residual below which pseudo-transient continuation ends: good enough as a start."""
 
 
 @njit
 def near(cv, ca, fresh, options, work, state):
-    """Whether the last change ends Newton's iteration for an equilibrium, as `integrate.at_rounding`, or it is lost."""
+    """Return `LOST` if an unknown exceeds `FAR`, else whether the last change ends Newton's iteration.
+
+    Arguments and return value are those of `small` in `integrate.build_integrator`.
+    """
     for i in range(state.q.size):
         if abs(state.q[i]) > FAR:
             return LOST
@@ -38,22 +45,23 @@ def near(cv, ca, fresh, options, work, state):
 
 
 def build_equilibrium(residual, newton, static_newton, size, guess):
-    """Bind the equations of a system.
+    """Bind the equations of a system to the search for an equilibrium.
 
     Parameters
     ----------
     residual, size : jitted functions
         As in `integrate.build_integrator`.
     newton, static_newton : jitted functions
-        As `integrate.build_newton` makes them, the second with the regularised tangent of an equilibrium.
+        As `integrate.build_newton` returns them, the second with the regularised tangent of an equilibrium.
     guess : jitted function (t, par, work, state) -> None
-        Writes where to look first to ``state.q0``.
+        Writes the initial guess to ``state.q0``.
 
     Returns
     -------
     hold, relax, equilibrium : jitted functions (t, par, options, work, state) -> bool
-        Whether there is an equilibrium at the angle of time `t`: ``state.q`` when corrected from there by Newton's
-        iteration; ``state.q0`` when reached from there in pseudo-time; ``state.q0`` by way of the guess.
+        Whether an equilibrium was found at the input angle of time `t`. `hold` corrects ``state.q`` by Newton's
+        iteration. `relax` moves ``state.q0`` by pseudo-transient continuation. `equilibrium` writes ``state.q0``: by
+        `hold` from the guess, else by `relax` from the guess, else by `relax` from zero.
     """
 
     @closure

@@ -1,11 +1,11 @@
-"""Equilibrium at each input angle under the inertial loads of the ideal motion: one revolution without transients.
+"""Quasi-static revolution: equilibrium at each input angle under the inertial loads of the ideal motion.
 
-The joint's own residual with the deviations' velocities and accelerations zero; the frames' angular velocities and
-accelerations stay, and with them centrifugal loads, the output shaft's inertia and the drag of pins that turn in
-their holes. Continuation in the angle: the solution is extrapolated through the last four angles, or through three
-where that foretold the last angle better (a contact has switched), and corrected by Newton's iteration, with a
-tangent kept from angle to angle. Where that fails it begins at the angle before; where that fails too, pseudo-
-transient continuation finds the equilibrium from there.
+The residual is that of the dynamic joint with the deviations' velocities and accelerations zero; the frames' angular
+velocities and accelerations stay, and with them centrifugal loads, the output shaft's inertia and the drag of pins that
+turn in their holes. The predictor extrapolates through the solutions at the last four angles, or the last three if
+three predicted the last angle better (after a contact has switched). Newton's iteration corrects it, with a tangent
+kept from angle to angle. If Newton fails, it starts from the solution at the previous angle; if that fails too, from
+where pseudo-transient continuation leads from there.
 """
 
 import math
@@ -20,16 +20,25 @@ from tolstat.kernel.simd.lane import where
 
 @njit
 def angle_time(k, n, par):
-    """Time (s) at angle `k` of `n`, from the second revolution on: a torque that rises at the start has risen."""
+    """Time (s) at angle `k` of `n` in the second revolution, when a torque ramp at the start has ended."""
     return 2 * math.pi * (n + k) / (n * abs(par.omega))
 
 
 @njit
 def extrapolate(begins, known, state):
-    """Trial point, in lanes that begin an angle, when `known` angles are solved.
+    """Predictor: write the trial point of the next angle, in lanes that begin one.
 
-    Through the last four equally spaced angles, or three where no more are known or where that was better;
-    ``state.aux`` and ``state.a1`` are the third and fourth last. Before that, the angle before.
+    It extrapolates through the last four equally spaced angles; through three if no more are known or if three
+    predicted the last angle better; with fewer than three it repeats the last solution.
+
+    Parameters
+    ----------
+    begins : bool
+        Mask: whether a lane begins an angle.
+    known : int
+        Number of angles solved.
+    state : State
+        ``q0``, ``q1``, ``aux`` and ``a1`` hold the last to the fourth last solution; ``q`` is written.
     """
     cubic, square = (known > 3) & (state.memory[AHEAD] > 0), known > 2
     for i in range(state.q.size):
@@ -41,16 +50,16 @@ def extrapolate(begins, known, state):
 
 @njit
 def stay(state):
-    """Trial point: that of the angle before."""
+    """Set the trial point to the solution at the previous angle."""
     for i in range(state.q.size):
         state.q[i] = state.q0[i]
 
 
 @njit
 def keep(solved, state):
-    """Make the trial point the last angle's solution, in lanes that have one.
+    """Accept the trial point as the last solution, in lanes that have solved an angle.
 
-    ``state.memory[AHEAD]``: whether four angles foretold it better than three.
+    ``state.memory[AHEAD]`` becomes 1 if four angles predicted this solution better than three, else 0.
     """
     by_three = by_four = 0.0 * state.q[0]
     for i in range(state.q.size):
@@ -66,7 +75,7 @@ def keep(solved, state):
 
 @njit
 def end_closure(samples):
-    """Change of the loads' moduli at theta = 0 over the revolution, relative to the largest of their kind."""
+    """Change of the load moduli at theta = 0 over the revolution, relative to the largest of their kind."""
     worst = 0.0
     for kind in (0, 1):
         largest = 0.0
@@ -80,9 +89,9 @@ def end_closure(samples):
 
 @njit
 def speed_ratios(par, samples):
-    """Write ``tau`` and ``psi`` of the samples from the deviation of the output shaft's angle, which ``tau`` holds.
+    """Write ``tau`` and ``psi``, eq. (13), of the samples; ``tau`` holds the output shaft's angular deviation before.
 
-    Its slope over the input angle is taken by central differences around the revolution.
+    The derivative of the deviation with respect to the input angle is taken by periodic central differences.
     """
     n = samples.size
     by_sample = n / (4 * math.pi) if par.omega > 0 else -n / (4 * math.pi)
@@ -96,20 +105,20 @@ def speed_ratios(par, samples):
 
 
 def build_quasistatic(hold, relax, record):
-    """Bind the equilibria of a system to a revolution.
+    """Bind the equilibrium solvers of a system to a revolution.
 
     Parameters
     ----------
     hold, relax : jitted functions
-        As `equilibrium.build_equilibrium` makes them.
+        As `equilibrium.build_equilibrium` returns them.
     record : jitted function (k, lane, in_full, par, work, v, samples) -> None
-        Keeps an angle.
+        Records an angle, see `settle.record`.
 
     Returns
     -------
     jitted function (first, par, options, work, state, ring) -> bool
-        Goes once around from the equilibrium ``state.q0`` at theta = 0; False when an angle has none in reach.
-        ``first``: whether there is no revolution before.
+        Solves one revolution from the equilibrium ``state.q0`` at theta = 0; False if no equilibrium was found at an
+        angle. `first`: whether it is the first revolution.
     """
 
     @closure

@@ -9,7 +9,7 @@ from tolstat.kernel.simd.jit import njit
 
 @njit
 def turning_points(x, points):
-    """Reversals of a periodic signal, from its largest value round to the same value again.
+    """Find the reversals of a periodic signal, from its largest value to the same value one period later.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def turning_points(x, points):
 
 @njit
 def keep(size, mean, ranges, means):
-    """Sort a cycle into those kept, largest first; the smallest falls out when there is no room."""
+    """Insert a cycle into `ranges` and `means`, (k,), in descending order of range; the smallest one drops out."""
     k = ranges.size - 1
     if not size > ranges[k]:
         return
@@ -58,7 +58,7 @@ def keep(size, mean, ranges, means):
 def count(x, gate, points, ranges, means):
     """Rainflow cycles of a periodic signal.
 
-    From the largest value on, every cycle closes within the period: nothing is left over, none is a half.
+    Counted from the largest value on, every cycle closes within the period: no residue, no half cycles.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def count(x, gate, points, ranges, means):
     Returns
     -------
     int
-        Number of cycles, those without room included.
+        Number of cycles, including those that did not fit.
     """
     ranges[:] = 0.0
     means[:] = 0.0
@@ -102,7 +102,7 @@ def count_joint(loads, relative_gate, ranges, means, cycles):
     loads : (n, 8, 6) array
         Force (N) and torque (N m) along e, t, z of each bushing over one revolution, finite.
     relative_gate : float
-        Cycles up to this part of the joint's largest force or torque are not counted.
+        Cycles up to this fraction of the joint's largest force or torque are not counted.
     ranges, means : (64, k) arrays
         Written, see `count`. For each bushing in turn force e, t, z, torque e, t, z, and the moduli of both.
     cycles : (64,) array of int

@@ -1,11 +1,11 @@
-"""What becomes of a joint, revolution by revolution, whose steps follow the error (`mesh`).
+"""Decisions after each revolution of a joint with error-controlled steps (`mesh`).
 
-Once its motion repeats, after one revolution or after several, it goes on with a tighter tolerance until it repeats
-again: what that changes of the largest loads tells their error. A joint that has repeated in no number of revolutions
-is watched to the end. Over the last ones a neighbour, set beside it by a small amount, goes around with it on the same
-mesh and is brought back to that distance after each revolution: the mean logarithm of the growth is the largest
-Lyapunov exponent (Benettin et al. 1980). The input angle is prescribed, so that no exponent is zero for the time's
-sake: negative belongs to a motion that repeats, zero to a quasi-periodic and positive to a chaotic one.
+Once the motion repeats, after one or several revolutions, the joint continues with a tighter tolerance until it repeats
+again: from the change of the largest loads their error is estimated. A joint that does not repeat is integrated up to a
+limit. Over its last revolutions a neighbouring motion, started at a small distance, is integrated on the same mesh and
+scaled back to that distance after each revolution: the mean logarithm of the growth is the largest Lyapunov exponent
+(Benettin et al. 1980). The input angle is prescribed, so that no exponent is trivially zero: a negative one belongs to
+a motion that repeats, zero to a quasi-periodic and a positive one to a chaotic motion.
 """
 
 import math
@@ -31,64 +31,66 @@ TR_BDF2, DYNAMIC = int(Method.TR_BDF2), int(Fidelity.DYNAMIC)
 NEWTON_FAILED, NOT_FINITE = int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
 
 TIGHTER = 8
-"""Of one tolerance to the next: it halves the steps."""
+"""Factor from one tolerance to the next tighter one: it halves the steps."""
 NEARLY, PATIENT = 1.5e-2, 10
-"""Closure error at which a joint gets a tighter tolerance, if it needs one, and revolutions after which it gets its
-first one anyway: it need not settle with every one."""
+"""Closure error at which the tolerance is tightened, if need be, and number of revolutions after which the first one is
+tightened anyway: a joint need not settle with every tolerance."""
 ENOUGH = 0.1
 """Closure error at which a joint has settled in any case, in units of the last change of its largest loads: a third of
 their error."""
 RESOLVED = 2e-2
-"""Change of the largest loads by a tighter tolerance at which it is the last, relative to the largest of their kind. A
-method of order 2 leaves a third of it as error."""
+"""Change of the largest loads by a tighter tolerance, relative to the largest of their kind, up to which no further one
+follows. A method of order 2 leaves a third of it as error."""
 FAR = 2 * RESOLVED
-"""Change by the first revolution with a tighter tolerance at which the next one follows at once."""
+"""Change in the first revolution with a tighter tolerance above which the next one follows at once."""
 SETTLING = 16
-"""Revolutions that a tighter tolerance is allowed at least."""
+"""Minimum number of revolutions with a tighter tolerance before a joint is given up."""
 LONGEST_PERIOD = 8
+"""Longest period that is recognised, revolutions."""
 FALLS, CLEARLY, BARELY = 0.1, 10.0, 4.0
-"""Fall of log10(closure) over the revolutions kept that counts, at least; in units of its scatter, where it needs no
-other sign (closure errors of chaotic joints wander, and fell by four to five times their scatter in some), and where
-it needs one."""
+"""Minimum fall of log10(closure) over the revolutions kept that counts as settling. It must also exceed its scatter by
+the second factor (closure errors of chaotic joints wander, and fell by four to five times their scatter in some), or by
+the third if the Lyapunov exponent is not positive."""
 APART = 1e-8
-"""Distance of the neighbour, m: above what Newton leaves of a step, below the micrometres of a contact."""
+"""Distance of the neighbouring motion, m: above the residual error of Newton's iteration, below the micrometres of a
+contact."""
 BESIDE, ALIGNING = 16, 4
-"""Revolutions of the neighbour, and the first of them, in which it turns to the direction that grows. Of a joint that
-is given up after no more than these no class is told."""
+"""Revolutions of the neighbouring motion, and how many of them are left out of the exponent, while the difference turns
+to the direction that grows fastest. A joint limited to no more than `BESIDE` revolutions is not classified."""
 EXPONENT = 0.25
-"""Size of an exponent (per revolution) that tells it from zero."""
+"""Magnitude of an exponent (per revolution) up to which it counts as zero."""
 MOST_ITERATIONS = 3_000_000
-"""Bound on the work of a joint: half a minute of a core."""
+"""Bound on the Newton iterations of a joint: half a minute of a core."""
 
 TURNS = np.dtype(
     [
-        ("revolution", "i8"),  # revolutions that the joint has made
-        ("since", "i8"),  # those of them before the tolerance in use
-        ("limit", "i8"),  # after which it is given up
-        ("tightened", "i8"),  # times that the tolerance has been tightened
-        ("period", "i8"),  # revolutions after which it has repeated, 0 if it has not
-        ("beside", "i8"),  # 1: it is the neighbour that goes around
-        ("growth", "f8"),  # sum of logarithms
+        ("revolution", "i8"),  # revolutions completed
+        ("since", "i8"),  # revolutions completed before the tolerance in use
+        ("limit", "i8"),  # revolutions after which the joint is given up
+        ("tightened", "i8"),  # number of times that the tolerance was tightened
+        ("period", "i8"),  # period found with the tolerance before, revolutions; 0: none
+        ("beside", "i8"),  # 1 while the neighbouring motion is integrated
+        ("growth", "f8"),  # sum of the logarithms of its growth
         ("before", "f8", (8, 2)),  # largest |F|, |T| with the tolerance before
-        ("other", "f8", (3, N_DOF)),  # q, v, a of the neighbour, or of the joint while the neighbour goes around
+        ("other", "f8", (3, N_DOF)),  # q, v, a of the neighbour; of the joint while `beside` is 1
     ]
 )
 
 
 class Past(NamedTuple):
-    """What is remembered of a joint from revolution to revolution."""
+    """Data of one joint that are kept from revolution to revolution."""
 
     trail: Trail
     turns: np.record  # TURNS
-    extremes: np.recarray  # (2,) RESULT: largest and smallest loads of the cell and of the revolution under way
-    begun: np.ndarray  # (3, N_DOF) q, v, a at the beginning of the cell under way
+    extremes: np.recarray  # (2,) RESULT: largest and smallest loads of the current cell and revolution
+    begun: np.ndarray  # (3, N_DOF) q, v, a at the start of the current cell
     mesh: np.recarray  # (cells,) CELL
 
 
 class Pasts(NamedTuple):
-    """The same of several joints, each array with a leading axis of joints.
+    """Data of several joints, fields as in `Past`, each array with a leading axis of joints.
 
-    Kernels return no records: who needs one joint's makes a `Past` of it.
+    Kernels return no records: each caller makes the `Past` of one joint itself.
     """
 
     modulus: np.ndarray
@@ -101,7 +103,7 @@ class Pasts(NamedTuple):
 
 
 def make_pasts(joints: int, options: Options) -> Pasts:
-    """Allocate."""
+    """Allocate for several joints."""
     trails = make_trails(joints, options.steps_per_rev, revolutions_kept(options))
     turns, extremes = np.zeros(joints, TURNS).view(np.recarray), np.zeros((joints, 2), RESULT).view(np.recarray)
     cells = options.steps_per_rev * cells_of(options.steps_per_rev)
@@ -117,25 +119,25 @@ def make_past(options: Options) -> Past:
 
 
 def revolutions_kept(options: Options) -> int:
-    """Revolutions that are remembered of a joint whose steps follow the error; next to nothing of others."""
+    """Number of revolutions kept of a joint: all of them with error-controlled steps, else one."""
     return options.max_revs if follows_error(options) else 1
 
 
 @njit
 def follows_error(options):
-    """Whether steps follow the error: TR-BDF2 with a tolerance."""
+    """Whether steps are error-controlled: dynamic TR-BDF2 with a tolerance."""
     return options.method == TR_BDF2 and options.rtol > 0 and options.fidelity == DYNAMIC
 
 
 @njit
 def wanted(options, turns):
-    """Closure error that ends a joint's way with the tolerance in use, or leads to the next one."""
+    """Closure error at which a joint is finished with the tolerance in use: it ends or the tolerance is tightened."""
     return options.settle_tol if turns.tightened > 0 else max(NEARLY, options.settle_tol)
 
 
 @njit
 def begin_turns(par, options, memory, weight, past):
-    """Make ready for a joint that stands at its start."""
+    """Initialise `past`, and `memory` and `weight` of State, for a joint at its start."""
     turns = past.turns
     turns.revolution = turns.since = turns.tightened = turns.period = turns.beside = 0
     turns.limit, turns.growth = options.max_revs, 0.0
@@ -149,7 +151,7 @@ def begin_turns(par, options, memory, weight, past):
 
 @njit
 def clear_extremes(extremes):
-    """Know nothing of largest and smallest loads."""
+    """Reset largest and smallest loads."""
     extremes.psi_max = 0.0
     for b in range(8):
         extremes.F_max[b] = extremes.T_max[b] = 0.0
@@ -161,7 +163,7 @@ def clear_extremes(extremes):
 
 @njit
 def merge_extremes(one, out):
-    """Let the extremes `one` count among those of `out`."""
+    """Include the extremes `one` in those of `out`."""
     for b in range(8):
         low = one.F_max[b] - one.F_range[b], one.T_max[b] - one.T_range[b]
         for kind in (0, 1):
@@ -179,9 +181,9 @@ def merge_extremes(one, out):
 
 @njit
 def keep_revolution(samples, extremes, trail, r):
-    """Keep revolution `r` (from 0): its statistics, and moduli to compare later ones with.
+    """Store moduli and statistics of revolution `r` (from 0); reset `extremes`; return the statistics.
 
-    Its largest and smallest loads are those of all parts: parabolas through samples of the grid would overshoot spikes.
+    Largest and smallest loads are those of all parts: parabolas through samples of the grid would overshoot spikes.
     """
     own = trail.revolution[r % trail.revolution.size]
     summarise(samples, own)
@@ -197,7 +199,7 @@ def keep_revolution(samples, extremes, trail, r):
 
 @njit
 def largest_change(before, out):
-    """Largest change of a largest load against those `before`, relative to the largest of the kind."""
+    """Largest change of any largest load against `before`, (8, 2), relative to the largest of the kind."""
     worst = 0.0
     for kind in (0, 1):
         change = size = 0.0
@@ -210,7 +212,7 @@ def largest_change(before, out):
 
 @njit
 def find_period(last, closure, tolerance, turns, trail):
-    """Revolutions after which the motion repeats, seen at the end of revolution `last` (from 0); 0 if it does not."""
+    """Period, in revolutions, of the motion at the end of revolution `last` (from 0); 0 if it does not repeat."""
     if closure <= tolerance:
         return 1
     known = last + 1 - turns.since
@@ -224,7 +226,7 @@ def find_period(last, closure, tolerance, turns, trail):
 
 @njit
 def tighten(period, options, memory, mesh, turns, out):
-    """Go on with a tighter tolerance."""
+    """Tighten the tolerance; keep `period` and the largest loads in `out` for comparison."""
     memory[TOLERANCE] /= TIGHTER
     refine_mesh(mesh)
     for b in range(8):
@@ -236,7 +238,7 @@ def tighten(period, options, memory, mesh, turns, out):
 
 @njit
 def repeats(last, options, memory, mesh, trail, turns, out):
-    """Whether a joint repeats, with its largest loads resolved or no tolerance left; else it may get a tighter one."""
+    """Whether a joint repeats and its largest loads are resolved or no tolerance is left; may tighten the tolerance."""
     period = find_period(last, out.closure, max(NEARLY, options.settle_tol), turns, trail)
     tired = turns.tightened == 0 and last + 1 >= PATIENT
     if period == 0 and not tired:
@@ -258,7 +260,7 @@ def repeats(last, options, memory, mesh, trail, turns, out):
 
 @njit
 def conclude_watch(options, trail, turns, out):
-    """Class of a joint that has not repeated; returns its status."""
+    """Classify the motion of a joint that has not repeated; return its status."""
     last, kept = turns.revolution - 1, min(trail.revolution.size, turns.revolution // 2)
     slope, scatter = closure_trend(turns.revolution - kept, trail.notes)
     combine(last, kept, trail, out)
@@ -278,13 +280,13 @@ def conclude_watch(options, trail, turns, out):
 
 @njit
 def lever(i, R):
-    """Radius at which unknown `i` is a displacement: 1 if it is one."""
+    """Radius (m) that makes unknown `i` a displacement: 1 if it is one."""
     return 1.0 if i < 6 * N_LUMPS and i % 6 < 3 else R
 
 
 @njit
 def set_beside(q, v, a, R, turns):
-    """Choose the neighbour's first difference: `APART`, in all unknowns."""
+    """Start the neighbouring motion at distance `APART`, with a difference in all unknowns."""
     turns.growth = 0.0
     share = APART / math.sqrt(N_DOF)
     for i in range(N_DOF):
@@ -294,7 +296,7 @@ def set_beside(q, v, a, R, turns):
 
 @njit
 def swap(q, v, a, turns):
-    """Exchange the joint and its neighbour."""
+    """Exchange the states of the joint and its neighbour."""
     for i in range(N_DOF):
         q[i], turns.other[0, i] = turns.other[0, i], q[i]
         v[i], turns.other[1, i] = turns.other[1, i], v[i]
@@ -304,9 +306,9 @@ def swap(q, v, a, turns):
 
 @njit
 def draw_near(q, v, a, h, R, turns):
-    """Bring the neighbour back to its distance from the joint; returns the logarithm of its growth.
+    """Scale the neighbour's difference back to `APART`; return the logarithm of its growth.
 
-    Speeds count by what they add in `h`, the time of a step of the grid, s.
+    Velocities are weighted by `h`, the step of the output grid, s.
     """
     square = 0.0
     for i in range(N_DOF):
@@ -322,7 +324,7 @@ def draw_near(q, v, a, h, R, turns):
 
 @njit
 def neighbour_done(q, v, a, par, options, turns):
-    """Go back from the neighbour, which has gone around, to the joint."""
+    """Restore the joint after a revolution of its neighbour, and add the growth."""
     swap(q, v, a, turns)
     growth = draw_near(q, v, a, 2 * math.pi / (abs(par.omega) * options.steps_per_rev), par.R, turns)
     if turns.revolution > turns.limit - BESIDE + ALIGNING:
@@ -331,14 +333,14 @@ def neighbour_done(q, v, a, par, options, turns):
 
 @njit
 def revolved(point, memory, weight, iterations, par, options, samples, past, out):
-    """Decide how a joint goes on that stands at theta = 0 again.
+    """Decide how a joint continues after a revolution.
 
     Parameters
     ----------
     point : tuple of ndarray, shape (55,)
-        q, v, a where it stands; exchanged for those of the neighbour, and back.
+        q, v, a of the joint; exchanged for those of the neighbour, and back.
     memory, weight : ndarray
-        As of State; the tolerance and what errors and residuals are relative to are set.
+        Of State; the tolerance and the scales of errors and residuals are set.
     iterations : int
         Newton iterations so far.
     par, options
@@ -346,20 +348,20 @@ def revolved(point, memory, weight, iterations, par, options, samples, past, out
     samples : ndarray of SAMPLE
         The revolution just made.
     past : Past
-        What is remembered.
+        Data of the joint; updated.
     out : record of RESULT
-        Written when the joint has come to its end.
+        Updated; complete when the joint has ended.
 
     Returns
     -------
     status : int
-        How the joint has ended.
+        Final status, where the joint has ended.
     goes_on : bool
-        Whether it has not.
+        Whether the joint continues.
     """
     q, v, a = point
     trail, turns = past.trail, past.turns
-    memory[STAGED] = 0.0  # for it may be of the other one
+    memory[STAGED] = 0.0  # the stage may belong to the other motion
     if turns.beside == 1:
         neighbour_done(q, v, a, par, options, turns)
         if turns.revolution == turns.limit:

@@ -1,4 +1,4 @@
-"""The recorded revolution: a ring of samples by input angle, and the closure error between revolutions."""
+"""The recorded revolution: a ring buffer of samples by input angle, and the closure error between revolutions."""
 
 import math
 from typing import NamedTuple
@@ -24,7 +24,7 @@ SAMPLE = np.dtype(
         ("tau", "f8"),
         ("psi", "f8"),  # Psi, eq. (13)
         ("mode", "u1", (4,)),
-        ("pressed", "u2", (4,)),  # bit j: station j of the pin carries
+        ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
         ("q", "f8", (N_DOF,)),  # m, rad
         ("v", "f8", (N_DOF,)),  # per s
     ],
@@ -43,11 +43,11 @@ def make_samples(joints: int, steps_per_rev: int) -> np.recarray:
 
 
 class Ring(NamedTuple):
-    """The last revolution of a joint, and what else is remembered of it."""
+    """The last revolution of a joint, its closure errors, and scratch of the closer look."""
 
     samples: np.recarray  # (steps_per_rev,) SAMPLE
     notes: np.record  # NOTES: closure errors
-    fine: np.recarray  # (3,) SAMPLE, see `closeup`
+    fine: np.recarray  # (3,) SAMPLE: last parts of the closer look, see `closeup`
 
 
 def make_ring(steps_per_rev: int) -> Ring:
@@ -63,7 +63,7 @@ def grid_step(par, options):
 
 @njit
 def pressed(pin, lane, par, work):
-    """Which stations of `pin` carry, as bits."""
+    """Which stations of `pin` carry a force, as bits."""
     bits = 0
     for j in range(par.n_stations):
         if pick(work.station[pin, j, FORCE], lane) > 0:
@@ -73,9 +73,24 @@ def pressed(pin, lane, par, work):
 
 @njit
 def record(k, lane, in_full, par, work, v, samples):
-    """Keep grid point `k` (counted from the start) of the joint in `lane`, as it was last evaluated with rates `v`.
+    """Record the loads of a grid point, and their change since the revolution before.
 
-    `in_full`: whether more is wanted than the loads' moduli, which the next revolution is compared with.
+    Parameters
+    ----------
+    k : int
+        Number of the grid point, counted from the start; it overwrites sample k modulo n.
+    lane : int
+        Lane of the joint; has no effect where there is one joint only.
+    in_full : bool
+        Whether to record the whole sample; otherwise only load moduli and their changes.
+    par : record of PARAM
+        The joint.
+    work : record of WORK
+        The joint's last evaluation.
+    v : ndarray, shape (55,)
+        Velocities at that evaluation, m/s and rad/s.
+    samples : ndarray of SAMPLE, shape (n,)
+        Written.
     """
     sample = samples[k % samples.size]
     fetch(samples[(k + 2) % samples.size])
@@ -103,17 +118,28 @@ def record(k, lane, in_full, par, work, v, samples):
         sample.pressed[pin] = pressed(pin, lane, par, work)
     omega, rate = pick(par.omega, lane), pick(v[PSI], lane)
     sample.tau = (pick(work.shaft[0], lane) + rate) / omega
-    sample.psi = rate / (omega * sample.tau)
+    sample.psi = rate / (omega * sample.tau)  # eq. (13)
 
 
 @njit
 def foresee(k, q, v, ahead, samples):
-    """Keep the motion at grid point `k`; expect of the next step the change that it brought a revolution ago.
+    """Store the motion at grid point `k`; predict the increment of the next step by that of one revolution earlier.
+
+    Parameters
+    ----------
+    k : int
+        Number of the grid point, counted from the start.
+    q, v : ndarray, shape (55,)
+        Unknowns (m, rad) and velocities (per s).
+    ahead : ndarray, shape (55,)
+        Written: predicted increment of q.
+    samples : ndarray of SAMPLE, shape (n,)
+        The last revolution; written.
 
     Returns
     -------
     float
-        1 when there was one, else 0: then nothing is known.
+        1 if there is a prediction, 0 in the first revolution.
     """
     n = samples.size
     here, following = samples[k % n], samples[(k + 1) % n]
@@ -143,9 +169,9 @@ def closure_error(samples):
 
 @njit
 def peak(before, here, ahead):
-    """Height of the parabola through three samples, of which `here` is the largest: a peak lies between samples.
+    """Height of the parabola through three samples of which `here` is the largest: peaks lie between samples.
 
-    Where contacts switch, the peak is a kink and not a parabola; the height is then off by an eighth at most of the
+    Where contacts switch, the peak is a kink and not a parabola; the height is then off by at most an eighth of the
     larger drop to a neighbour.
     """
     bend = 2 * here - before - ahead
@@ -154,7 +180,7 @@ def peak(before, here, ahead):
 
 @njit
 def extremes(values):
-    """Largest and smallest height of a closed curve given at equally spaced angles, shape (n,)."""
+    """Largest and smallest value of a periodic curve given at equally spaced angles, shape (n,), by parabolas."""
     n = values.size
     top = low = 0
     for s in range(n):
@@ -169,10 +195,10 @@ def extremes(values):
 
 @njit
 def step_error(par, samples, out):
-    """Estimated error of a step of BDF2 as a load relative to the largest one, the mean of the recorded revolution.
+    """Estimated error of a BDF2 step, as a load relative to the largest one: mean over the recorded revolution.
 
-    A step of BDF2 errs by 2/9 of the third difference of an unknown (Hairer, Wanner: Solving ODEs I, III.2); by the
-    stiffness of the lump's bushing that is a load.
+    A step of BDF2 errs by 2/9 of the third difference of an unknown (Hairer, Wanner: Solving ODEs I, III.2); the
+    stiffness of the lump's bushing converts it to a load.
     """
     force = torque = 0.0
     for b in range(8):

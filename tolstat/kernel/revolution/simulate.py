@@ -1,4 +1,4 @@
-"""One joint from its start to a settled, recorded revolution (model, section 7)."""
+"""Simulation of one joint from its start to a settled, recorded revolution (docs/model.md, Results)."""
 
 import math
 from typing import NamedTuple
@@ -39,7 +39,7 @@ PERIODIC, UNKNOWN = int(Motion.PERIODIC), int(Motion.UNKNOWN)
 RAMP = int(Start.RAMP)
 DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)
 CHECKS_PER_REV = 12
-"""How often a revolution the closure error is looked at, once two revolutions are recorded."""
+"""Checks of the closure error per revolution, once two revolutions are recorded."""
 
 residual, acceleration = dynamics.residual, dynamics.acceleration
 assemble, eliminate, solve = tangent.assemble, linsolve.factorise, linsolve.solve
@@ -47,14 +47,14 @@ assemble, eliminate, solve = tangent.assemble, linsolve.factorise, linsolve.solv
 
 @njit
 def factorise(t, q, v, a, cv, ca, par, options, work):
-    """Tangent at the state that the residual was last evaluated at, factorised."""
+    """Assemble and factorise the tangent at the state of the last residual, see `integrate.build_integrator`."""
     assemble(cv, ca, par, work)
     return eliminate(work)
 
 
 @njit
 def factorise_static(t, q, v, a, cv, ca, par, options, work):
-    """Tangent of an equilibrium, regularised and factorised."""
+    """Assemble and factorise the regularised tangent of an equilibrium."""
     assemble(CV_REGULAR, CA_REGULAR, par, work)
     return eliminate(work)
 
@@ -70,7 +70,7 @@ reset = integrate.reset
 
 @njit
 def inside_model(par):
-    """Whether the model has a meaning for a joint; written so that NaN has none."""
+    """Whether a joint lies within the scope of the model; written so that NaN does not."""
     good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
     good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0
     linear = 0.0
@@ -85,7 +85,7 @@ def inside_model(par):
 
 @njit
 def clear_results(out):
-    """NaN in everything that may not be computed."""
+    """Reset a row of RESULT: NaN in what may not be computed, zero in the counters."""
     nan = np.nan
     out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
     out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
@@ -103,7 +103,7 @@ def clear_results(out):
 
 @njit
 def clear(par, state, samples, notes):
-    """Make ready for another joint."""
+    """Reset state, samples and notes for another joint."""
     set_weight(typical_force(par), par, state.weight)
     state.q0[:] = 0.0
     state.v0[:] = 0.0
@@ -116,9 +116,9 @@ def clear(par, state, samples, notes):
 
 @njit
 def run(par, options, alone, out):
-    """Fill the ring at the fidelity asked for; return a status.
+    """Simulate a joint at the fidelity of `options`; fill the ring; return a status.
 
-    ``out.closure`` and ``out.revolutions`` are written, and ``out.failed_step`` where a step failed.
+    ``out.closure`` and ``out.revolutions`` are written, and ``out.failed_step`` if a step failed.
     """
     work, state, ring, past = alone
     if not inside_model(par):
@@ -147,7 +147,7 @@ def run_ideal(par, work, state, ring, out):
 
 @njit
 def run_quasistatic(par, options, work, state, ring, out):
-    """Go around through equilibria, again where a revolution does not end where it began."""
+    """Solve quasi-static revolutions until one ends where it began; return a status."""
     n = ring.samples.size
     equilibrium(angle_time(0, n, par), par, options, work, state)
     for revolutions in range(options.max_revs):
@@ -164,7 +164,7 @@ def run_quasistatic(par, options, work, state, ring, out):
 
 @njit
 def begin(par, options, work, state):
-    """Bring a joint to its start at theta = 0."""
+    """Initialise a joint at theta = 0: in the ideal pose for a torque ramp, else in static equilibrium."""
     if options.start == RAMP:
         acceleration(0.0, state.q0, state.v0, par, options, work, state.a0)
     else:
@@ -179,7 +179,21 @@ resolve = build_resolve(newton, begin)
 
 @njit
 def judge(k, iterations, options, samples, notes, out):
-    """Status of a joint at grid point `k`: `NOT_SETTLED` while it is to go on."""
+    """Check closure error and work at grid point `k`; return `NOT_SETTLED` while the joint is to continue.
+
+    Parameters
+    ----------
+    k : int
+        Number of the grid point, counted from the start.
+    iterations : int
+        Newton iterations so far.
+    options : Options
+        Numerical settings.
+    samples, notes
+        As in `settle.Ring`; the closure error is noted.
+    out : record of RESULT
+        ``closure`` and ``revolutions`` are written.
+    """
     n = options.steps_per_rev
     out.revolutions = k / n
     if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
@@ -211,7 +225,7 @@ def run_dynamic(par, options, work, state, ring, out):
 
 @njit
 def is_finite(out):
-    """Whether the statistics of a joint are numbers."""
+    """Whether the load statistics of a joint are finite."""
     for b in range(8):
         if not (out.F_max[b] < 1e300 and out.T_max[b] < 1e300 and out.F_mean[b] + out.T_mean[b] < 1e300):
             return False
@@ -220,7 +234,7 @@ def is_finite(out):
 
 @njit
 def describe(status, options, counters, mesh, out):
-    """Write how a joint ended."""
+    """Write status, step numbers and counters of a joint that has ended."""
     out.status = status
     out.settled = status == OK
     out.steps_per_rev = parts_of(mesh) if follows_error(options) else options.steps_per_rev
@@ -230,7 +244,10 @@ def describe(status, options, counters, mesh, out):
 
 @njit
 def finish(status, failed, options, counters, mesh, out):
-    """Write how a joint ended, and at which step (-1: at none) one without results has `failed`."""
+    """Write how a joint ended; one without results is reset, with its failed step and angle.
+
+    `failed` is the step of the output grid at which the joint failed, -1 if at none.
+    """
     if status not in (OK, NOT_SETTLED, NOT_PERIODIC):
         clear_results(out)
         if failed > 0:
@@ -241,7 +258,10 @@ def finish(status, failed, options, counters, mesh, out):
 
 @njit
 def conclude(status, par, options, notes, samples, out):
-    """Write the error of the steps, and how the closure error fell: in the second half, where it is not small yet."""
+    """Write step error, closure trend and class of motion, unless steps are error-controlled.
+
+    The closure trend of a joint that has not settled is fitted over the second half of ``max_revs``.
+    """
     if options.fidelity == DYNAMIC:
         out.step_error = step_error(par, samples, out)
     since = 0.0 if status == OK else 0.5 * options.max_revs
@@ -261,7 +281,7 @@ def simulate_joint(par, options, alone, out):
     options : Options
         Numerical settings.
     alone : Scratch
-        Nothing is carried over from one joint to the next. The ring holds the last revolution.
+        Work arrays; nothing is carried over from one joint to the next. The ring holds the last revolution.
     out : record of RESULT
         Written: status, and NaN in what was not computed.
     """
@@ -283,7 +303,7 @@ def simulate_joint(par, options, alone, out):
 
 
 class Scratch(NamedTuple):
-    """Everything a process needs to simulate one joint after the other."""
+    """Work arrays of a process that simulates joints one after the other."""
 
     work: np.record
     state: np.record

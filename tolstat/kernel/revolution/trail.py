@@ -1,7 +1,7 @@
-"""What is remembered of a joint that takes long to settle: closure errors, and whole revolutions to compare.
+"""History of a joint over many revolutions: closure errors, load moduli and statistics of each revolution.
 
-A joint that settles writes no more than one number a check here. Of one whose steps follow the error (`resolve`) whole
-revolutions are kept: moduli of their loads, for closure errors over several revolutions, and the statistics of each.
+With uniform steps only closure errors are stored, one number per check. With error-controlled steps (`resolve`) whole
+revolutions are stored: moduli of their loads, for closure errors over several revolutions, and the statistics of each.
 """
 
 import math
@@ -14,13 +14,13 @@ from tolstat.kernel.mechanics.vector import copy, larger
 from tolstat.kernel.simd.jit import njit
 
 MOST_ANGLES = 360
-"""Input angles a revolution at which moduli are kept."""
+"""Maximum number of input angles per revolution at which moduli are kept."""
 MOST_CHECKS = 192
-"""Closure errors kept."""
+"""Maximum number of closure errors kept; older ones are overwritten."""
 
 
 NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
-"""Closure errors: revolutions and log10 of the error at each check; checks made."""
+"""Closure errors: revolutions and log10 of the error at each check; number of errors noted."""
 
 
 class Trail(NamedTuple):
@@ -55,7 +55,7 @@ def _stride(steps: int) -> int:
 
 @njit
 def note_closure(revolutions, closure, notes):
-    """Remember a closure error; one that has no logarithm is left out."""
+    """Store a closure error; one without a finite logarithm is left out."""
     if 0 < closure < 1e300:
         i = notes.count % MOST_CHECKS
         notes.check[i, 0], notes.check[i, 1] = revolutions, math.log10(closure)
@@ -64,14 +64,14 @@ def note_closure(revolutions, closure, notes):
 
 @njit
 def closure_trend(since, notes):
-    """Straight line through the logarithms of the closure errors from revolution `since` on.
+    """Fit a straight line to the logarithms of the closure errors from revolution `since` on.
 
     Returns
     -------
     slope : float
-        Per revolution; NaN where there are fewer than two.
+        Per revolution; NaN if there are fewer than two closure errors.
     scatter : float
-        Root mean square about the line.
+        Root mean square deviation from the line.
     """
     n = 0
     x = y = xx = xy = yy = 0.0
@@ -90,7 +90,7 @@ def closure_trend(since, notes):
 
 @njit
 def lag_closure(last, lag, trail):
-    """Closure error of revolution `last` (from 0) against the one `lag` revolutions before, as `closure_error`."""
+    """Closure error of revolution `last` (from 0) against the one `lag` earlier, defined as in `closure_error`."""
     kept, angles = trail.modulus.shape[0], trail.modulus.shape[1]
     now, before = trail.modulus[last % kept], trail.modulus[(last - lag) % kept]
     worst = 0.0
@@ -107,7 +107,7 @@ def lag_closure(last, lag, trail):
 
 @njit
 def combine(last, count, trail, out):
-    """Write the statistics of the `count` revolutions up to `last` (from 0) to a row of RESULT."""
+    """Write the statistics over the `count` revolutions up to `last` (from 0) to `out`, a row of RESULT."""
     kept = trail.revolution.size
     first = trail.revolution[last % kept]
     for b in range(8):

@@ -1,4 +1,4 @@
-"""One joint from its start over a given number of steps, every state kept."""
+"""Simulation of one joint over a given number of steps, with every state recorded."""
 
 import math
 
@@ -28,7 +28,7 @@ def follow(par, options, work, state, points):
     par : record of PARAM
         The joint.
     options : Options
-        Numerical settings; nothing is said here of when a joint is settled.
+        Numerical settings; whether the joint settles is not checked.
     work, state : record of WORK, State
         Scratch.
     points : ndarray, shape (steps + 1, 3, 55)

@@ -1,1 +1,1 @@
-"""Compilation, and arithmetic of many joints at once."""
+"""Compilation of kernels, and SIMD arithmetic on several joints at once."""

@@ -1,8 +1,8 @@
-"""Memory as lanes want it: arrays without an owner, and records asked for before they are used.
+"""Arrays without reference counts, and prefetching of records.
 
-To pass on arrays that have no owner counts no reference, which took an eighth of the time in lanes. Revolutions of as
-many joints as there are lanes do not fit the cache of a core: who reads them in turn waits for each, unless they come
-while other lanes are at work.
+Arrays without an owner pass between kernels without reference counting, which took an eighth of the time in lanes. The
+sampled revolutions of all lanes do not fit the cache of a core: without prefetching, each lane would wait for its
+samples; with it, memory is read while other lanes compute.
 """
 
 from llvmlite import ir
@@ -25,7 +25,7 @@ def _borrow(context, builder, ty, value):
 
 @intrinsic
 def borrowed(typingctx, value):
-    """An array, or a tuple of arrays and what else, whose owner must outlive all that is done with it: the caller's."""
+    """Array, or tuple with arrays in it, without an owner; the caller must keep the memory alive meanwhile."""
 
     def codegen(context, builder, sig, args):
         return _borrow(context, builder, value, args[0])
@@ -34,11 +34,11 @@ def borrowed(typingctx, value):
 
 
 CACHE_LINE = 64
-"""Bytes that come at a time."""
+"""Bytes that the processor fetches at a time."""
 
 
 def fetch(record):
-    """Ask for the memory of a record that will be read and written soon."""
+    """Prefetch a record that will be read and written soon."""
 
 
 @intrinsic
@@ -51,7 +51,7 @@ def _fetch(typingctx, record):
         start = builder.bitcast(args[0], byte)
         for offset in range(0, sig.args[0].size, CACHE_LINE):
             line = builder.gep(start, [number(offset)])
-            builder.call(function, [line, number(1), number(3), number(1)])  # to write, to all caches, data
+            builder.call(function, [line, number(1), number(3), number(1)])  # for writing, all cache levels, data
         return context.get_dummy_value()
 
     return types.void(record), codegen

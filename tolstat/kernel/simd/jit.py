@@ -1,7 +1,7 @@
-"""The one ``njit`` of the kernel, and where its compiled code is cached.
+"""The one ``njit`` of the kernel, and the cache directory of its compiled code.
 
 Numba's cache notices an edit in the file of a cached function, but not in a file whose functions it calls. The
-cache directory therefore carries a hash of all kernel sources: code compiled from other sources is out of reach.
+name of the cache directory therefore has a hash of all kernel sources: code compiled from other sources is never used.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from numba.core.caching import UserProvidedCacheLocator
 
 try:
     from tolstat.kernel.simd.unit import Kernel
-except ImportError:  # a Numba with other internals: each function by itself, which takes minutes
+except ImportError:  # Numba's internals differ: compile each function separately, which takes minutes
     from numba.core.registry import CPUDispatcher as Kernel
 
 KERNEL = Path(__file__).parent.parent
 OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
-"""No ``fastmath``: it removes the checks for NaN. No ``parallel``: processes share the work."""
+"""No ``fastmath``: it removes the checks for NaN. No ``parallel``: the work is divided among processes."""
 
 
 def source_hash() -> str:
@@ -66,19 +66,19 @@ CACHE_DIRECTORY = cache_directory()
 
 
 class Locator(UserProvidedCacheLocator):
-    """Finds compiled kernels whatever the folder of their sources: one compilation serves every environment."""
+    """Cache locator that ignores the folder of the sources: one compilation serves every environment."""
 
     @classmethod
     def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """Folder below the cache directory, whose own name tells the sources apart."""
+        """Subfolder of the cache directory; the hash in the directory's name already identifies the sources."""
         own = Path(py_file).is_relative_to(KERNEL)
         return KERNEL.name if own else str(super().get_suitable_cache_subpath(py_file))
 
 
 def njit(function: Callable[..., Any]) -> Any:
-    """Compile `function` as every kernel is compiled, and keep what Python calls on disk."""
+    """Compile `function` with the kernel's options; code of a kernel that Python calls is cached on disk."""
     before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
-    # read when a function is decorated; other users' functions in this process keep their own directory
+    # Numba reads both when a function is decorated; functions of other packages keep their own directory
     config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = CACHE_DIRECTORY, f"{__name__}.{Locator.__name__}"
     try:
         kernel = closure(function)
@@ -95,9 +95,9 @@ def closure(function: Callable[..., Any]) -> Any:
 
 
 def bare(function: Any, *arguments: Any) -> Any:
-    """Compiled code of a kernel for arguments such as these, without numba's look at their types at each call.
+    """Compiled code of a kernel for the types of `arguments`, without Numba's type dispatch at each call.
 
-    That look takes longer than a residual of the joint. Other types than these must never be passed.
+    The dispatch takes longer than a residual of the joint. Arguments of other types must never be passed.
     """
     if not hasattr(function, "compile"):  # compilation is switched off
         return function

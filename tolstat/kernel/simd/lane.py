@@ -1,9 +1,9 @@
-"""Lanes: one value for each of several joints, in one SIMD register. The same kernels take plain numbers or lanes.
+"""Lanes: one value for each of several joints, in one SIMD register. Kernels accept plain numbers or lanes.
 
 `Lane` is a Numba type whose value is an LLVM vector of doubles, `Mask` one of booleans. Arithmetic, square root and
-comparison act on each lane by itself with the instructions that plain numbers use, so that a joint has the same bits in
-any lane, beside any neighbour, or alone. A mask decides no ``if``: kernels choose with `where`, and skip work with
-`any_of`, `all_of`.
+comparison act on each lane separately with the instructions that plain numbers use, so that a joint has the same bits
+in any lane, beside any other joints, or alone. A mask cannot be the condition of an ``if``: kernels select values with
+`where`, and skip work with `any_of`, `all_of`.
 """
 
 import math
@@ -17,14 +17,14 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, lower_cast, overload, register_model
 
 WIDTH = 8 if get_host_cpu_features().get("avx512f") else 4
-"""Joints in lock-step: those that a register holds, of 512 or 256 bits. No result depends on it."""
+"""Number of lanes: doubles in a register of 512 or 256 bits. No result depends on it."""
 
 DOUBLES = ir.VectorType(ir.DoubleType(), WIDTH)
 BOOLS = ir.VectorType(ir.IntType(1), WIDTH)
 
 
 class LaneType(types.Type):
-    """`WIDTH` doubles, one of each joint."""
+    """`WIDTH` doubles, one per joint."""
 
     bitwidth = 64 * WIDTH
 
@@ -32,11 +32,11 @@ class LaneType(types.Type):
         super().__init__(name=f"Lane{WIDTH}")
 
     def unify(self, typingctx, other):
-        """Plain numbers beside lanes become lanes."""
+        """Common type of lanes and plain numbers: lanes."""
         return self if isinstance(other, types.Integer | types.Float) else None
 
     def can_convert_from(self, typingctx, other):
-        """Plain numbers are the same in all lanes."""
+        """Plain numbers convert to lanes: the same value in every lane."""
         from numba.core.typeconv import Conversion
 
         return Conversion.safe if isinstance(other, types.Integer | types.Float) else None
@@ -49,11 +49,11 @@ class MaskType(types.Type):
         super().__init__(name=f"Mask{WIDTH}")
 
     def unify(self, typingctx, other):
-        """Plain booleans beside masks become masks."""
+        """Common type of masks and plain booleans: masks."""
         return self if isinstance(other, types.Boolean) else None
 
     def can_convert_from(self, typingctx, other):
-        """Plain booleans are the same in all lanes."""
+        """Plain booleans convert to masks: the same value in every lane."""
         from numba.core.typeconv import Conversion
 
         return Conversion.safe if isinstance(other, types.Boolean) else None
@@ -100,7 +100,7 @@ def _number(ty):
 
 
 def _operator(function, returns, operands, allowed, emit):
-    """Give a Python operator or function a meaning for lanes or masks; `emit` (builder, *values) is its code."""
+    """Define a Python operator or function for lanes or masks; `emit` (builder, *values) generates its code."""
 
     class Template(AbstractTemplate):
         def generic(self, args, kws):
@@ -151,7 +151,7 @@ _operator(min, LANE, 2, LANE, lambda builder, a, b: builder.select(builder.fcmp_
 
 
 def _each(function_name):
-    """Scalar libm call on each lane."""
+    """Code generator: a scalar libm call for each lane."""
 
     def emit(builder, value):
         function = cgutils.get_or_insert_function(
@@ -223,7 +223,7 @@ def _extract(typingctx, lanes, lane):
 
 
 def pick(value, lane):
-    """Value of the joint in `lane`; the value itself where there is one joint."""
+    """Value of the joint in `lane`; a plain number is returned as it is."""
     return value
 
 
@@ -233,7 +233,7 @@ def _pick(value, lane):
 
 
 def fma(a, b, c):
-    """Return a b + c, rounded once where it is compiled."""
+    """Return a b + c; compiled code rounds once."""
     return a * b + c
 
 
@@ -262,10 +262,10 @@ def where(condition, a, b):
 
 
 def retain(condition, new, old):
-    """`new` where the condition holds, else `old`, which lies where the result goes.
+    """`new` where the condition holds, else `old`, the value now stored at the place of the result.
 
-    The whole is written, as it is cheap. `where` would become a store of some lanes, which takes many cycles on some
-    processors.
+    All lanes are stored, which is cheap. With `where`, the compiler would make a masked store, which takes many cycles
+    on some processors.
     """
     return new if condition else old
 

@@ -1,11 +1,11 @@
-"""Kernels that call each other become machine code once, as one unit: that of the kernel that Python calls.
+"""Compilation of a kernel that Python calls and of all its callees as one unit, instead of function by function.
 
-Numba optimises and emits each function by itself, with a copy of all that it calls: level by level the same code
-again. Here a kernel that kernels call stays intermediate code. The one that Python calls takes in each one below it
-once, and is optimised, emitted and cached with them as a whole.
+Numba optimises and emits each function separately, with a copy of all its callees: the same code again at each level of
+calls. Here a kernel that is called by kernels stays intermediate code. The kernel that Python calls links each of its
+direct and indirect callees once, and is optimised, emitted and cached together with them.
 
-This is the one place that leans on Numba's internals. Where they have moved, importing it fails and `_jit` compiles as
-Numba does; where they mean something else, ``tests/kernel/test_compilation.py`` fails.
+This is the one module that depends on Numba's internals. If names in them change, its import fails and `jit` compiles
+as Numba does; if their meaning changes, ``tests/kernel/test_compilation.py`` fails.
 """
 
 from llvmlite.binding import Linkage
@@ -22,14 +22,14 @@ if not all(hasattr(JITCodeLibrary, name) for name in NEEDED):
 
 
 class Unit(JITCodeLibrary):
-    """Intermediate code of a kernel; machine code of it and of all below once that is asked for."""
+    """Intermediate code of a kernel; `finalize` makes machine code of it and of all its callees."""
 
     def add_linking_library(self, library):
-        """Remember what is called, as it is."""
+        """Keep the library of a callee without linking it yet."""
         self._linking_libraries.append(library)
 
     def below(self):
-        """Modules of everything that is called from here, directly or not, each once."""
+        """Modules of all direct and indirect callees, each once."""
         found, waiting, others = {self}, [self], []
         while waiting:
             for library in waiting.pop()._linking_libraries:
@@ -42,11 +42,11 @@ class Unit(JITCodeLibrary):
                     yield library._final_module
                 else:
                     others.append(library)
-        for library in others:  # last: the linker takes of these what is called by then, and nothing else
+        for library in others:  # last: the linker takes only functions that are referenced by then
             yield library._get_module_for_linking()
 
     def finalize(self):
-        """Take in everything below, optimise, and emit."""
+        """Link all callees, optimise, and emit machine code."""
         self._raise_if_finalized()
         module = self._final_module
         own = {function.name for function in module.functions}
@@ -54,7 +54,7 @@ class Unit(JITCodeLibrary):
             module.link_in(other, preserve=True)
         for function in module.functions:
             if not function.is_declaration and function.name not in own:
-                function.linkage = Linkage.internal  # nobody else calls this copy: what is inlined can go
+                function.linkage = Linkage.internal  # no other code calls this copy: delete it where it is inlined
         self._optimize_final_module()
         module.verify()
         self._finalize_final_module()
@@ -62,7 +62,7 @@ class Unit(JITCodeLibrary):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class IntoUnit(LoweringPass):
-    """Have a kernel lowered into a `Unit`."""
+    """Compiler pass: make the `Unit` that the kernel is lowered into."""
 
     _name = "into_unit"
 
@@ -70,7 +70,7 @@ class IntoUnit(LoweringPass):
         super().__init__()
 
     def run_pass(self, state):
-        """Make the unit."""
+        """Create the unit."""
         state.library = Unit(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return False
@@ -78,7 +78,7 @@ class IntoUnit(LoweringPass):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class AnnouncePart(LoweringPass):
-    """Tell Numba how a kernel without machine code is called."""
+    """Compiler pass: register a kernel without machine code as callable by other kernels."""
 
     _name = "announce_part"
 
@@ -86,19 +86,19 @@ class AnnouncePart(LoweringPass):
         super().__init__()
 
     def run_pass(self, state):
-        """Register what was lowered."""
+        """Register the lowered kernel under a new key."""
         lowered = state["cr"]
-        key = object()  # stands where the function that Python calls does otherwise
+        key = object()  # in place of the compiled function, which does not exist
         state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
         state["cr"] = lowered._replace(cfunc=key)
         return False
 
 
 class Whole(Compiler):
-    """Compiles a kernel that Python calls."""
+    """Compiler of a kernel that Python calls."""
 
     def define_pipelines(self):
-        """Numba's, into a unit."""
+        """Numba's pipeline, lowering into a `Unit`."""
         (passes,) = super().define_pipelines()
         passes.add_pass_after(IntoUnit, AnnotateTypes)
         passes.finalize()
@@ -106,14 +106,14 @@ class Whole(Compiler):
 
 
 class Part(Whole):
-    """Compiles a kernel that kernels call."""
+    """Compiler of a kernel that kernels call."""
 
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, locals):
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
         super().__init__(typingctx, targetctx, library, args, return_type, flags, locals)
 
     def define_pipelines(self):
-        """Numba's, into a unit that is not emitted."""
+        """Numba's pipeline, lowering into a `Unit` without machine code."""
         (passes,) = super().define_pipelines()
         passes.add_pass_after(AnnouncePart, NativeLowering)
         passes.finalize()
@@ -121,15 +121,15 @@ class Part(Whole):
 
 
 class Callee(CPUDispatcher):
-    """A kernel as kernels see it."""
+    """Dispatcher of a kernel for calls from kernels."""
 
     def add_overload(self, cres):
-        """Keep for type inference; there is nothing that Python could call."""
+        """Keep the overload for type inference; it has no entry point for Python."""
         self.overloads[tuple(cres.signature.args)] = cres
 
 
 class Kernel(CPUDispatcher):
-    """A kernel as Python sees it."""
+    """Dispatcher of a kernel for calls from Python."""
 
     def __init__(self, py_func, locals=None, targetoptions=None, pipeline_class=Whole):
         super().__init__(py_func, locals, targetoptions, pipeline_class)
@@ -137,5 +137,5 @@ class Kernel(CPUDispatcher):
 
     @property
     def _numba_type_(self):
-        """What it is to a kernel that calls it."""
+        """Numba type of the kernel inside other kernels."""
         return Dispatcher(self.callee)

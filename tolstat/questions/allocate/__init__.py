@@ -1,1 +1,1 @@
-"""Which tolerances to change, for what they cost."""
+"""Cheapest tolerances with which limits are kept."""

@@ -1,4 +1,4 @@
-"""The cheapest tolerances with which a campaign keeps its limits, from its own joints."""
+"""The cheapest tolerances with which a campaign keeps its limits, estimated from its own joints."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from tolstat.study.tolerances.distributions import Distribution, Normal, Rayleig
 
 EXAMPLE = 'write --limit "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3
-"""Of the tolerances proposed."""
+"""Significant digits of the tolerances proposed."""
 CHOOSING = 0.999
-"""Confidence of the intervals that are aimed at: so far from the limit that the judges, who have 0.95, mostly agree."""
+"""Confidence level of the search: higher than the 0.95 of the final check, so that the check mostly confirms it."""
 MOST = 50_000
-"""Joints that choose; more are for judging."""
+"""Maximum number of joints used in the search; all others are used in the final check."""
 
 
 class Allocation(NamedTuple):
@@ -46,19 +46,19 @@ class Allocation(NamedTuple):
     study : Study
         The study as it is.
     tolerances : DataFrame
-        One row a tolerance that may change: ``tolerance`` (pattern), ``errors`` (how many), ``unit``, ``before`` and
+        One row per tolerance that may change: ``tolerance`` (pattern), ``errors`` (how many), ``unit``, ``before`` and
         ``proposed`` (half band, SI), ``factor``, ``cost_before``, ``cost``.
     limits : DataFrame
-        One row a limit, judged by joints that had no part in the choice: ``limit``, ``target``, ``before`` (share of
-        all joints as drawn), ``estimate``, ``lower``, ``upper``, ``ess``.
+        One row per limit, from joints that the search did not use: ``limit``, ``target``, ``before`` (share of all
+        joints as drawn), ``estimate``, ``lower``, ``upper``, ``ess``.
     entries : dict
         Keys of the changed entries of ``[tolerances]`` by pattern.
     weights : Weights
-        Of the joints that judged.
+        Weights of the joints of the final check.
     aim : str
         See `analysis.allocation.Choice`.
     more : float
-        How many times as many joints, made to the proposal, would show that it holds; inf where it is not expected to.
+        Factor on ``weights.ess``: joints made to the proposal that would show that it holds; inf if not expected to.
     """
 
     study: Study
@@ -71,12 +71,12 @@ class Allocation(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether the joints show it: upper ends below the targets, by weights that can be trusted."""
+        """Whether the final check confirms the proposal: reliable weights, and all upper ends below the targets."""
         return self.weights.usable and bool((self.limits["upper"] < self.limits["target"]).all())
 
     @property
     def verdict(self) -> str:
-        """Sentence on what the proposal is worth."""
+        """Sentence on whether the proposal holds, or why it needs new runs."""
         w = self.weights
         figures = (
             f"{len(w.values)} joints judged, they count as {w.ess:.0f}; Pareto k {w.k:.2f}, {w.allowed:.2f} allowed"
@@ -92,7 +92,7 @@ class Allocation(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The study with the proposal, TOML. Its seed is another one: joints that chose have no part in the check."""
+        """The study with the proposal, TOML, with another seed: a check must not use the joints of the search."""
         return scaling.rewritten(self.study, self.entries, self.study.sampling.seed + 1)
 
 
@@ -104,36 +104,36 @@ def of_store(
     study_path: Path | None = None,
     confidence: float = 0.95,
 ) -> Allocation:
-    """Propose the cheapest tolerances with which limits are kept.
+    """Propose the cheapest tolerances that keep the limits.
 
     Parameters
     ----------
     store : ResultStore
         The result file, of joints drawn from tolerances.
     limits : sequence of str
-        ``"P(cross*.F > 700 N) < 0.001"``: the share of joints of which any of these loads is above the level. Joints
-        without a valid load count as above.
+        ``"P(cross*.F > 700 N) < 0.001"``: share of the joints with any of these loads above the level. Joints without a
+        valid load count as above.
     cost_file : Path, optional
         See `study.costs.of`.
     keep : sequence of str
         Names or patterns of errors whose tolerances stay as they are.
     study_path : Path, optional
-        The study file, where the text in the result file does not do any more.
+        Study file to read if the text in the result file can no longer be read.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
 
     Returns
     -------
     Allocation
-        One factor an entry of the study's ``[tolerances]``; those of operating point and material, of measured parts
-        and of correlated errors stay as they are.
+        One factor per entry of the study's ``[tolerances]``; entries of the operating point, the material, measured
+        parts and correlated errors are not changed.
 
     Raises
     ------
     InputError
         With every fault of limits, costs and names.
     StoreError
-        When the file's joints are not drawn from tolerances, or too few.
+        When the file's joints are not drawn from tolerances, are drawn in groups, or are too few.
 
     Examples
     --------
@@ -188,7 +188,7 @@ def of_store(
 
 
 class _Ratios:
-    """Logarithms of new over old density of joints, by factors on their tolerances; the last ones are remembered."""
+    """Log likelihood ratios (new over old density) of joints as a function of factors on tolerances; with a cache."""
 
     def __init__(self, free: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
         self._free = free
@@ -198,22 +198,22 @@ class _Ratios:
         self._one = lru_cache(maxsize=4 * len(free))(self._scaled)
 
     def at(self, factors: FloatArray) -> FloatArray:
-        """Of tolerances scaled by factors, (n,)."""
+        """Log ratios for tolerances scaled by factors, (n,)."""
         return np.asarray(sum(self._one(i, float(f)) for i, f in enumerate(factors)))
 
     def log_spread(self, factors: FloatArray) -> float:
-        """See `analysis.allocation.Problem`; inf where the ratio has no mean square."""
+        """See `analysis.allocation.Problem`; inf if the ratio has no finite mean square."""
         return float(sum(len(t.names) * self._spread(i, float(factors[i])) for i, t in enumerate(self._free)))
 
     def of(self, entries: dict[str, dict[str, Any]]) -> FloatArray:
-        """Of other entries, by pattern, (n,)."""
+        """Log ratios for other entries, by pattern, (n,)."""
         parts = [self._density(i, entries.get(t.pattern, t.entry)) for i, t in enumerate(self._free)]
         return np.asarray(sum(parts) - sum(self._before))
 
     def _scaled(self, i: int, factor: float) -> FloatArray:
         old, t = self._old[i], self._free[i]
         if isinstance(old, (Normal, Rayleigh)) and scaling.unbounded(old) and "mean" not in t.entry:
-            # what the entry would give, without reading it anew; the judges go by the entry
+            # same as the scaled entry, but without parsing it; the final check uses the entry
             return self._logpdf(i, replace(old, sigma=factor * old.sigma)) - self._before[i]
         return self._density(i, t.scaled(factor)) - self._before[i]
 
@@ -226,7 +226,7 @@ class _Ratios:
     def _spread(self, i: int, factor: float) -> float:
         """Logarithm of the mean square of new over old density of one error."""
         old = self._old[i]
-        if scaling.unbounded(old):  # 1 / (r sqrt(2 - r^2)) for r times the deviation, twice for a radius
+        if scaling.unbounded(old):  # 1 / (r sqrt(2 - r^2)) for r times the deviation, squared for a radius
             square = 2.0 - factor**2
             coordinates = 2 if isinstance(old, Rayleigh) else 1
             return -coordinates * math.log(factor * math.sqrt(square)) if square > 0 else math.inf
@@ -238,7 +238,7 @@ class _Ratios:
 def _asked(
     store: ResultStore, study: Study, limits: Sequence[str], cost_file: Path | None, keep: Sequence[str]
 ) -> tuple[list[Statement], list[Tolerance], list[Cost]]:
-    """Limits, and tolerances that may change with their costs."""
+    """Parsed limits, tolerances that may change, and the costs of these."""
     faults: list[Fault] = []
     statements: list[Statement] = []
     for text in limits:

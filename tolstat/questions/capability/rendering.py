@@ -18,22 +18,22 @@ BLOCK = 1 << 16
 
 
 def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Capability against each limit, and of the joint against all of them together.
+    """Capability against each limit, and against all limits together.
 
     Parameters
     ----------
     campaign : Campaign
         A campaign of a study with limits.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
 
     Returns
     -------
     DataFrame
-        One row a limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above);
-        ``good`` and ``ppm`` with ``_lower`` and ``_upper``, unresolved joints counted both ways; ``cpk`` (of
-        quantiles) and ``cpk_normal`` with their ends, ``normal_p``, ``needed``. The last row, `TOGETHER`, is for the
-        largest of the loads over their limits.
+        One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above);
+        ``good`` and ``ppm`` with ``_lower`` and ``_upper``, which count unresolved joints below and above the limit;
+        ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``, ``needed``. The last row,
+        `TOGETHER`, is for the largest ratio of load to limit of each joint.
     """
     status, table = campaign.results["status"], campaign.results
     columns = {name: load(campaign.results, name) for name in campaign.limits}
@@ -56,7 +56,7 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
 
 
 def _utilization(columns: Sequence[FloatArray], campaign: Campaign) -> FloatArray:
-    """Largest of each joint's loads over their limits; by blocks, since all loads of a million joints are large."""
+    """Largest ratio of load to limit of each joint; computed in blocks to save memory."""
     levels, blocks = list(campaign.limits.values()), range(0, len(campaign.results), BLOCK)
     parts = (np.column_stack([values[first : first + BLOCK] for values in columns]) for first in blocks)
     return np.concatenate([np.empty(0), *(capability.utilization(part, levels) for part in parts)])
@@ -74,21 +74,21 @@ def returns(
     names : sequence of str
         Loads.
     one_in : sequence of float
-        Numbers of joints N, so large that one in N is in the tail.
+        Numbers of joints N, so large that the load exceeded by one joint in N lies in the fitted tail.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
 
     Returns
     -------
     DataFrame
-        One row a load and N: ``load``, ``unit``, ``one_in``, ``estimate``, ``lower``, ``upper``, ``bound_lower``,
-        ``bound_upper`` (unresolved joints below, above), ``fleet``, ``fleet_lower``, ``fleet_upper``, ``shape``,
-        ``shape_lower``, ``shape_upper``, ``p`` (goodness of the fit), ``n_above``. SI units.
+        One row per load and N: ``load``, ``unit``, ``one_in``, ``estimate``, ``lower``, ``upper``, ``bound_lower`` and
+        ``bound_upper`` (unresolved joints counted below, above), ``fleet``, ``fleet_lower``, ``fleet_upper``,
+        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``. SI units.
 
     Raises
     ------
     ValueError
-        When the tail has too few joints (`TooThinError`), or one in N is not in it.
+        When the tail has too few joints (`TooThinError`), or N is too small to lie in it.
     """
     rows = []
     for name in names:
@@ -105,7 +105,7 @@ def returns(
 
 
 def text(table: pd.DataFrame) -> str:
-    """Text of `limits`: one line a limit."""
+    """Text of `limits`: one line per limit."""
     rows = [["load", "limit", "joints", "above", "ppm", "95 % interval", "Cpk", "95 % interval", "if normal"]]
     for row in table.to_dict("records"):
         unit = "" if row["unit"] == "1" else f" {row['unit'].replace('*', ' ')}"
@@ -117,7 +117,7 @@ def text(table: pd.DataFrame) -> str:
 
 
 def note(table: pd.DataFrame) -> str:
-    """Sentences on what the table stands on."""
+    """Notes to the table: definitions, unresolved joints, restrictions."""
     lines = ["limits are upper limits: Cpk is Cpu, of median and 99.865 % quantile (ISO 22514-2), and there is no Cp"]
     unresolved = int((table["n_failed"] + table["n_unsettled"]).iloc[0])
     if unresolved:

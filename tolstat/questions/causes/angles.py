@@ -22,12 +22,12 @@ from tolstat.store.revolutions import FloatArray, Revolutions, read
 from tolstat.study import Study
 
 JOINTS = 1000
-"""Joints that are looked at, the first valid ones of the campaign: some 2 s where they are simulated again."""
+"""Default number of joints evaluated, the first valid ones: some 2 s if they are simulated again."""
 FEWEST = 100
-"""Joints below which shares are not given."""
+"""Minimum number of joints for shares to be given."""
 DRAWN = ("random", "sobol", "lhs")
 SPREAD = (0.05, 0.5, 0.95)
-"""Shares of the joints that stay below the loads shown."""
+"""Shares of the joints at which quantiles of the load are shown."""
 
 
 class AgainstAngle(NamedTuple):
@@ -38,19 +38,19 @@ class AgainstAngle(NamedTuple):
     load, unit : str
         ``cross1.F``: the modulus of the bushing's force at an angle, not its largest over the revolution; SI unit.
     joints : int
-        Joints that it rests on.
+        Number of joints evaluated.
     origin, apart
-        As of `revolutions.Revolutions`.
+        As in `revolutions.Revolutions`.
     angles : ndarray, shape (k,)
         Input angles, rad.
     nominal : ndarray, shape (k,)
-        Load of the joint without errors; NaN where there is none.
+        Load of the nominal joint; NaN if there is none that settled.
     spread : ndarray, shape (3, k)
-        Loads that the shares `SPREAD` of the joints stay below.
+        Quantiles of the load over the joints, at the shares `SPREAD`.
     names : tuple of str
-        Errors, the largest share over the revolution first.
+        The d errors, in descending order of their share over the revolution.
     first : FirstOrder
-        Shares of the variance, or of that of the logarithm, at each angle, (d, k); variance (k,).
+        Shares of the variance (or of the variance of the logarithm) at each angle, (d, k); variance (k,).
     overall : FirstOrder
         Shares over the whole revolution, (d,).
     """
@@ -68,7 +68,7 @@ class AgainstAngle(NamedTuple):
     overall: FirstOrder
 
     def table(self) -> pd.DataFrame:
-        """One row an angle and error: ``theta`` (rad), ``load``, ``unit``, ``std``, ``error``, ``share`` with ends."""
+        """One row per angle and error: ``theta`` (rad), ``load``, ``unit``, ``std``, ``error``, ``share``, ends."""
         k, d = len(self.angles), len(self.names)
         return pd.DataFrame(
             {
@@ -102,9 +102,9 @@ def of_store(
     loads : sequence of str
         ``cross1.F`` to ``fork4.T``.
     joints : int
-        How many joints are looked at: the first valid ones. Without stored histories they are simulated again.
+        Number of joints evaluated, the first valid ones. Without stored histories they are simulated again.
     logarithmic : container of str
-        Those of the loads whose shares are of the variance of the logarithm.
+        Loads for which the variance of the logarithm is decomposed.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def of_store(
     Raises
     ------
     InputError
-        When a load is none of a bushing.
+        When a name is not the load of a bushing.
     StoreError
         When the joints are not drawn from tolerances, or fewer than `FEWEST` are valid.
     """

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tolstat.questions.causes.angles import AgainstAngle
 
 LINES = 4
-"""Errors whose share is drawn."""
+"""Number of errors whose share is drawn."""
 ORIGIN = {
     "stored": "from the histories in the file",
     "harmonics": "restored from the harmonics in the file",
@@ -26,7 +26,7 @@ ORIGIN = {
 
 
 def text(found: AgainstAngle, shown: int = 12) -> str:
-    """Table of the `shown` errors with the largest share over the revolution, and where their share is largest."""
+    """Table of the `shown` errors with the largest share over the revolution, and the angle of its maximum."""
     rows = [["error", "revolution, %", "95 % interval", "largest, %", "at, deg"]]
     for i, name in enumerate(found.names[:shown]):
         share, low, high = (100.0 * part[i] for part in found.overall[:3])
@@ -38,7 +38,7 @@ def text(found: AgainstAngle, shown: int = 12) -> str:
 
 
 def note(found: AgainstAngle, log: bool = False) -> str:
-    """Sentences on what the shares stand on."""
+    """Notes to the shares: joints, source of the histories, bias correction."""
     said = (
         f"Against the angle: the first {found.joints} settled joints, {ORIGIN[found.origin]}; bands are 95 % at each "
     )
@@ -50,7 +50,7 @@ def note(found: AgainstAngle, log: bool = False) -> str:
 
 
 def save(found: AgainstAngle, log: bool, path: Path) -> list[Path]:
-    """Draw load and shares below each other, as PNG; the file written."""
+    """Draw the load above the shares; return the file written, in the format that the suffix of `path` names."""
     with style.settings():
         figure = Figure(figsize=(8.0, 7.6), layout="constrained")
         upper, lower = figure.subplots(2, 1)
@@ -62,18 +62,18 @@ def save(found: AgainstAngle, log: bool, path: Path) -> list[Path]:
 
 
 def closed(values: FloatArray) -> FloatArray:
-    """A revolution with its first sample at the end again."""
+    """Append the first sample of a revolution to its end."""
     return np.concatenate([values, values[..., :1]], axis=-1)
 
 
 def theta_axis(ax: Axes, angles: FloatArray) -> FloatArray:
-    """Make the x axis one of shaft angles; the angles in degrees, closed to a revolution."""
+    """Set up the x axis for shaft angles; return the angles in degrees, with 360 appended."""
     ax.set(xlim=(0.0, 360.0), xticks=range(0, 361, 60), xlabel="input shaft angle θ [deg]")
     return np.append(np.degrees(angles), 360.0)
 
 
 def loads(ax: Axes, angle: AgainstAngle) -> None:
-    """Draw a load over the revolution: the joint without errors, and how the others scatter."""
+    """Draw a load over the revolution: nominal joint, median and 5 to 95 % band of the others."""
     theta = theta_axis(ax, angle.angles)
     low, middle, high = closed(angle.spread)
     ax.fill_between(theta, low, high, color=style.COLOURS[0], alpha=0.2, lw=0, label="5 to 95 % of the joints")
@@ -86,7 +86,7 @@ def loads(ax: Axes, angle: AgainstAngle) -> None:
 
 
 def shares(ax: Axes, angle: AgainstAngle) -> None:
-    """Draw the shares of the variance of the errors that have the largest over the revolution."""
+    """Draw the shares of the variance of the `LINES` errors with the largest share over the revolution."""
     theta = theta_axis(ax, angle.angles)
     ceiling = 0.0
     for i, name in enumerate(angle.names[:LINES]):

@@ -1,4 +1,4 @@
-"""The errors that make a load of a campaign scatter, and those that make its tail."""
+"""Causes of a load: errors that contribute to its variance, and errors over-represented in its tail."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from tolstat.study.selection import LIMIT_UNITS, columns_of
 from tolstat.study.tolerances.distributions import score
 
 TAIL = 0.9
-"""Share of the joints below the tail of a load that has no limit."""
+"""Share of the joints below the tail, for a load without a limit."""
 MOST = sensitivity.MOST
-"""Joints that shares, ranks and either side of the tail are read from at most, the first ones: more tell little more,
-and a million joints with fifty errors do not fit into a gigabyte."""
+"""Maximum number of joints (the first ones) for shares and ranks, and on either side of the tail: more add little, and
+a million joints with fifty errors do not fit into a gigabyte."""
 JOINTS = 200
-"""Valid joints that causes are asked of at least."""
+"""Minimum number of valid joints."""
 
 
 class Causes(NamedTuple):
@@ -40,22 +40,22 @@ class Causes(NamedTuple):
     load : str
         Its name.
     joints, used, lost : int
-        Valid joints; those of them, `MOST` at most, that shares and ranks are read from; and joints without a valid
-        load, of which the causes are not known.
+        Number of valid joints; of those used for shares and ranks, at most `MOST`; of joints without a valid load,
+        which are left out.
     level, above : float, int
-        Level that the tail begins at, SI, and joints above it: the study's limit, or the 90 % quantile where there is
-        none.
+        Level at which the tail begins, SI (the study's limit or, without one, the 90 % quantile), and number of joints
+        above it.
     unit : str
         SI unit of the load.
     std : float
         Standard deviation of the load, or of its logarithm.
     additive, r2 : float
-        Sum of the first-order indices; share that rank regression explains.
+        Sum of the first-order indices; R^2 of the rank regression, NaN for a pick-freeze design.
     table : DataFrame
-        One row an error that scatters, the largest first-order index first: ``error``, then each with ``_lower`` and
-        ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``; ``direction`` and ``size``, with ``_p``
-        (NaN where too few joints are above the level). Of a pick-freeze design one row a group of errors, with
-        ``first`` and ``total`` only.
+        One row per error that scatters, the largest first-order index first: ``error``; with ``_lower`` and ``_upper``:
+        ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and ``size``; the last two also with
+        ``_p``, and NaN if too few joints are on either side of the level. For a pick-freeze design, one row per group
+        of errors, with ``first`` and ``total`` only.
     """
 
     load: str
@@ -83,11 +83,11 @@ def of_store(
     by : str
         A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
     study_path : Path, optional
-        The study file, where the text in the result file does not do any more.
+        Study file to read if the text in the result file can no longer be read.
     confidence : float
-        Of all intervals.
+        Confidence level of all intervals.
     log : bool
-        Give shares of the variance of the load's logarithm: for a load of which a few joints make the variance.
+        Decompose the variance of the load's logarithm: for a load whose variance a few joints dominate.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def of_store(
     Raises
     ------
     InputError
-        When there is no such load.
+        When there is no such load, or `log` is set and a value is not positive.
     StoreError
         When the file has too few valid joints, or joints that are not drawn from tolerances.
 
@@ -130,16 +130,16 @@ def of_campaign(
     log: bool = False,
     place: str = "the campaign",
 ) -> Causes:
-    """Find the causes of a load among joints that are in memory already; parameters and errors as `of_store`.
+    """Find the causes of a load from joints in memory; other parameters and exceptions as for `of_store`.
 
     Parameters
     ----------
     campaign : Campaign
-        The joints, or some of them, each counting the same.
+        All or some of the joints, all of the same weight.
     study : Study
         Their study.
     place : str
-        What to call them in a message.
+        Name of the joints in error messages.
     """
     return _of_joints(campaign, study, by, confidence, log, place, lambda rows: campaign.errors[rows])
 
@@ -153,7 +153,7 @@ def _of_joints(
     place: str,
     errors: Callable[[NDArray[np.intp]], NDArray[np.void]],
 ) -> Causes:
-    """Causes, with the errors of the joints that are looked at from a function of their places."""
+    """Causes of a load; `errors` returns the errors of the joints at given indices of the campaign."""
     values, unit = source.load(campaign.results, by)
     status = campaign.results["status"]
     rows = np.flatnonzero(np.isin(status, VALID) & np.isfinite(values))
@@ -217,7 +217,7 @@ def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: b
 
 
 def scattering(study: Study, errors: NDArray[np.void]) -> list[str]:
-    """Names of the tolerances of a study whose errors differ in the joints of a table ERROR."""
+    """Names of the tolerances of a study whose errors vary over the joints of a table ERROR."""
     return [name for name in study.tolerances if np.ptp(sampling.values(errors, name)) > 0]
 
 

@@ -15,23 +15,23 @@ SIGNIFICANT = 0.05
 
 
 def text(causes: Causes, shown: int = 12) -> str:
-    """Text of `rows`."""
+    """Aligned text of `rows`."""
     return align(rows(causes, shown))
 
 
 def rows(causes: Causes, shown: int = 12) -> list[list[str]]:
-    """Table of the `shown` errors with the largest first-order indices, and those that play a part in the tail.
+    """Table of the `shown` errors with the largest first-order indices, and of those with an effect on the tail.
 
     Returns
     -------
     list of list of str
-        Headings, then a row an error: shares of the variance in per cent, rank coefficients, and the probability that
-        a joint of the tail has the larger error (``direction``) and the error farther from the middle (``size``), each
-        with its interval; ``*`` marks what chance does not explain. Columns that are not known are left out.
+        Headings, then one row per error: shares of the variance in per cent and rank coefficients, with intervals;
+        probability that a joint of the tail has the larger error (``direction``) and the error farther from the middle
+        (``size``), where ``*`` marks p < `SIGNIFICANT`. Columns without values are left out.
     """
     table = causes.table
     marked = (table["direction_p"] < SIGNIFICANT) | (table["size_p"] < SIGNIFICANT)
-    total = _interval if math.isnan(causes.r2) else _ends  # from given data there are but bounds
+    total = _interval if math.isnan(causes.r2) else _ends  # given data yield bounds only
     lines = [["error", "alone, %", "in all, %", "rank coefficient", "tail: larger", "tail: farther out"]]
     for row in table[(table.index < shown) | marked].to_dict("records"):
         line = [row["error"], _interval(row, "first", 100), total(row, "total", 100), _interval(row, "srrc")]
@@ -41,7 +41,7 @@ def rows(causes: Causes, shown: int = 12) -> list[list[str]]:
 
 
 def note(causes: Causes, log: bool = False) -> str:
-    """Sentences on what the table stands on."""
+    """Notes to the table: number of joints, explained variance, restrictions."""
     unit = UNITS.get(causes.unit, causes.unit)
     std = f"{causes.std:.4g}, of the logarithm" if log else f"{causes.std:.4g} {unit}".rstrip()
     tail = f"tail: {causes.above} joints above {causes.level:.5g} {unit}".rstrip()

@@ -24,7 +24,7 @@ SHOWN = 10
 
 
 def section(found: tuple[Causes, ...], against: tuple[AgainstAngle, ...], logarithmic: Container[str]) -> Section:
-    """Which errors make the leading loads scatter; those of `logarithmic` loads are the causes of their logarithm."""
+    """Which errors make the leading loads scatter; for `logarithmic` loads, the variance of the logarithm is used."""
     blocks: list[Block] = []
     if found:
         blocks.append(Text(_reading(found, logarithmic)))
@@ -44,7 +44,7 @@ def section(found: tuple[Causes, ...], against: tuple[AgainstAngle, ...], logari
 
 
 def _of(load: str, logarithmic: Container[str]) -> str:
-    """What the shares are of: a load with a long tail is taken by its logarithm."""
+    """Name of the decomposed quantity: the load, or its logarithm for a load with a long tail."""
     return f"log {load}" if load in logarithmic else load
 
 
@@ -61,9 +61,9 @@ def _reading(found: tuple[Causes, ...], logarithmic: Container[str]) -> str:
 
 
 def _telling(causes: Causes) -> bool:
-    """Whether the bounds of the total indices say something of the errors shown."""
+    """Whether the bounds of the total indices are narrow enough to be shown: median width below 0.5."""
     part = causes.table.head(SHOWN)
-    return bool((part["total_upper"] - part["total_lower"]).median() < 0.5)  # none: NaN
+    return bool((part["total_upper"] - part["total_lower"]).median() < 0.5)  # false without bounds (NaN)
 
 
 def _tornado_panel(causes: Causes, of: str) -> Panel:

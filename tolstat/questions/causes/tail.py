@@ -1,4 +1,4 @@
-"""The joints behind the tail of a load: which errors made them so."""
+"""The joints in the tail of a load, with their errors."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class TailJoint(NamedTuple):
     value : float
         The load, SI.
     status : Status
-        Loads of a joint that is not settled belong to the revolution recorded.
+        Its status; the load of a joint that is not settled is that of the recorded revolution.
     scores : dict of str to float
-        Each error that scatters, in sigma (`tolerance.score`), the largest first.
+        Each error with a tolerance, in sigma (`distributions.score`), in descending order of the modulus.
     """
 
     row: int
@@ -60,9 +60,9 @@ def worst(store: ResultStore, by: str, n: int = 10, study_path: Path | None = No
     by : str
         A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or a column of the results.
     n : int
-        How many.
+        Maximum number of joints.
     study_path : Path, optional
-        The study file, where the text in the result file does not do any more.
+        Study file to read if the text in the result file can no longer be read.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def worst(store: ResultStore, by: str, n: int = 10, study_path: Path | None = No
 def describe(
     store: ResultStore, study: Study, rows: NDArray[np.intp], values: NDArray[np.float64], status: NDArray[np.uint8]
 ) -> list[TailJoint]:
-    """Put the errors of joints beside their loads.
+    """Combine the loads of joints with their errors.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def describe(
     study : Study
         Its study.
     rows : ndarray of int, shape (m,)
-        Rows of the file.
+        File slots of the joints.
     values, status : ndarray, shape (m,)
         Their load and `tables.Status`.
     """
@@ -126,7 +126,7 @@ def _values(results: NDArray[np.void], by: str) -> tuple[NDArray[np.float64], st
 
 
 def _check_kept(store: ResultStore, by: str) -> None:
-    """Raise where the study does not keep what is asked for."""
+    """Raise `InputError` if the study does not keep the load or column."""
     held = [c.name for c in store.columns]
     loads = [load for load in LIMIT_UNITS if kept.holds(store.columns, load)]
     if by not in (*loads, *held):

@@ -1,4 +1,4 @@
-"""Two campaigns side by side: what differs between their studies, and what that does to the loads."""
+"""Comparison of two campaigns: differences between their studies and between their loads."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Change(NamedTuple):
     Attributes
     ----------
     keys : list of str
-        Dotted keys of their identity; all go from the same value to the same value.
+        Dotted keys of their identity; all change from value `a` to value `b`.
     a, b : object
         The values, JSON; None where the study has no such key.
     """
@@ -42,7 +42,7 @@ class Change(NamedTuple):
 
 
 class Sides(NamedTuple):
-    """The joints of two campaigns; arrays of A and B, of one length and order where they are paired.
+    """The joints of two campaigns A and B; if paired, both have the same length and order.
 
     Attributes
     ----------
@@ -65,13 +65,13 @@ class Sides(NamedTuple):
         return self.a.iid and self.b.iid
 
     def load(self, name: str) -> tuple[FloatArray, FloatArray, str]:
-        """Load of each joint of A and of B, NaN without a valid one, and its unit."""
+        """Load of each joint of A and of B, NaN if not valid, and its unit."""
         (a, unit), (b, _) = (_valid(side, name) for side in (self.a, self.b))
         return a, b, unit
 
 
 class Comparison(NamedTuple):
-    """What two campaigns differ in.
+    """Differences between two campaigns.
 
     Attributes
     ----------
@@ -80,12 +80,12 @@ class Comparison(NamedTuple):
     changes : list of Change
         What differs between the studies.
     shares : DataFrame
-        One row a limit of either study: ``load``, ``unit``, ``level`` (SI), then `analysis.difference.ShareDifference`.
+        One row per limit of either study: ``load``, ``unit``, ``level`` (SI), fields of `difference.ShareDifference`.
     loads : DataFrame
-        One row a load and ``statistic`` (``mean``, ``50 %`` ...): ``load``, ``unit``, ``statistic``, then
-        `analysis.difference.Difference`.
+        One row per load and ``statistic`` (``mean``, ``50 %`` ...): ``load``, ``unit``, ``statistic``, then the fields
+        of `analysis.difference.Difference`.
     switched : DataFrame
-        One row a pair and limit of which one joint only is above the limit: ``row`` (of A), ``load``, ``unit``,
+        One row per pair and limit if only one joint of the pair is above the limit: ``row`` (of A), ``load``, ``unit``,
         ``level``, ``a``, ``b``. Empty without pairs.
     """
 
@@ -102,24 +102,24 @@ def of_stores(a: ResultStore, b: ResultStore, by: Sequence[str] = (), confidence
     Parameters
     ----------
     a, b : ResultStore
-        Their files. Joints are paired where both studies draw them in the same way from the same seed: an error then
-        has the same random number in both, whatever its tolerance. Joints that one of them has not got are left out.
+        Result files. Joints are paired if both studies draw them by the same method from the same seed: an error then
+        has the same random number in both, whatever its tolerance. Joints without a partner are then left out.
     by : sequence of str
-        Loads whose quantiles and means are compared; without it those that have a limit, or all that are kept.
+        Loads whose quantiles and means are compared; by default those with a limit or, without limits, all kept.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
 
     Returns
     -------
     Comparison
-        Differences are B less A.
+        Differences are B minus A.
 
     Raises
     ------
     InputError
-        When a load is none, or not kept by both.
+        When a name is not a load, or a load is not kept by both files.
     StoreError
-        When a file holds joints that are not drawn from tolerances, or has none with a valid load.
+        When a file holds joints that are not drawn from tolerances, or no joint with a valid load.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def of_stores(a: ResultStore, b: ResultStore, by: Sequence[str] = (), confidence
 
 
 def changes(a: ResultStore, b: ResultStore) -> list[Change]:
-    """List what differs between the studies of two files, limits and code included; equal changes are put together."""
+    """List what differs between the studies of two files, limits and code included; equal changes are grouped."""
     one, other = (_identity(store) for store in (a, b))
     found: dict[str, Change] = {}
     for key in sorted(one.keys() | other.keys()):

@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from tolstat.questions.compare.query import Change, Comparison, Sides
 
 LEVELS = 200
-"""Points of a curve."""
+"""Approximate number of levels of a curve."""
 COLUMNS = 4
-"""Loads that the picture shows at most."""
+"""Maximum number of loads in the picture."""
 
 
 def text(found: Comparison, loads: bool = False) -> str:
-    """Tables of what differs: shares above limits, then quantiles and means where asked for or without limits."""
+    """Tables of the differences: shares above limits; quantiles and means with `loads` or without limits."""
     tables = []
     if len(found.shares):
         heads = ["P(load > limit)", "A", "B", "B - A", "95 % interval", "only A", "only B", "p"]
@@ -43,7 +43,7 @@ def text(found: Comparison, loads: bool = False) -> str:
 
 
 def note(found: Comparison, a: str, b: str) -> str:
-    """Sentences on what differs between the studies, and what the tables stand on."""
+    """Notes: differences between the studies, number of joints compared, restrictions."""
     sides = found.sides
     lines = [f"A: {a}", f"B: {b}"]
     lines += [f"  {_change(change)}" for change in found.changes] or ["  the studies are the same"]
@@ -68,7 +68,7 @@ def write(found: Comparison, stem: Path, names: tuple[str, str]) -> list[Path]:
     found : Comparison
         The comparison.
     stem : Path
-        Folder, and what all names begin with.
+        Folder, and beginning of all file names.
     names : tuple of str
         What the legend calls A and B.
 
@@ -86,7 +86,7 @@ def write(found: Comparison, stem: Path, names: tuple[str, str]) -> list[Path]:
 
 
 def figure(found: Comparison, names: tuple[str, str]) -> Figure:
-    """Draw both exceedance curves of the loads compared, `COLUMNS` at most, and below them the difference.
+    """Draw both exceedance curves of at most `COLUMNS` of the loads compared, and below them the difference.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def figure(found: Comparison, names: tuple[str, str]) -> Figure:
     Returns
     -------
     Figure
-        Bands are pointwise 95 % intervals, of pairs where joints are paired.
+        Bands are pointwise 95 % intervals; those of the difference use the pairs if joints are paired.
     """
     loads = list(dict.fromkeys(found.loads["load"]))[:COLUMNS]
     with style.settings():
@@ -157,7 +157,7 @@ def _band(
 
 
 def _levels(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Levels of the curves: quantiles of both sides together, closer in the tail."""
+    """Levels of the curves: quantiles of both campaigns pooled, denser in the tail."""
     both = np.concatenate([a[np.isfinite(a)], b[np.isfinite(b)]])
     tail = np.geomspace(1.0, 1.0 / both.size, LEVELS // 2)
     shares = np.union1d(np.linspace(0.0, 1.0, LEVELS // 2), 1.0 - tail)

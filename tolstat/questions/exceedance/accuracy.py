@@ -20,13 +20,13 @@ def _results(verification: Verification) -> dict[str, np.ndarray[tuple[int], np.
 
 
 def _held(verification: Verification) -> NDArray[np.bool_]:
-    """Which of `OBSERVABLES` the campaign keeps, (21,); all where no joint tells."""
+    """Which of `OBSERVABLES` the campaign keeps, (21,); all if no joint has a value."""
     held = ~np.isnan(accuracy.loads(verification.base)).all(axis=0)
     return np.asarray(held | ~held.any())
 
 
 def errors(verification: Verification) -> dict[str, accuracy.FloatArray]:
-    """Errors relative to the largest load of the kind, (m, 21), by check; last `TOTAL`, `accuracy.numerical`."""
+    """Errors relative to the largest load of the kind, (m, 21), by check; last `TOTAL`, from `accuracy.numerical`."""
     results = _results(verification)
     found = {name: accuracy.differences(verification.base, other) for name, other in results.items()}
     return found | {TOTAL: accuracy.numerical(verification.base, results)}
@@ -38,7 +38,7 @@ def distribution(verification: Verification) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row a kind of load kept and check: ``load`` (``F``: the worst of its bushings in each joint), ``error``
+        One row per kind of load kept and check: ``load`` (``F``: the worst of its bushings in each joint), ``error``
         (name of the check or `TOTAL`), ``joints``, ``median``, ``usual`` (95 % of the joints are below) and ``worst``.
     """
     rows = []
@@ -52,7 +52,7 @@ def distribution(verification: Verification) -> pd.DataFrame:
 
 
 def by_observable(verification: Verification) -> pd.DataFrame:
-    """Distribution as `distribution`, of every observable kept by itself."""
+    """Distribution of the errors over the joints as in `distribution`, for each observable kept."""
     rows = []
     for name, values in errors(verification).items():
         for k in np.flatnonzero(_held(verification)):
@@ -62,13 +62,13 @@ def by_observable(verification: Verification) -> pd.DataFrame:
 
 
 def joints(verification: Verification) -> pd.DataFrame:
-    """Every joint, check and observable kept.
+    """Errors of every joint, by check and observable kept.
 
     Returns
     -------
     DataFrame
         ``row``, ``check``, ``status`` (of the check), ``load``, ``unit``, ``campaign`` and ``value`` (SI), ``error``:
-        the campaign's less the check's, relative to the largest load of the kind.
+        the campaign's value minus the check's, relative to the largest load of the kind.
     """
     base = accuracy.loads(verification.base)
     parts = []
@@ -91,13 +91,13 @@ def joints(verification: Verification) -> pd.DataFrame:
 
 
 def usual(verification: Verification) -> dict[str, float]:
-    """Numerical error that 95 % of the joints stay below, by kind of load; NaN where none is known."""
+    """Numerical error that 95 % of the joints stay below, by kind of load; NaN if unknown."""
     values = accuracy.by_kind(errors(verification)[TOTAL])
     return {kind: accuracy.spread(values[:, k]).usual for k, kind in enumerate(KINDS)}
 
 
 def basis(verification: Verification) -> str:
-    """Sentence on what the numerical error stands on."""
+    """Words on how the numerical error was determined."""
     m = len(verification.rows)
     results = _results(verification)
     if REFERENCE in results:
@@ -125,7 +125,7 @@ def note(verification: Verification) -> str:
 
 
 def lost_joints(verification: Verification) -> str:
-    """Words on checks of joints that did not settle or failed, empty where all are well."""
+    """Words on joints that failed or did not settle in the campaign or in a check; empty if there are none."""
     base = verification.base["status"] == Status.OK
     words = [f"{int((~base).sum())} not settled"] if not base.all() else []
     for name, results in _results(verification).items():

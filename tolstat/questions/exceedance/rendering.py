@@ -25,7 +25,7 @@ from tolstat.store.view import Campaign, ends, load
 SHARES = (0.5, 0.9, 0.95, 0.99)
 BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
 MAX_LEVELS, DRAWN_LEVELS = 600, 200
-"""Most points of a curve in the CSV and in the picture; the file has every joint."""
+"""Maximum number of points of a curve in the CSV and in the picture."""
 LIMIT_DASH, ZERO_DASH = (0.0, (8.0, 3.0)), (0.0, (1.0, 2.0))
 
 
@@ -37,12 +37,12 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
     campaign : Campaign
         The campaign.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
 
     Returns
     -------
     DataFrame
-        One row a limit in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
+        One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
         `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
         `_budget`. Loads in SI units.
     """
@@ -60,14 +60,14 @@ def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
 def _budget(
     campaign: Campaign, name: str, level: float, confidence: float, numerical: Mapping[str, float]
 ) -> dict[str, float]:
-    """Bounds of a share with every load off by the numerical error, downwards and upwards.
+    """Bounds of a share with every load shifted down and up by the numerical error.
 
     Returns
     -------
     dict
-        ``numerical_error``, relative to the largest load of the kind in the joint, NaN where it is not known;
-        ``numerical_lower`` and ``numerical_upper``, the estimates; ``total_lower`` and ``total_upper``, the ends
-        ``outer_*`` of these, which cover numerical error, sampling and unresolved joints.
+        ``numerical_error``, relative to the largest load of the kind in the joint, NaN if unknown; ``numerical_lower``
+        and ``numerical_upper``, the estimates with loads shifted down and up; ``total_lower`` and ``total_upper``,
+        their ends ``outer_lower`` and ``outer_upper``: cover numerical error, sampling and unresolved joints.
     """
     kind = KINDS[KIND_OF[OBSERVABLES.index(name)]]
     error = numerical.get(kind, np.nan)
@@ -82,12 +82,12 @@ def _budget(
 
 
 def quantiles(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Quantiles of every bushing load kept (of the other loads where it is none), for a study that sets no limits.
+    """Quantiles of every bushing load kept or, if there are none, of the other loads kept.
 
     Returns
     -------
     DataFrame
-        One row a load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.quantile.Quantile`,
+        One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.quantile.Quantile`,
         ``confidence``. Loads in SI units.
     """
     rows = []
@@ -101,13 +101,13 @@ def quantiles(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
 
 
 def curves(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Step curves of the same loads, one below the other.
+    """Exceedance curves of the loads of `quantiles`, as one table.
 
     Returns
     -------
     DataFrame
         ``load``, ``unit``, then the fields of `analysis.exceedance.Exceedance`; SI units, at most
-        `MAX_LEVELS` levels a load.
+        `MAX_LEVELS` levels per load.
     """
     parts = []
     for name in campaign.listed:
@@ -136,7 +136,7 @@ def note(campaign: Campaign) -> str:
 
 
 def _distrust(campaign: Campaign) -> str:
-    """Words on the limits above which too few joints of weight are seen for the share to be trusted."""
+    """Words on limits whose share is unreliable, because too few effective joints are above them."""
     poor = []
     weights = np.ones(len(campaign.results)) if campaign.weights is None else campaign.weights
     for name, level in campaign.limits.items():
@@ -153,9 +153,9 @@ def figure(campaign: Campaign, confidence: float = 0.95) -> Figure:
     Parameters
     ----------
     campaign : Campaign
-        The campaign; with no valid joint the panels say so.
+        The campaign; without a valid joint, the panels say so.
     confidence : float
-        Of the bands.
+        Confidence level of the bands.
 
     Returns
     -------
@@ -172,19 +172,19 @@ def figure(campaign: Campaign, confidence: float = 0.95) -> Figure:
 
 
 def nominal(campaign: Campaign, name: str) -> float:
-    """Load of the joint without errors, SI; NaN where there is none."""
+    """Load of the nominal joint, SI; NaN if there is none."""
     return float(load(campaign.nominal, name)[0][0]) if len(campaign.nominal) else np.nan
 
 
 def curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple[NDArray[np.void], str]:
-    """Step curve of a load and its unit, thinned to `most` levels: all of the highest, evenly spread below."""
+    """Exceedance curve of a load and its unit, thinned to `most` levels: denser at the largest loads."""
     values, unit = load(campaign.results, name)
     levels = np.unique(exceedance.sort_out(values, campaign.results["status"]).valid)
     if levels.size > most:
         top = levels.size - np.geomspace(1, levels.size, most // 2).round().astype(int)
         even = np.linspace(0, levels.size - 1, most // 2).round().astype(int)
         levels = levels[np.union1d(top, even)]
-    below = np.nextafter(levels[:1], -np.inf)  # where every valid joint is above
+    below = np.nextafter(levels[:1], -np.inf)  # a level that every valid joint exceeds
     return campaign.curve(values, np.concatenate([below, levels]), confidence, ends(campaign.results, name)), unit
 
 
@@ -224,7 +224,7 @@ def panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: flo
 
 
 def least(campaign: Campaign, table: NDArray[np.void]) -> float:
-    """Least share that a curve can show: one joint, or what the joints with weights come down to."""
+    """Smallest share that a curve shows: that of one joint or, with weights, the smallest positive estimate."""
     shares = table["estimate"][table["estimate"] > 0]
     return 1.0 / float(table["n"][0]) if campaign.weights is None else float(shares.min(initial=1.0))
 
@@ -272,7 +272,7 @@ def _limit_levels(campaign: Campaign, group: str, letter: str) -> dict[float, li
 
 
 def limit_lines(ax: Axes, marked: dict[float, list[int]], unit: str) -> None:
-    """Mark limits by vertical lines, labelled above the panel; one far off is an arrow at the edge."""
+    """Mark limits by vertical lines, labelled above the panel; an arrow stands for one out of range."""
     labels: list[tuple[float, str, str]] = []
     low, high = ax.get_xlim()
     for level, numbers in marked.items():
@@ -299,7 +299,7 @@ def limit_lines(ax: Axes, marked: dict[float, list[int]], unit: str) -> None:
 
 
 def _without_overlap(labels: list[tuple[float, str, str]], new: tuple[float, str, str]) -> list[tuple[float, str, str]]:
-    """Append a label, joined to the one before where the two would touch (0.014 panel widths a letter)."""
+    """Append a label, or merge it with the previous one if they would overlap (0.014 panel widths per letter)."""
     if not labels:
         return [new]
     place, text, _ = labels[-1]

@@ -21,7 +21,7 @@ from tolstat.study.selection import LIMIT_UNITS
 
 Mask = NDArray[np.bool_]
 MAX_LEGEND = 6
-"""Most values of the second swept quantity that the legend names."""
+"""Maximum number of values of the second swept quantity in the legend."""
 
 
 def table(campaign: Campaign) -> pd.DataFrame:
@@ -35,7 +35,7 @@ def table(campaign: Campaign) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row a joint, pending and failed ones included: the swept values, headed by label and unit
+        One row per joint, pending and failed ones included: the swept values, headed by label and unit
         for the reader (``pin*.diameter [mm]``); ``status``; force and torque of each bushing, SI, headed likewise;
         ``psi``. Loads that the study does not keep have no column.
     """
@@ -50,7 +50,7 @@ def table(campaign: Campaign) -> pd.DataFrame:
 
 
 def worst(campaign: Campaign) -> pd.DataFrame:
-    """Short form of `table`: of the cross and of the fork bushings the largest force and torque."""
+    """Short form of `table`: largest force and torque of the cross bushings and of the fork bushings."""
     full = table(campaign)
     loads = [c for c in full.columns if str(c).partition(" ")[0] in LIMIT_UNITS] if campaign.drawn else []
     short = full[[c for c in full.columns if c not in loads]].copy()
@@ -173,7 +173,7 @@ def _shades(count: int) -> list[str]:
 
 
 def key(campaign: Campaign) -> tuple[list[Artist], list[str]]:
-    """Legend of a panel: its lines and marks, and their meaning."""
+    """Handles and labels of a panel's legend."""
     axes = swept_axes(campaign)
     handles: list[Artist]
     if len(axes) < 2:

@@ -1,4 +1,4 @@
-"""Cycles in the form that pyLife takes: a Series of cycle numbers over classes of range and mean."""
+"""Load cycles in pyLife's format: a Series of cycle numbers over classes of range and mean."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ INTERVALS = ("range", "mean")
 def series(
     store: ResultStore, channels: Sequence[str] | None = None, bins: int = 100, revolutions: float = 1.0
 ) -> pd.Series[float]:
-    """Rainflow cycles of every joint as pyLife's load collectives take them.
+    """Rainflow cycles of every joint as a pyLife load collective.
 
     Parameters
     ----------
@@ -31,16 +31,16 @@ def series(
     channels : sequence of str, optional
         Channels to keep, keys of `tables.CHANNELS`.
     bins : int
-        Classes of range from 0 to the largest, and of mean between the extremes; the same for all forces, and for all
-        torques.
+        Number of classes of the range (from 0 to the largest) and of the mean (between its extremes); one set of
+        classes for all forces, one for all torques.
     revolutions : float
-        Revolutions that the cycles are counted for.
+        Number of revolutions that the numbers of cycles refer to.
 
     Returns
     -------
     pandas.Series
-        Name ``cycles``; index levels ``range`` and ``mean`` (intervals closed on the left, N or N m), ``joint`` (row of
-        the file) and ``channel``. Classes without cycles, and joints without results, are left out.
+        Name ``cycles``; index levels ``range`` and ``mean`` (intervals closed on the left, N or N m), ``joint`` (file
+        slot) and ``channel``. Classes without cycles, and joints without results, are left out.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def series(
     if bins < 1:
         raise ValueError(f"{bins} classes: at least 1 expected")
     cycles = fatigue.cycles(store, channels)
-    joint, channel, slot = np.nonzero(cycles.ranges > 0)  # NaN is not
+    joint, channel, slot = np.nonzero(cycles.ranges > 0)  # leaves out NaN
     values = {"range": cycles.ranges[joint, channel, slot], "mean": cycles.means[joint, channel, slot]}
     torque = np.array([CHANNELS[name] != "N" for name in cycles.channels], bool)[channel]
     frame = pd.DataFrame({"joint": joint, "channel": channel, "cycles": cycles.weights[slot] * revolutions})
@@ -97,7 +97,7 @@ def from_table(table: pd.DataFrame) -> pd.Series[float]:
 
 
 def _edges(values: FloatArray, bins: int, from_zero: bool) -> FloatArray:
-    """Edges of equal classes that hold all values, the last one above them."""
+    """Edges of classes of equal width that contain all values; the last edge is above the largest value."""
     low, high = (0.0 if from_zero else values.min(initial=np.inf), values.max(initial=-np.inf))
     if not low <= high:
         return np.array([0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Cycles of the joints of a campaign, from whichever histories it holds, or of several that make up a duty cycle."""
+"""Load cycles of the joints of one campaign, or of several campaigns that make up a duty cycle."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from tolstat.study.selection import select
 
 @dataclass(frozen=True)
 class Loading:
-    """Cycles of the joints of a campaign, or of several that make up a duty cycle, and what they are judged by.
+    """Load cycles of the joints of one campaign or of a duty cycle, and the settings of their evaluation.
 
     Attributes
     ----------
     name : str
         Name of the study, or of the studies.
     cycles : Cycles
-        Of the joints that count, n of them; the nominal joint is not among them.
+        Cycles of the n joints, without the nominal joint.
     status : ndarray, shape (n,)
-        `tables.Status`; of several operating points the first that is not ``OK``.
+        `tables.Status`; with several operating points the first that is not ``OK``.
     nominal : Cycles
-        Of the joint without errors; no rows where there is none.
+        Cycles of the nominal joint; no rows if there is none that settled.
     iid : bool
         Whether the joints are independent samples.
     judged : Fatigue
-        Section ``[fatigue]`` of the study, of the first one where there are several.
+        Section ``[fatigue]`` of the study; of the first study if there are several.
     """
 
     name: str
@@ -72,22 +72,22 @@ def channels(patterns: Sequence[str] = ("*.*",)) -> tuple[str, ...]:
 def cycles(store: ResultStore, names: Sequence[str] | None = None, most: int | None = None) -> Cycles:
     """Rainflow cycles of every joint of a campaign.
 
-    As the workers counted them (``histories = "cycles"``), else counted now from the histories. From harmonics they are
-    the cycles of the load so restored.
+    Cycles stored by the workers (``histories = "cycles"``) are read. Otherwise they are counted now from the load
+    histories, or from the loads restored from harmonics.
 
     Parameters
     ----------
     store : ResultStore
         The campaign.
     names : sequence of str, optional
-        Channels to keep, all 64 without it: some 8 kB a joint.
+        Channels to keep; by default all 64: some 8 kB per joint.
     most : int, optional
-        Rows to read, the first ones; all without it.
+        Number of rows to read, from the first; by default all.
 
     Returns
     -------
     Cycles
-        Row i is joint i; NaN for joints without results.
+        Row i is file slot i; NaN for joints without results.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def read(
     names : sequence of str, optional
         Channels to keep.
     most : int, optional
-        Rows of each file to read, the first ones; all without it.
+        Number of rows of each file to read, from the first; by default all.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def _check_same_joints(path: str | Path, errors: NDArray[np.void], other: str | 
 
 
 def _counted(store: ResultStore, n: int) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
-    """Rows below `n`, and their cycles by name of `rainflow.SPECS`, a block at a time."""
+    """Yield blocks of file slots below `n` and their cycles, by name of `rainflow.SPECS`."""
     held = store.history_specs
     if not held:
         remedy = 'set histories = "cycles" in [output] of the study and run it anew'

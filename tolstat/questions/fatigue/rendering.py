@@ -1,4 +1,4 @@
-"""Fatigue of a campaign: damage-equivalent loads, damage sums and load spectra over the joints, and their picture."""
+"""Fatigue of a campaign: damage-equivalent loads, damage sums and load spectra over the joints; figures."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from tolstat.questions.fatigue.query import Loading
 
 SHARES = (0.5, 0.9, 0.99)
 MAX_NUMBERS = 40
-"""Most points of a spectrum."""
+"""Maximum number of points of a spectrum."""
 SMALLEST = 1e-3
-"""Smallest range drawn, as a part of the largest."""
+"""Smallest range drawn, relative to the largest."""
 MOST_LACKING = 1e-3
-"""Part of the sum of S^m that cycles without a place may add before it is said."""
+"""Relative increase of the sum of S^m by cycles that the file does not hold, above which a note says so."""
 
 
 def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confidence: float = 0.95) -> pd.DataFrame:
-    """Damage-equivalent loads over the joints.
+    """Quantiles over the joints of the damage-equivalent loads.
 
     Parameters
     ----------
     loading : Loading
         Cycles of the joints.
     shares : sequence of float
-        Shares of the joints that stay at or below a load.
+        Shares of the joints at or below the quantile.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
 
     Returns
     -------
     DataFrame
-        One row a channel, exponent and share: ``channel``, ``unit``, ``m``, ``nominal``, ``lacking`` (bound of the part
-        of the sum of S^m that the file does not hold, largest of the joints), the fields of
-        `analysis.quantile.Quantile`, ``confidence``. Loads are ranges in SI units.
+        One row per channel, exponent and share: ``channel``, ``unit``, ``m``, ``nominal``, ``lacking`` (upper bound of
+        the relative increase of the sum of S^m by cycles that the file does not hold, maximum over the joints), the
+        fields of `analysis.quantile.Quantile`, ``confidence``. Loads are ranges in SI units.
     """
     judged, rows = loading.judged, []
     for m in judged.exponents:
@@ -91,21 +91,21 @@ def spectra(
     shares: Sequence[float] = SHARES,
     confidence: float = 0.95,
 ) -> pd.DataFrame:
-    """Cumulative load spectra over the joints: the range that so many cycles of the service life reach.
+    """Cumulative load spectra: quantiles over the joints of the range that a number of cycles reaches or exceeds.
 
     Parameters
     ----------
     loading : Loading
         Cycles of the joints.
     channels : sequence of str, optional
-        Channels of ``loading.cycles``; all without it.
+        Channels of ``loading.cycles``; by default all.
     shares, confidence
         As in `equivalent_loads`; the intervals are pointwise.
 
     Returns
     -------
     DataFrame
-        One row a channel, share and number: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``, the
+        One row per channel, share and number: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``, the
         fields of `analysis.quantile.Quantile`, ``confidence``. Ranges in SI units, ascending numbers.
     """
     rows = []
@@ -123,10 +123,10 @@ def spectra(
 
 
 def worst(table: pd.DataFrame) -> list[str]:
-    """Of each bushing's force and torque the channel with the largest load, from `equivalent_loads`.
+    """Channel with the largest equivalent load for each bushing's force and torque, from `equivalent_loads`.
 
-    Read at the middle exponent and the highest share; moduli, whose cycles are no cycles of a component, only where the
-    table has nothing else. Empty when no joint has a valid result.
+    Evaluated at the middle exponent and the highest share. Moduli, whose cycles are not those of a component, are used
+    only if the table has nothing else. Empty if no joint has a valid result.
     """
     exponents = sorted(table["m"].unique())
     part = table[(table["m"] == exponents[len(exponents) // 2]) & (table["share"] == table["share"].max())]
@@ -138,7 +138,7 @@ def worst(table: pd.DataFrame) -> list[str]:
 
 
 def notes(loading: Loading, table: pd.DataFrame) -> str:
-    """Sentences on what the figures of `equivalent_loads` stand on."""
+    """Notes to `equivalent_loads`: number of joints, definition of the loads, restrictions."""
     judged = loading.judged
     lines = [
         f"{_valid(loading)}; loads are ranges: {judged.reference_cycles:g} cycles of them do the damage of "
@@ -160,7 +160,7 @@ def figure(loading: Loading, confidence: float = 0.95) -> Figure:
     loading : Loading
         Cycles of the joints.
     confidence : float
-        Of the bands.
+        Confidence level of the bands.
 
     Returns
     -------
@@ -185,14 +185,14 @@ def figure(loading: Loading, confidence: float = 0.95) -> Figure:
 
 
 def key() -> tuple[list[Artist], list[str]]:
-    """Legend of a panel: its lines and their meaning."""
+    """Handles and labels of a panel's legend."""
     labels = [f"{100 * share:g} % of the joints stay below" for share in SHARES]
     handles: list[Artist] = [Line2D([], [], color=style.COLOURS[i], ls=style.DASHES[i]) for i in range(len(SHARES))]
     return [*handles, Line2D([], [], color=style.INK, lw=1)], [*labels, "nominal joint"]
 
 
 def leading(loading: Loading) -> list[str]:
-    """Of force and torque of the cross and of the fork bushings the channel with the largest equivalent load."""
+    """Channel with the largest equivalent load for force and torque of the cross bushings and of the fork bushings."""
     table = equivalent_loads(loading, SHARES[-1:])
     candidates = table[table["channel"].isin(worst(table))].sort_values("estimate")
     found = []
@@ -204,7 +204,7 @@ def leading(loading: Loading) -> list[str]:
 
 
 def panel(ax: Axes, loading: Loading, channel: str, confidence: float = 0.95) -> None:
-    """Draw the spectra of one channel: steps down to the right, and their bands."""
+    """Draw the spectra of one channel as step curves, with their bands."""
     revolutions = loading.judged.revolutions
     table = spectra(loading, [channel], SHARES, confidence)
     ax.set_xlabel("cycles a revolution with at least this range")
@@ -216,7 +216,7 @@ def panel(ax: Axes, loading: Loading, channel: str, confidence: float = 0.95) ->
     for i, (_, part) in enumerate(table.groupby("share")):
         lower, estimate, upper = (part[name].to_numpy() for name in ("lower", "estimate", "upper"))
         if np.isfinite(lower).any():
-            top = np.where(np.isfinite(upper), upper, estimate)  # no upper end: too few joints
+            top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite
             ends = (_held(np.maximum(y, 0.1 * floor)) for y in (lower, top))
             ax.fill_between(x, next(ends), next(ends), step="pre", color=style.COLOURS[i], alpha=0.2, lw=0)
         ax.step(x, _held(estimate), where="pre", color=style.COLOURS[i], ls=style.DASHES[i], zorder=3)
@@ -235,12 +235,12 @@ def _valid(loading: Loading) -> str:
 
 
 def _held(y: exceedance.FloatArray) -> exceedance.FloatArray:
-    """Values of a step curve with the first one held to the left edge."""
+    """Repeat the first value of a step curve, so that the curve extends to the left edge."""
     return np.concatenate([y[:1], y])
 
 
 def _numbers(part: cycles.Cycles) -> exceedance.FloatArray:
-    """Cycles per revolution at which the spectra of the joints have their steps, some of them if they are many."""
+    """Cycles per revolution at which the spectra of the joints have steps, thinned to `MAX_NUMBERS`."""
     order = np.argsort(-part.ranges[:, 0], axis=1)
     steps = np.cumsum(part.weights[order], axis=1)[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
     numbers = np.unique(np.append(steps.round(9), 1.0))

@@ -1,1 +1,1 @@
-"""The same answer from many cheap and few dear joints."""
+"""Statistics from many joints of a low and few joints of a high fidelity."""

@@ -1,4 +1,4 @@
-"""A campaign at two fidelities: two ordinary result files of the same joints, and what they tell together."""
+"""A campaign at two fidelities: two ordinary result files of the same joints, evaluated together."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ from tolstat.study.selection import LIMIT_UNITS
 
 SHARES = (0.5, 0.9, 0.99)
 TIMED = 64
-"""Joints that the cost of a fidelity is measured on."""
+"""Maximum number of joints simulated to measure the cost of a fidelity."""
 
 
 class Found(NamedTuple):
-    """What two fidelities came to.
+    """Result of a campaign at two fidelities.
 
     Attributes
     ----------
     table : DataFrame
-        One row a statistic: ``load``, ``unit``, ``statistic`` (``mean``, ``quantile``, ``share above``), ``at`` (share
-        or level), then the fields of `analysis.multifidelity.Estimate`. Loads in SI units.
+        One row per statistic: ``load``, ``unit``, ``statistic`` (``mean``, ``quantile``, ``share above``), ``at``
+        (share or level), then the fields of `analysis.multifidelity.Estimate`. Loads in SI units.
     allocation : Allocation
-        Of the pilot.
+        Allocation of the work, computed from the pilot.
     cost_high, cost_low : float
-        Measured, seconds of one core a joint.
+        Measured cost, seconds of one core per joint.
     high, low : int
-        Joints.
+        Number of joints at each fidelity.
     files : tuple of Path
         Result files, that of the high fidelity first.
     """
@@ -63,12 +63,12 @@ class Found(NamedTuple):
 
 
 def solver_of(study: Study, text: str, place: str) -> Solver:
-    """Settings that ``"quasistatic:36"`` stands for: fidelity and, where given, steps a revolution.
+    """Solver settings from a text such as ``"quasistatic:36"``: fidelity and, if given, steps per revolution.
 
     Raises
     ------
     InputError
-        When it is something else.
+        When the text is not of this form.
     """
     fidelity, colon, steps = text.partition(":")
     own = study.solver.model_dump(exclude_unset=True, exclude={"error_budget"}) | {"fidelity": fidelity}
@@ -88,27 +88,27 @@ def run(
     workers: int | None = None,
     tell: Callable[[str], None] = note,
 ) -> Found:
-    """Simulate a study at two fidelities and put them together.
+    """Simulate a study at two fidelities and combine the results.
 
     Parameters
     ----------
     study : Study
-        Of independent joints; its number of joints is of no account.
+        Study of independent joints; its number of joints is ignored.
     low, high : str
-        Cheap fidelity, and the one that statistics are asked of: ``"quasistatic:36"``, see `solver_of`.
+        Cheap fidelity, and the one that the statistics refer to, such as ``"quasistatic:36"``; see `solver_of`.
     folder : Path
-        Existing folder where ``STUDY_high.h5`` and ``STUDY_low.h5`` are, or are made. Files with more joints than the
-        pilot are finished and evaluated, as after an interruption; they are not made larger again.
+        Existing folder of ``STUDY_high.h5`` and ``STUDY_low.h5``, which are created if missing. Files with more joints
+        than the pilot, as after an interruption, are completed and evaluated but not extended again.
     budget : float
         Time of one core for all joints together, seconds.
     pilot : int
-        Joints simulated at both fidelities, by which the work is shared.
+        Number of joints first simulated at both fidelities, from which the work is allocated.
     by : str, optional
-        Load whose mean the sharing is best for; the first that the study asks for without it.
+        Load for whose mean the allocation is optimal; by default the first that the study asks for.
     workers : int, optional
-        Processes, which change no number; the budget is of one core all the same.
+        Number of processes; does not affect results. The budget counts the time of one core in any case.
     tell : callable, optional
-        Told how the work is shared.
+        Receives a sentence on the allocation.
 
     Returns
     -------
@@ -117,12 +117,12 @@ def run(
     Raises
     ------
     InputError
-        When the fidelities cannot be or are the same, the joints are not independent samples, or the study does not
+        When a fidelity is invalid or both are the same, the joints are not independent samples, or the study does not
         ask for the load.
     StoreError
         When a file is of another study, or that of the high fidelity has more joints.
     Interrupted, WorkerDied
-        As `campaign.run`; the same call goes on.
+        As `campaign.run`; the same call resumes.
     """
     solvers = _solvers(study, low, high)
     asked = study.asked or list(source.LOADS)
@@ -142,7 +142,7 @@ def run(
     allocation = multifidelity.allocate(pairs.high[:pilot][both], pairs.low[:pilot][both], *costs)
     tell(_sentence(allocation, by, *costs))
     if allocation.gain > 1.0 and max(held) == pilot:
-        # both first: a run that is stopped goes on with the numbers of joints that it had chosen
+        # extend both files before simulating, so that an interrupted run resumes with the numbers of joints chosen
         for plan, path, n in zip(plans, paths, allocation.joints(budget, *costs, pilot), strict=True):
             _extend(plan, path, n)
         for plan, path in zip(plans, paths, strict=True):
@@ -167,7 +167,7 @@ def _solvers(study: Study, low: str, high: str) -> tuple[Solver, Solver]:
 
 
 def _simulate(plan: Study, path: Path, n: int, workers: int | None) -> int:
-    """Simulate the joints of a file that are pending, `n` of a new one; how many it has."""
+    """Simulate the pending joints of a file (`n` joints if it is new); return its number of joints."""
     if path.exists():
         with ResultStore.open(path) as store:
             n = store.n - int(plan.sampling.nominal_first)
@@ -176,7 +176,7 @@ def _simulate(plan: Study, path: Path, n: int, workers: int | None) -> int:
 
 
 def _extend(plan: Study, path: Path, n: int) -> None:
-    """Give a file `n` joints, those that it does not have pending."""
+    """Extend a file to `n` joints; the new ones are pending."""
     with ResultStore.open(path, "r+") as store:
         more = range(store.n, n + int(plan.sampling.nominal_first))
         if more:
@@ -188,7 +188,7 @@ def _sized(plan: Study, n: int) -> Study:
 
 
 def _cost(plan: Study, pilot: int) -> float:
-    """Seconds of one core a joint, measured."""
+    """Measured cost, seconds of one core per joint."""
     first = int(plan.sampling.nominal_first)
     rows = np.arange(first, first + min(pilot, TIMED))
     params = perturbed(plan, rows, draw(plan, range(rows[0], rows[-1] + 1)), perturb)
@@ -214,7 +214,7 @@ def _read(paths: tuple[Path, Path]) -> tuple[Campaign, Campaign]:
 
 
 def _pairs(campaigns: tuple[Campaign, Campaign], name: str, costs: tuple[float, float]) -> Pairs:
-    """A load of each joint, NaN where it is not valid. Both files are of one study and seed: row i is one joint."""
+    """Pairs of a load, NaN where not valid; both files have one study and seed, so row i is the same joint."""
     high, low = (
         np.where(np.isin(held.results["status"], VALID), source.load(held.results, name)[0], np.nan)
         for held in campaigns

@@ -1,1 +1,1 @@
-"""Loads that one joint in a million exceeds."""
+"""Probabilities of rare loads, by subset simulation."""

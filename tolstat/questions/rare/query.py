@@ -1,8 +1,8 @@
-"""Probabilities of rare loads by subset simulation: its levels are rows of a result file, stage after stage.
+"""Probabilities of rare loads by subset simulation, with the joints of all levels in one result file.
 
-A stage is what can be simulated at once: all joints of level 0, or one step of all chains. Before each the file grows
-by its joints, pending, and a campaign simulates them. Nothing else is kept: which joints come next follows from the
-study and the loads in the file, so that a run that was stopped goes on where it was.
+A stage is a set of joints that can be simulated at once: all joints of level 0, or one step of all chains. Each stage
+appends its joints to the file as pending rows, and a campaign simulates them. No other state is stored: the study and
+the loads in the file determine the next joints, so that an interrupted run resumes where it stopped.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from tolstat.study.model import Subset
 from tolstat.study.selection import limit_of
 
 MANY = 2000
-"""Joints of a stage from which on it is worth starting worker processes: some seconds of work."""
+"""Minimum number of joints of a stage for which worker processes are started: some seconds of work."""
 _LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
 
 
 class Found(NamedTuple):
-    """What a subset simulation came to.
+    """Result of a subset simulation.
 
     Attributes
     ----------
     sampling : Subset
-        The question, and how it was put.
+        Load and limit, and settings of the simulation.
     levels : list of Level
         See `analysis.subset.Level`; loads in SI units.
     reached : bool
@@ -55,7 +55,7 @@ class Found(NamedTuple):
     unresolved : int
         Joints among them without a valid load.
     unresolved_first : int
-        Joints among those of level 0, which are drawn at random, without a valid load.
+        Joints of level 0 (drawn at random) without a valid load.
     """
 
     sampling: Subset
@@ -68,23 +68,23 @@ class Found(NamedTuple):
 
     @property
     def as_sure_as(self) -> float:
-        """Number of joints drawn at random that would be as sure of the probability; NaN where it is not known."""
+        """Number of joints drawn at random that would give the same coefficient of variation; NaN if unknown."""
         p, deviation = self.estimate.probability, self.estimate.deviation
         return (1.0 - p) / (p * deviation**2) if deviation > 0 else math.nan
 
     @property
     def upper_if_above(self) -> float:
-        """Most that the probability can be if all joints without a valid load are above, as far as level 0 tells."""
+        """Upper end if joints without a valid load are all above the limit, estimated by their share in level 0."""
         return min(1.0, self.estimate.upper + self.unresolved_first / self.sampling.per_level)
 
 
 def parse(text: str) -> tuple[str, float]:
-    """Load and level (SI) that ``"cross1.F > 900 N"`` asks about.
+    """Load and level (SI) from a text such as ``"cross1.F > 900 N"``.
 
     Raises
     ------
     InputError
-        When it is something else.
+        When the text is not of this form.
     """
     found = _LIMIT.fullmatch(text)
     if found is None:
@@ -105,7 +105,7 @@ def asked(
     Parameters
     ----------
     study : Study
-        Its tolerances hold; its number of joints and its limits are of no account.
+        Study whose tolerances are used; its number of joints and its limits are ignored.
     limit : str
         Load and level, ``"cross1.F > 15 kN"``.
     n : int
@@ -113,9 +113,9 @@ def asked(
     p0 : float
         Share of them that is carried to the next level; ``n * p0`` is a whole number.
     seed : int, optional
-        Instead of the study's.
+        Seed instead of the study's.
     unresolved : {"above", "below"}
-        Where joints without a valid load are counted.
+        Side of every threshold on which joints without a valid load are counted.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def of_study(study: Study, limit: str, out: str | Path, workers: int | None = No
     limit : str
         Load and level, ``"cross1.F > 15 kN"``.
     out : str or Path
-        Result file; one of the same question is gone on with.
+        Result file; an existing one of the same question is resumed.
     workers : int, optional
         As in `run`.
     **question
@@ -170,19 +170,19 @@ def of_study(study: Study, limit: str, out: str | Path, workers: int | None = No
 
 
 def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> Found:
-    """Carry a subset simulation through, or on.
+    """Run or resume a subset simulation.
 
     Parameters
     ----------
     plan : Study
         As `asked` makes it.
     out : Path
-        Result file; made if it does not exist, otherwise gone on with.
+        Result file; created if it does not exist, otherwise resumed.
     workers : int, optional
-        Processes for each stage, which change no number. Without it stages of few joints stay in this process, which
-        nothing then protects from a joint that crashes.
+        Number of processes for each stage; does not affect results. By default, stages of fewer than `MANY` joints run
+        in this process, which a crash in the simulation of a joint then ends.
     tell : callable, optional
-        Told of each level that is complete.
+        Receives a sentence on each completed level.
 
     Returns
     -------
@@ -193,7 +193,7 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     StoreError
         When the file is of another question, or was begun by other code.
     Interrupted, WorkerDied
-        As `campaign.run`; the same call goes on.
+        As `campaign.run`; the same call resumes.
     """
     question = plan.sampling
     assert isinstance(question, Subset)
@@ -201,7 +201,7 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     unresolved: list[int] = []
     first, told = int(question.nominal_first), 0
     held = _rows(out) or first + question.per_level
-    _simulate(plan, out, held, held, workers, tell)  # which also finds out that the file is of another question
+    _simulate(plan, out, held, held, workers, tell)  # also checks that the file is of the same question
     while not walk.done:
         stage = range(first, first + walk.next.parent.size)
         if held < stage.stop:
@@ -220,7 +220,7 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
 
 
 def _noise(plan: Study, level: int, first: int, count: int) -> FloatArray:
-    """Scores of level 0, what moves them at the others."""
+    """Standard normal scores of the joints of level 0; at other levels the random numbers of their moves."""
     if level == 0:
         return sampling.scores(plan, range(first, first + count))
     return sampling.noise(plan, level, first, count)
@@ -234,13 +234,13 @@ def _rows(out: Path) -> int:
 
 
 def _sized(plan: Study, rows: int) -> Study:
-    """The study with so many rows."""
+    """The study with `rows` rows, the nominal joint included."""
     n = rows - int(plan.sampling.nominal_first)
     return replace(plan, sampling=plan.sampling.model_copy(update={"n": n}))
 
 
 def _simulate(plan: Study, out: Path, rows: int, count: int, workers: int | None, tell: Callable[[str], None]) -> None:
-    """Simulate the rows of the file that are pending, some `count` of them."""
+    """Simulate the pending rows of the file, about `count` of them."""
     execution = Execution(workers=workers)
     if workers is None and count < MANY:
         execution = Execution("serial", 1, block=count)
@@ -248,7 +248,7 @@ def _simulate(plan: Study, out: Path, rows: int, count: int, workers: int | None
 
 
 def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
-    """Give the file the joints of a stage, pending."""
+    """Append the joints of a stage to the file, as pending rows."""
     origin = np.empty(len(stage), SUBSET)
     origin["level"], origin["parent"] = joints.level, joints.parent + int(plan.sampling.nominal_first)
     with ResultStore.open(out, "r+") as store:
@@ -256,7 +256,7 @@ def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
 
 
 def _loads(question: Subset, out: Path, stage: range, joints: Candidates) -> tuple[FloatArray, int]:
-    """Loads of a stage, those that are not valid beyond every level or below, and how many these are."""
+    """Loads of a stage, inf or -inf (by `question.unresolved`) where not valid; number of joints not valid."""
     rows = slice(stage.start, stage.stop)
     with ResultStore.open(out) as store:
         results, origin = store.results(rows), store.origin(rows)

@@ -1,4 +1,4 @@
-"""What a subset simulation came to, as a table of its levels and a sentence."""
+"""Result of a subset simulation, as a table of its levels and a sentence."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def table(levels: list[Level], load: str) -> pd.DataFrame:
     levels : list of Level
         Loads in SI units.
     load : str
-        The load that is asked about.
+        The load whose probability is estimated.
 
     Returns
     -------
     DataFrame
-        One row a level: ``level``, ``load``, ``unit``, ``threshold`` (-inf at level 0), ``probability`` of a load above
-        it, then the other fields of `analysis.subset.Level`.
+        One row per level: ``level``, ``load``, ``unit``, ``threshold`` (-inf at level 0), ``probability`` of a load
+        above it, then the other fields of `analysis.subset.Level`.
     """
     frame = pd.DataFrame([level._asdict() for level in levels])
     frame.insert(0, "level", range(len(levels)))
@@ -38,7 +38,7 @@ def table(levels: list[Level], load: str) -> pd.DataFrame:
 
 
 def sentence(estimate: Estimate, load: str, above: float) -> str:
-    """The probability and its interval; what is left at most where the levels did not reach the limit."""
+    """The probability with its interval, or its upper bound if the levels did not reach the limit."""
     unit = LIMIT_UNITS[load]
     head = f"P({load} > {above:g} {UNITS.get(unit, unit)}".strip() + ")"
     if math.isnan(estimate.probability):

@@ -1,1 +1,1 @@
-"""Other tolerances from the same joints."""
+"""Likelihood-ratio reweighting to other tolerances."""

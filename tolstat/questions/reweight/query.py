@@ -1,4 +1,4 @@
-"""A campaign under other tolerances, from its own joints: no new runs where that can be."""
+"""Statistics of a campaign under other tolerances, by likelihood-ratio reweighting of its own joints."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from tolstat.study.selection import columns_of
 from tolstat.study.tolerances.distributions import Distribution, score
 
 OUTSIDE = 1e-4
-"""Share of the new errors that may lie where the study draws none; it is missed by every estimate."""
+"""Maximum probability of the new distribution outside the range of the old one; no estimate covers that part."""
 _ENDS = np.array([1e-12, 1 - 1e-12])
 
 
 class Reweighted(NamedTuple):
-    """A campaign under other tolerances.
+    """Statistics of a campaign reweighted to other tolerances.
 
     Attributes
     ----------
     weights : Weights
-        Of the joints that have been simulated.
+        Weights of the joints that have been simulated.
     changed : list of str
-        Errors that have another distribution.
+        Errors whose distribution changes.
     table : DataFrame
-        One row a limit: ``load``, ``unit``, ``level``, ``before`` (share of the joints as drawn), ``estimate``,
+        One row per limit: ``load``, ``unit``, ``level``, ``before`` (share of the joints as drawn), ``estimate``,
         ``lower``, ``upper``, ``bound_lower`` and ``bound_upper`` (joints without a valid load counted below and above),
-        ``ess``. A study without limits has quantiles instead: ``share`` for ``level``, loads for shares, no bounds.
+        ``ess``. For a study without limits, quantiles: ``share`` instead of ``level``, loads as estimates, no bounds.
     """
 
     weights: Weights
@@ -49,7 +49,7 @@ class Reweighted(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Sentence on whether to trust the table."""
+        """Sentence on whether the table is reliable."""
         w = self.weights
         figures = f"{len(w.values)} joints count as {w.ess:.0f}; Pareto k {w.k:.2f}, {w.allowed:.2f} allowed"
         return figures if w.usable else f"needs new runs: {figures}, {reweight.LEAST_ESS} joints needed"
@@ -67,9 +67,9 @@ def of_store(
     settings : sequence of str
         See `study.change.changed`.
     study_path : Path, optional
-        The study file, where the text in the result file does not do any more.
+        Study file to read if the text in the result file can no longer be read.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def of_store(
     Raises
     ------
     InputError
-        With the faults of the settings, and every error whose new distribution reaches where no joint was drawn.
+        With the faults of the settings, and every error whose new distribution exceeds the range of the old one.
     StoreError
         When the joints of the file are not drawn from tolerances.
 
@@ -138,14 +138,14 @@ def _log_ratios(
     names: Sequence[str],
     errors: np.ndarray[tuple[int], np.dtype[np.void]],
 ) -> FloatArray:
-    """Logarithm of the new density of each joint over the old one, (n,)."""
+    """Log likelihood ratio (new over old density) of each joint, (n,)."""
     logs = np.zeros(len(errors))
     for name in names:
         values = sampling.values(errors, name)
         logs += new[name].logpdf(values) - study.tolerances[name].logpdf(values)
     linked = study.copula.names
     if set(linked) & set(names):
-        # the copula's own density: a Gaussian's with the correlation over one's without
+        # density of the Gaussian copula: correlated over independent normal density
         form = np.linalg.inv(study.copula.matrix) - np.eye(len(linked))
         for sign, tolerances in ((-0.5, new), (0.5, study.tolerances)):
             z = np.column_stack([score(tolerances[n], sampling.values(errors, n)) for n in linked])

@@ -1,4 +1,4 @@
-"""For which share of a revolution is a load above a level? Time in a joint, not the share of joints that exceed it."""
+"""Share of a revolution in which a load is above a level; not the share of joints that exceed the level."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from tolstat.store import ResultStore, revolutions
 from tolstat.study.selection import Entry, quantity
 
 SHARES = (0.5, 0.9, 0.99)
-"""Joints whose time is told: the one in the middle, and those that one in ten and one in a hundred surpass."""
+"""Shares of the joints at which quantiles of the time above are given."""
 POINTS = 60
-"""Levels of a curve."""
+"""Number of levels of a curve."""
 _COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 
@@ -32,14 +32,14 @@ class Duration(NamedTuple):
     Attributes
     ----------
     name : str
-        Of the study.
+        Name of the study.
     joints, lost : int
         Joints with and without a valid revolution, those pending not counted.
     table : DataFrame
-        One row a load and level, SI: ``load``, ``unit``, ``level``; ``joints_above`` (share of the joints that are
-        above it at any time), with ``_lower`` and ``_upper``; ``time`` (mean share of the revolution over the joints),
-        with ends; ``time_50``, ``time_90``, ``time_99`` (share of the revolution that this percentage of the joints
-        does not surpass), with ends. NaN ends for dependent samples.
+        One row per load and level, SI: ``load``, ``unit``, ``level``; ``joints_above`` (share of the joints that are
+        above the level at any time), with ``_lower`` and ``_upper``; ``time`` (mean share of the revolution over the
+        joints), with ends; ``time_50``, ``time_90``, ``time_99`` (share of the revolution that this percentage of the
+        joints does not exceed), with ends. NaN ends for dependent samples.
     curves : DataFrame
         The same columns for many levels of each load; empty unless asked for.
     """
@@ -58,20 +58,20 @@ def of_store(
     curves: bool = False,
     confidence: float = 0.95,
 ) -> Duration:
-    """Tell how long loads are above levels.
+    """Estimate for which share of a revolution loads are above levels.
 
     Parameters
     ----------
     store : ResultStore
         File of a campaign with histories, in full or as harmonics.
     by : sequence of str
-        Loads of bushings, `tables.CHANNELS`: ``cross1.F``, ``fork2.T_e``; without it those that have a limit.
+        Loads of bushings, `tables.CHANNELS`: ``cross1.F``, ``fork2.T_e``; by default those that have a limit.
     levels : sequence of str
-        ``"700 N"``; without it the load's limit. A level is for all loads of its unit.
+        ``"700 N"``; by default the load's limit. A level applies to all loads of its unit.
     curves : bool
-        Whether to go over `POINTS` levels of each load as well.
+        Whether to evaluate `POINTS` levels of each load as well.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def of_store(
     asked = _asked(store, by, levels)
     status = store.status()
     if store.sampling["nominal_first"] and store.rows.start == 0:
-        status[0] = Status.PENDING  # the joint without errors is none of the sample
+        status[0] = Status.PENDING  # the nominal joint is not part of the sample
     counted = np.flatnonzero(status == Status.OK)
     lost = int(np.sum(status != Status.PENDING)) - counted.size
     if not counted.size:
@@ -113,7 +113,7 @@ def channel(loads: NDArray[Any], name: str) -> FloatArray:
     Parameters
     ----------
     loads : ndarray, shape (n, samples, 8, 6)
-        As `revolutions.loads` gives them.
+        As `revolutions.loads` returns them.
     name : str
         One of `tables.CHANNELS`.
 
@@ -185,14 +185,14 @@ def _shares(
 def _rows(
     levels: Mapping[str, FloatArray], shares: Mapping[str, FloatArray], iid: bool, confidence: float
 ) -> Iterator[dict[str, Any]]:
-    """One row a load and level, as `Duration` has them."""
+    """One row per load and level, as in `Duration`."""
     for name, own in levels.items():
         for level, time in zip(own, shares[name].T, strict=True):
             every = np.full(time.size, int(Status.OK))
             above = exceedance.at(time, every, 0.0, confidence, iid)
             row = {"load": name, "unit": CHANNELS[name], "level": float(level)}
             row |= _ends("joints_above", above.estimate, above.lower, above.upper)
-            # a time between 0 and 1 scatters no more than one that is 0 or 1 and has the same mean
+            # a variable in [0, 1] has at most the variance of a Bernoulli variable with the same mean
             mean = exceedance.clopper_pearson(time.sum(), time.size, confidence) if iid else (np.nan, np.nan)
             row |= _ends("time", float(time.mean()), *map(float, mean))
             for share in SHARES:

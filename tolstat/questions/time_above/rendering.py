@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tolstat.questions.time_above.query import Duration
 
 COLUMNS = 4
-"""Loads that the picture shows at most."""
+"""Maximum number of loads in the picture."""
 _LINES = {
     "time": "mean joint",
     "time_50": "median joint",
@@ -42,7 +42,7 @@ def text(found: Duration) -> str:
 
 
 def note(found: Duration) -> str:
-    """Sentence on what the table stands on."""
+    """Notes to the table: number of joints, restrictions."""
     lines = [f"{found.joints} joints, {found.lost} without a valid revolution left out; time: share of a revolution"]
     if found.table["time_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only")
@@ -55,9 +55,9 @@ def write(found: Duration, stem: Path) -> list[Path]:
     Parameters
     ----------
     found : Duration
-        With curves.
+        Result with curves.
     stem : Path
-        Folder, and what all names begin with.
+        Folder, and beginning of all file names.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def write(found: Duration, stem: Path) -> list[Path]:
 
 
 def figure(found: Duration) -> Figure:
-    """Draw the curves of each load, `COLUMNS` at most: above, share of the joints; below, share of the revolution."""
+    """Draw the curves of at most `COLUMNS` loads: share of the joints (upper row), share of the revolution (lower)."""
     loads = list(dict.fromkeys(found.curves["load"]))[:COLUMNS]
     with style.settings():
         page = Figure(figsize=(max(4.2 * len(loads), 6.5), 6.6))

@@ -22,9 +22,9 @@ SMALLEST_EIGENVALUE = 1e-9
 
 
 class Correlation(Strict):
-    """One ``[[correlation]]``: every two of the errors named have the correlation `rho`.
+    """One ``[[correlation]]``: every pair of the errors in `between` has the correlation `rho`.
 
-    It is the correlation of the normal scores (Gaussian copula): the errors' own where they are normal.
+    `rho` is the correlation of the normal scores (Gaussian copula), and of the errors themselves if they are normal.
     """
 
     between: Annotated[list[str], Field(min_length=1)]
@@ -63,7 +63,7 @@ class Copula:
         from scipy.special import ndtr, ndtri
 
         scores, factor = ndtri(u), np.linalg.cholesky(self.matrix)
-        # term by term: a matrix product rounds a row by the number of rows that are multiplied with it
+        # term by term: in a matrix product the rounding of a row depends on the number of rows
         mixed = np.zeros_like(scores)
         for i, j in zip(*np.nonzero(factor), strict=True):
             mixed[:, i] += factor[i, j] * scores[:, j]
@@ -81,7 +81,7 @@ def assemble(entries: Sequence[Correlation], toleranced: dict[str, str], place: 
     toleranced : dict
         Names of the errors that have a tolerance, and their units.
     place : str
-        File that faults name.
+        File name shown in faults.
 
     Returns
     -------

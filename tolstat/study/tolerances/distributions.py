@@ -1,4 +1,4 @@
-"""From a drawing's tolerance to a distribution: inverse distribution functions, process capability, ISO 2768.
+"""Distributions of errors: inverse distribution functions, densities, process capability, ISO 2768.
 
 No statistics of the errors of Cardan crosses are published; every distribution here is an assumption
 that a study makes and states.
@@ -44,7 +44,7 @@ class Distribution(ABC):
 
     @abstractmethod
     def logpdf(self, x: Array) -> Array:
-        """Logarithm of the density at `x`; of the probability for values measured.
+        """Logarithm of the density at `x`; for a discrete distribution, of the probability.
 
         Parameters
         ----------
@@ -54,22 +54,22 @@ class Distribution(ABC):
         Returns
         -------
         ndarray, (n,)
-            -inf where the distribution has no values.
+            -inf outside the support.
         """
 
     @property
     def discrete(self) -> bool:
-        """Whether `logpdf` is that of probabilities."""
+        """Whether the distribution is discrete, so that `logpdf` gives logarithms of probabilities."""
         return False
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Kind and parameters, as JSON values: what decides the numbers that are drawn."""
+        """Kind and parameters, as JSON values: everything that determines the values drawn."""
 
 
 @dataclass(frozen=True)
 class _Described(Distribution):
-    """Distribution whose dataclass fields are all of it."""
+    """Distribution that its dataclass fields describe completely."""
 
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""
@@ -84,7 +84,7 @@ class _Banded(Protocol):
 
 
 def _within(band: _Banded, x: Array, density: Array) -> Array:
-    """Density where x is in the band, and none elsewhere."""
+    """Logarithmic density where x is in the band, -inf elsewhere."""
     return np.where((x >= band.lower) & (x <= band.upper), density, -np.inf)
 
 
@@ -108,9 +108,9 @@ class Normal(_Described):
 
 @dataclass(frozen=True)
 class TruncatedNormal(_Described):
-    """Normal distribution of parts of which those outside the band are rejected.
+    """Normal distribution truncated to the band, as if parts outside were rejected.
 
-    `mean` and `sigma` are those before the inspection.
+    `mean` and `sigma` are those before the truncation.
     """
 
     mean: float
@@ -123,7 +123,7 @@ class TruncatedNormal(_Described):
         from scipy.special import ndtr, ndtri
 
         a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
-        # each half from its own tail: probabilities near 1 have lost the digits that those near 0 still have
+        # each half from its own tail: probabilities near 1 have fewer significant digits than those near 0
         low = ndtri(ndtr(a) + u * (ndtr(b) - ndtr(a)))
         high = -ndtri(ndtr(-b) + (1 - u) * (ndtr(-a) - ndtr(-b)))
         z = np.where(low <= 0, low, high)
@@ -257,7 +257,7 @@ class Measured(Distribution):
     values : ndarray, (m,)
         Measured values, ascending.
     digest : str
-        Digest of the values, which stands for them in a study's identity.
+        Digest of the values, which replaces them in a study's identity.
     """
 
     values: Array = field(repr=False, compare=False)
@@ -291,7 +291,7 @@ class Measured(Distribution):
 
 
 def score(distribution: Distribution, values: Array) -> Array:
-    """Standard scores: how many sigma from the middle a normal error of the same probability would lie.
+    """Standard normal scores that have the same probability as the values.
 
     Parameters
     ----------
@@ -303,8 +303,8 @@ def score(distribution: Distribution, values: Array) -> Array:
     Returns
     -------
     ndarray, (n,)
-        z with ``ppf(Phi(z)) = value``; for a normal distribution (value - mean) / sigma. Where a range of probabilities
-        has one value (`Measured`), their middle. Beyond +-9 it is not told apart.
+        z with ``ppf(Phi(z)) = value``, within +-9; for a normal distribution (value - mean) / sigma. Where a range of
+        probabilities has one value (`Measured`), the score of the middle of that range.
     """
     from scipy.special import ndtr, ndtri
 

@@ -1,4 +1,4 @@
-"""What the entries of ``[tolerances]`` have in common: the error they are for, and the band.
+"""Common base of the entries of ``[tolerances]``: the error that an entry is for, and its band.
 
 A band is ``plus_minus`` about the nominal value, ``lower`` and ``upper``, or ``iso2768`` and ``nominal``.
 Limits and means are deviations for geometry, the values themselves for ``operation.*`` and ``material.*``.
@@ -58,7 +58,7 @@ class ToleranceEntry(schema.Strict):
 
     @abstractmethod
     def build(self, site: Site) -> Distribution:
-        """Return the distribution that the entry means; refuses keys that contradict each other."""
+        """Return the distribution of the entry; refuse keys that contradict each other."""
 
     @model_validator(mode="after")
     def _can_be_built(self, info: ValidationInfo) -> Self:

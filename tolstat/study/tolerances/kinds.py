@@ -1,6 +1,6 @@
-"""Entries of ``[tolerances]``, one model for each distribution: their keys, and the distribution they mean.
+"""Entries of ``[tolerances]``, one model for each distribution: the entry's keys, and the distribution they define.
 
-No statistics of the errors of Cardan crosses are published: which distribution holds is what a study assumes.
+No statistics of the errors of Cardan crosses are published: the distribution is an assumption of the study.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class BetaEntry(Banded):
 
 
 class RayleighEntry(HalfBand):
-    """Radius of an offset of which each coordinate has sigma = plus_minus / (3 cpk), or `sigma` as given."""
+    """Radius of an offset whose two coordinates have sigma = plus_minus / (3 cpk) each, or the given `sigma`."""
 
     distribution: Literal["rayleigh"]
     cpk: PositiveNumber | None = None
@@ -225,7 +225,7 @@ RADIAL_KINDS: dict[str, type[ToleranceEntry]] = {"rayleigh": RayleighEntry}
 
 
 def distribution(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> Distribution:
-    """Distribution that an entry means.
+    """Distribution that an entry defines.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def distribution(data: object, site: Site, place: str, path: tuple[int | str, ..
     site : Site
         The error that it is for.
     place, path : str, tuple of str
-        File, and key path in it, that faults name.
+        File name, and key path in the file, shown in faults.
 
     Returns
     -------

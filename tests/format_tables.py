@@ -8,8 +8,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from tolstat.common import draw_records as origins
-from tolstat.common import tables
+from tolstat.common import draw_records, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "result_format.md"
@@ -41,7 +40,7 @@ def updated(text: str) -> str:
     """`text` of the document with its tables made anew."""
     content = {
         "design": field_table(DESIGN_COLUMNS),
-        **{f"origin {method}": field_table(origins.columns({"method": method})) for method in origins.FIELDS},
+        **{f"origin {method}": field_table(draw_records.columns({"method": method})) for method in draw_records.FIELDS},
         "errors": field_table(ERROR_COLUMNS),
         "results": field_table(RESULT_COLUMNS),
         "ledger": field_table(LEDGER_COLUMNS),

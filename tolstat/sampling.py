@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from tolstat.common import draw_records as origins
+from tolstat.common import draw_records
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import nominal_errors
 from tolstat.study import Study
@@ -86,14 +86,14 @@ def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
 
 
 def _level_0(study: Study, rows: range) -> Table:
-    table = np.zeros(len(rows), origins.SUBSET)
+    table = np.zeros(len(rows), draw_records.SUBSET)
     table["level"][: max(0, int(study.sampling.nominal_first) - rows.start)] = -1  # the nominal joint
     table["parent"] = -1
     return table
 
 
 def _origin(study: Study, rows: range) -> Table:
-    table = np.zeros(len(rows), origins.IMPORTANCE)
+    table = np.zeros(len(rows), draw_records.IMPORTANCE)
     table["component"] = -1  # the nominal joint
     drawn = table[max(0, int(study.sampling.nominal_first) - rows.start) :]
     last = rows.stop - int(study.sampling.nominal_first)

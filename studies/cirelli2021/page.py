@@ -22,7 +22,7 @@ from studies.cirelli2021 import page_equations as paper_equations
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_main import revolutions
 from studies.cirelli2021.page_source import PaperStudy
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 from tolstat.common.tables import BUSHINGS
 from tolstat.display import style, text
 
@@ -85,7 +85,7 @@ def write(study: PaperStudy, path: Path) -> None:
     environment.filters["picture"] = _picture
     environment.filters["number"] = _number
     page = environment.get_template("paper.html.j2").render(context(study))
-    with writing(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
 
 

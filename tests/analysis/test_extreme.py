@@ -98,7 +98,7 @@ def test_stability_follows_the_threshold():
     assert tails[1].shape.lower < 0.1 < tails[1].shape.upper
     default = extreme.stability(values, np.ones(4000))
     assert len(default) == 8
-    assert default[-1].n_above >= extreme.FEWEST
+    assert default[-1].n_above >= extreme.MIN_EXCESSES
 
 
 def test_a_thin_tail_is_refused_with_the_joints_needed():

@@ -12,7 +12,7 @@ from tests.analysis.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
 from tests.support import fakes, synthetic
 from tolstat import cli, joint, sampling, study
 from tolstat.analysis import pick_freeze
-from tolstat.campaign import extend as combine
+from tolstat.campaign import extend
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.common.errors import InputError
@@ -169,7 +169,7 @@ def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, mo
     found = json.loads(CliRunner().invoke(cli.app, ["causes", "design_causes.h5", "--json"]).stdout)
     assert found["r2"] is None
     assert len(found["table"]) == 2
-    wider = combine.extend(tmp_path / "design_causes.h5", 160)
+    wider = extend.extend(tmp_path / "design_causes.h5", 160)
     assert wider.rows == 1 + 160 * 4
 
 

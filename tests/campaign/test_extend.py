@@ -18,7 +18,7 @@ from tests.campaign.test_campaign import datasets
 from tests.support import fakes, synthetic
 from tolstat import cli, joint, sampling
 from tolstat import study as studies
-from tolstat.campaign import extend as combine
+from tolstat.campaign import extend
 from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.errors import InputError, StoreError
@@ -72,7 +72,7 @@ def test_an_extended_campaign_is_one_of_that_size(tmp_path: Path, make: Make, me
     grown = run(make(40, method, kind), tmp_path / "grown.h5")
     before = datasets(grown)
     for n in (41, 101):  # more than once, too
-        study = combine.extend(grown, n)
+        study = extend.extend(grown, n)
         run(study, grown)
     assert datasets(grown) == datasets(whole)
     assert ("histories/loads" in before) == (kind == "full")
@@ -94,9 +94,9 @@ def test_a_kill_while_extending_leaves_the_old_file(
     with monkeypatch.context() as patch:
         patch.setattr("os.replace", killed)
         with pytest.raises(KeyboardInterrupt):
-            combine.extend(path, 60)
+            extend.extend(path, 60)
     assert path.read_bytes() == before
-    run(combine.extend(path, 60), path)
+    run(extend.extend(path, 60), path)
     assert datasets(path) == datasets(run(make(60, kind="full"), tmp_path / "b.h5"))
 
 
@@ -111,19 +111,19 @@ def test_what_cannot_grow_is_refused(tmp_path: Path, make: Make, method: str, n:
     path = run(make(40, method), tmp_path / "a.h5")
     before = path.read_bytes()
     with pytest.raises(InputError, match=message):
-        combine.extend(path, n)
+        extend.extend(path, n)
     assert path.read_bytes() == before
 
 
 def test_slices_and_changed_studies_do_not_grow(tmp_path: Path, make: Make) -> None:
     (part,) = slices(make(40), tmp_path, 5, 20)
     with pytest.raises(InputError, match="holds rows 5:20 of a campaign only\n  hint: merge"):
-        combine.extend(part, 80)
+        extend.extend(part, 80)
     whole = run(make(40), tmp_path / "a.h5")
     make(40, seed=3)
     changed = "its study is not as it was when the file was made\n    sampling.seed: 2021 in the file, 3 in the study"
     with pytest.raises(StoreError, match=changed):
-        combine.extend(whole, 80, tmp_path / "small.toml")
+        extend.extend(whole, 80, tmp_path / "small.toml")
 
 
 @pytest.mark.slow
@@ -133,7 +133,7 @@ def test_merged_slices_are_one_run(tmp_path: Path, make: Make, method: str, kind
     study = make(60, method, kind)
     parts = slices(study, tmp_path, 0, 1, 20, 44, 61)
     assert len(datasets(parts[2])["row"]) == 24 * 8
-    merged = combine.merge(parts[::-1], tmp_path / "c.h5")
+    merged = extend.merge(parts[::-1], tmp_path / "c.h5")
     whole = run(study, tmp_path / "whole.h5")
     assert datasets(tmp_path / "c.h5") == datasets(whole)
     assert (merged.counts.done, merged.twice) == (61, 0)
@@ -147,14 +147,14 @@ def test_merged_slices_are_one_run(tmp_path: Path, make: Make, method: str, kind
 def test_equal_overlaps_are_merged_and_different_ones_refused(tmp_path: Path, make: Make) -> None:
     study = make(60)
     parts = slices(study, tmp_path, 0, 30, 61) + slices(study, tmp_path, 10, 40)
-    assert combine.merge(parts, tmp_path / "c.h5").twice == 30
+    assert extend.merge(parts, tmp_path / "c.h5").twice == 30
     assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
     with ResultStore.open(parts[2], "r+") as store:
         results = store.results(slice(7, 8))
         results["T_max"][0, 1] += 1e-13
         store.write(np.array([7]), Simulation(results, {}))
     with pytest.raises(InputError, match=r"0-30.h5 and .*10-40.h5: hold different results of row 17: cross2.T_max"):
-        combine.merge(parts, tmp_path / "d.h5")
+        extend.merge(parts, tmp_path / "d.h5")
     assert not (tmp_path / "d.h5").exists()
 
 
@@ -162,7 +162,7 @@ def test_gaps_and_strangers_are_told_together(tmp_path: Path, make: Make) -> Non
     other = slices(make(60, seed=4), tmp_path, 20, 22)
     parts = slices(make(60), tmp_path, 0, 5) + slices(make(60), tmp_path, 30, 50) + other
     with pytest.raises(InputError) as caught:
-        combine.merge(parts, tmp_path / "c.h5")
+        extend.merge(parts, tmp_path / "c.h5")
     text = str(caught.value)
     assert "20-22.h5: is not of the campaign of" in text
     assert "sampling.seed: 4 in the file, 2021 there" in text
@@ -172,7 +172,7 @@ def test_gaps_and_strangers_are_told_together(tmp_path: Path, make: Make) -> Non
     assert not (tmp_path / "c.h5").exists()
     (tmp_path / "c.h5").touch()
     with pytest.raises(StoreError, match="exists already"):
-        combine.merge(parts, tmp_path / "c.h5")
+        extend.merge(parts, tmp_path / "c.h5")
 
 
 def test_pending_rows_stay_pending_and_can_be_done_later(tmp_path: Path, make: Make) -> None:
@@ -180,7 +180,7 @@ def test_pending_rows_stay_pending_and_can_be_done_later(tmp_path: Path, make: M
     parts = slices(study, tmp_path, 0, 30, 61)
     with h5py.File(parts[1], "r+") as file:
         file["results/status"][3:9] = Status.PENDING
-    assert combine.merge(parts, tmp_path / "c.h5").counts.done == 55
+    assert extend.merge(parts, tmp_path / "c.h5").counts.done == 55
     run(study, tmp_path / "c.h5")
     assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
 

@@ -16,9 +16,8 @@ from tests.support import fakes, synthetic
 from tests.support.synthetic import HEAD
 from tolstat import cli, report, study
 from tolstat.analysis import exceedance, quantile
-from tolstat.campaign import plan
+from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
-from tolstat.campaign import stop_rule as precision
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
 from tolstat.store import ResultStore, view
@@ -28,8 +27,8 @@ RULE = "P(cross1.F > 0.5 N) width < 0.4"
 
 
 def test_a_rule_is_read() -> None:
-    assert precision.parse("P(cross1.F > 0.7 kN) width < 0.002")[1:] == ("cross1.F", 700.0, 0.002)
-    assert precision.parse(" P( psi>1e-3 )width<0.5 ")[1:] == ("psi", 1e-3, 0.5)
+    assert stop_rule.parse("P(cross1.F > 0.7 kN) width < 0.002")[1:] == ("cross1.F", 700.0, 0.002)
+    assert stop_rule.parse(" P( psi>1e-3 )width<0.5 ")[1:] == ("psi", 1e-3, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -43,17 +42,17 @@ def test_a_rule_is_read() -> None:
 )
 def test_faults_of_a_rule_are_told_together(text: str, words: list[str]) -> None:
     with pytest.raises(InputError) as caught:
-        precision.parse(text)
+        stop_rule.parse(text)
     assert all(word in str(caught.value) for word in words), caught.value
 
 
 def test_looks_begin_where_one_can_suffice() -> None:
-    assert precision.looks(0.002, 100_000) == [1843, 3686, 7372, 14744, 29488, 58976, 100_000]
+    assert stop_rule.looks(0.002, 100_000) == [1843, 3686, 7372, 14744, 29488, 58976, 100_000]
     _, upper = exceedance.clopper_pearson([0, 0], [1842, 1843])
     assert upper[0] > 0.002 > upper[1]
-    assert precision.looks(0.1, 20) == [20]
-    assert precision.looks(0.1, 10**6) == [36, 72, 144, 288, 576, 1152, 2304, 4608, 10**6]
-    assert precision.each(5) == pytest.approx(0.99)
+    assert stop_rule.looks(0.1, 20) == [20]
+    assert stop_rule.looks(0.1, 10**6) == [36, 72, 144, 288, 576, 1152, 2304, 4608, 10**6]
+    assert stop_rule.each(5) == pytest.approx(0.99)
 
 
 def missed(p: float, width: float, planned: list[int], confidence: float, runs: int = 20_000) -> float:
@@ -71,34 +70,34 @@ def missed(p: float, width: float, planned: list[int], confidence: float, runs: 
 @pytest.mark.parametrize("width", [0.1, 0.01])
 def test_the_interval_of_a_stopped_campaign_covers(p: float, width: float) -> None:
     """Misses stay below 5 %, here with three standard errors to spare."""
-    planned = precision.looks(width, 100_000)
-    assert missed(p, width, planned, precision.each(len(planned))) < 0.05 - 3 * np.sqrt(0.05 / 20_000)
+    planned = stop_rule.looks(width, 100_000)
+    assert missed(p, width, planned, stop_rule.each(len(planned))) < 0.05 - 3 * np.sqrt(0.05 / 20_000)
 
 
 def test_an_interval_that_is_not_corrected_misses_too_often() -> None:
-    planned = precision.looks(0.01, 100_000)
-    assert missed(0.01, 0.01, planned, precision.CONFIDENCE) > 0.07
+    planned = stop_rule.looks(0.01, 100_000)
+    assert missed(0.01, 0.01, planned, stop_rule.CONFIDENCE) > 0.07
 
 
 def test_unresolved_joints_count_both_ways() -> None:
-    lower, upper = precision.interval(10, 5, 100, 1)
+    lower, upper = stop_rule.interval(10, 5, 100, 1)
     assert lower == exceedance.clopper_pearson(10, 100)[0]
     assert upper == exceedance.clopper_pearson(15, 100)[1]
 
 
-def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400) -> precision.Outcome:
+def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400) -> stop_rule.Outcome:
     made = fakes.Study(n=n)
 
     def run(row: int) -> None:
         campaign.run(made, path, workers, block, stages=fakes.stages(), until_row=row)
 
-    return precision.run_until(made, path, precision.parse(RULE), run)
+    return stop_rule.run_until(made, path, stop_rule.parse(RULE), run)
 
 
 def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     outcome = stopped(path)
-    looks = precision.looks(0.4, 399)
+    looks = stop_rule.looks(0.4, 399)
     look = outcome.look
     assert outcome.reached
     assert outcome.looks == looks
@@ -111,7 +110,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
         assert store.stop["joints"] == look.joints
         assert store.stop["confidence_of_a_look"] == pytest.approx(1 - 0.05 / len(looks))
     assert look.n_unresolved == (status[1 : look.joints + 1] != Status.OK).sum()
-    shares = [exceedance.at(loads[1 : n + 1], status[1 : n + 1], 0.5, precision.each(len(looks))) for n in looks[:-1]]
+    shares = [exceedance.at(loads[1 : n + 1], status[1 : n + 1], 0.5, stop_rule.each(len(looks))) for n in looks[:-1]]
     widths = [share.outer_upper - share.outer_lower for share in shares]
     first = next(n for n, width in zip(looks, widths, strict=False) if width < 0.4)
     assert first == look.joints
@@ -140,14 +139,14 @@ def test_until_is_for_independent_samples(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(synthetic.STUDY.replace("n = 60", 'n = 64\nmethod = "sobol"'), encoding="utf-8")
     loaded = study.load(tmp_path / "s.toml")
     with pytest.raises(InputError, match=r"sampling\.method is 'sobol': only independent samples, alike in weight"):
-        precision.run_until(loaded, tmp_path / "a.h5", precision.parse(RULE), lambda row: None)
+        stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE), lambda row: None)
 
 
 def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=40)
-    look = precision.Look(39, 0, 4, 0.02, 0.25)
+    look = stop_rule.Look(39, 0, 4, 0.02, 0.25)
     with ResultStore.open(path, "r+") as store:
-        store.note_stop(precision.Outcome(True, look, [39, 60]).record(precision.parse(RULE)))
+        store.note_stop(stop_rule.Outcome(True, look, [39, 60]).record(stop_rule.parse(RULE)))
     notes = report.build(path).notes
     assert f"stopped by {RULE} at 39 joints; 95% interval corrected for 2 looks: 0.02000 to 0.25000" in notes
 
@@ -166,7 +165,7 @@ def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert f"{RULE}: reached with" in done.stderr
     assert "corrected for 7 planned looks" in done.stderr
     with h5py.File("s.h5") as file:
-        assert json.loads(file.attrs["stop"])["looks"] == precision.looks(0.4, 400)
+        assert json.loads(file.attrs["stop"])["looks"] == stop_rule.looks(0.4, 400)
     done = CliRunner().invoke(cli.app, [*words, "--rows", "0:9"])
     assert done.exit_code == 2
 

@@ -23,7 +23,7 @@ from tolstat.common.files import data_dir
 from tolstat.common.tables import RESULT, Status
 from tolstat.questions.causes import tail
 from tolstat.store import ResultStore, integrity, recorded
-from tolstat.study.tolerances import distributions as tolerance
+from tolstat.study.tolerances import distributions
 
 HEAD = """
 [joint]
@@ -158,27 +158,27 @@ def test_pending_rows_and_unknown_options_are_refused(file: Path, tmp_path: Path
 
 
 DISTRIBUTIONS = [
-    (tolerance.Normal(0.1, 0.02), stats.norm(0.1, 0.02)),
-    (tolerance.TruncatedNormal(0.0, 1.0, -2.0, 3.0), stats.truncnorm(-2.0, 3.0)),
-    (tolerance.Uniform(-1.0, 2.0), stats.uniform(-1.0, 3.0)),
-    (tolerance.Triangular(0.0, 2.0, 0.5), stats.triang(0.25, 0.0, 2.0)),
-    (tolerance.LogNormal(0.0, tolerance.Normal(0.0, 0.5)), stats.lognorm(0.5)),
-    (tolerance.Beta(2.0, 5.0, 0.0, 1.0), stats.beta(2.0, 5.0)),
-    (tolerance.Rayleigh(1.5), stats.rayleigh(scale=1.5)),
+    (distributions.Normal(0.1, 0.02), stats.norm(0.1, 0.02)),
+    (distributions.TruncatedNormal(0.0, 1.0, -2.0, 3.0), stats.truncnorm(-2.0, 3.0)),
+    (distributions.Uniform(-1.0, 2.0), stats.uniform(-1.0, 3.0)),
+    (distributions.Triangular(0.0, 2.0, 0.5), stats.triang(0.25, 0.0, 2.0)),
+    (distributions.LogNormal(0.0, distributions.Normal(0.0, 0.5)), stats.lognorm(0.5)),
+    (distributions.Beta(2.0, 5.0, 0.0, 1.0), stats.beta(2.0, 5.0)),
+    (distributions.Rayleigh(1.5), stats.rayleigh(scale=1.5)),
 ]
 
 
 @pytest.mark.parametrize(("ours", "theirs"), DISTRIBUTIONS)
-def test_scores_have_the_probability_of_the_error(ours: tolerance.Distribution, theirs: object) -> None:
+def test_scores_have_the_probability_of_the_error(ours: distributions.Distribution, theirs: object) -> None:
     z = np.array([-5.0, -3.0, -1.0, -0.1, 0.0, 0.4, 2.0, 3.5, 5.0])
     values = theirs.ppf(stats.norm.cdf(z))
-    np.testing.assert_allclose(tolerance.score(ours, values), z, atol=2e-9)
+    np.testing.assert_allclose(distributions.score(ours, values), z, atol=2e-9)
 
 
 def test_score_of_a_measured_value_is_the_middle_of_its_step() -> None:
-    measured = tolerance.Measured.of([1.0, 2.0, 2.0, 7.0])
+    measured = distributions.Measured.of([1.0, 2.0, 2.0, 7.0])
     expected = stats.norm.ppf([1 / 8, 1 / 2, 7 / 8])
-    np.testing.assert_allclose(tolerance.score(measured, np.array([1.0, 2.0, 7.0])), expected, atol=1e-9)
+    np.testing.assert_allclose(distributions.score(measured, np.array([1.0, 2.0, 7.0])), expected, atol=1e-9)
 
 
 def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:

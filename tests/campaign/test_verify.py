@@ -19,8 +19,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Method, Options, Start, Status
 from tolstat.questions.exceedance import accuracy as tables
 from tolstat.questions.exceedance import rendering as exceedance
-from tolstat.store import ResultStore, recorded, verification
-from tolstat.store import view as source
+from tolstat.store import ResultStore, recorded, verification, view
 from tolstat.store.verification import Check, Verification
 
 REAL = """
@@ -198,10 +197,10 @@ def off_by(path, factor, rows=(5, 9)):
 def test_report_moves_every_load_by_the_numerical_error(tmp_path):
     path = synthetic.store(tmp_path)
     with ResultStore.open(path) as store:
-        assert exceedance.limits(source.read(store))["numerical_lower"].isna().all()
+        assert exceedance.limits(view.read(store))["numerical_lower"].isna().all()
     off_by(path, 1.25)
     with ResultStore.open(path) as store:
-        limits = exceedance.limits(source.read(store)).set_index("load").loc["cross1.F"]
+        limits = exceedance.limits(view.read(store)).set_index("load").loc["cross1.F"]
         results = store.results()[1:]
     assert limits["numerical_error"] == pytest.approx(0.2)
     moved = 0.2 * results["F_max"].max(axis=1)

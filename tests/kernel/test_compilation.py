@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba import float64
 
-from tolstat.kernel.simd.jit import closure
+from tolstat.kernel.simd.jit import njit_inner
 
 
 @numba.njit
@@ -17,12 +17,12 @@ def users(x):
     return math.exp(x)
 
 
-@closure
+@njit_inner
 def square(x):
     return x * x
 
 
-@closure
+@njit_inner
 def sum_of_squares(x):
     total = 0.0
     for k in range(x.size):
@@ -30,7 +30,7 @@ def sum_of_squares(x):
     return total
 
 
-@closure
+@njit_inner
 def top(x):
     return sum_of_squares(x) + square(x[0]) + users(x[1])
 
@@ -66,7 +66,7 @@ def test_functions_that_are_no_kernels_call_kernels():
     assert ordinary(X) == pytest.approx(TOP + 9, rel=1e-15)
     assert top(X) == pytest.approx(TOP, rel=1e-15)
 
-    @closure
+    @njit_inner
     def above(x):
         return ordinary(x) + square(x[2])
 
@@ -75,19 +75,19 @@ def test_functions_that_are_no_kernels_call_kernels():
 
 def test_two_kernels_of_one_factory_are_told_apart():
     def build(inner):
-        @closure
+        @njit_inner
         def kernel(x):
             return inner(x) + 1
 
         return kernel
 
-    @closure
+    @njit_inner
     def cube(x):
         return x * x * x
 
     of_square, of_cube = build(square), build(cube)
 
-    @closure
+    @njit_inner
     def both(x):
         return of_square(x), of_cube(x)
 
@@ -96,11 +96,11 @@ def test_two_kernels_of_one_factory_are_told_apart():
 
 
 def test_an_error_in_a_part_names_it():
-    @closure
+    @njit_inner
     def wrong(x):
         return x.no_such_thing
 
-    @closure
+    @njit_inner
     def caller(x):
         return wrong(x)
 

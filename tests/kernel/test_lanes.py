@@ -12,7 +12,7 @@ from tolstat import joint as joints
 from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
-from tolstat.kernel.simd.jit import closure
+from tolstat.kernel.simd.jit import njit_inner
 from tolstat.kernel.simd.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
 from tolstat.solver import simulation, stationary
 
@@ -20,7 +20,7 @@ FAST = Options(steps_per_rev=45, max_revs=6, max_refinements=0)
 STATIC = FAST._replace(fidelity=int(Fidelity.QUASISTATIC))
 
 
-@closure
+@njit_inner
 def operations(a, b, out):
     a, b, out = as_lanes(a)[0], as_lanes(b)[0], as_lanes(out)
     out[0], out[1], out[2], out[3] = a + b, a - b, a * b, a / b
@@ -70,7 +70,7 @@ def libm(function, *arguments):
     return np.array(out)
 
 
-@closure
+@njit_inner
 def halve_all(record):
     lanes = as_lanes(record)
     lanes.R = 0.5 * lanes.R
@@ -120,7 +120,7 @@ def assert_same(a, b):
 def alone(params, options):
     results = np.zeros(len(params), simulation.RESULT).view(np.recarray)
     samples = [own.copy() for _, own in simulation._alone(params, options, True, results)]
-    stationary.fill_ends(results)
+    stationary.fill_intervals(results)
     return results, samples
 
 

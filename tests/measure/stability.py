@@ -22,10 +22,10 @@ from tolstat.kernel.integrators.integrate import reset
 from tolstat.kernel.integrators.state import CV_FACTORISED, H_OLD, make_state_record
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import WORK
-from tolstat.kernel.revolution.resolve import APART, lever
+from tolstat.kernel.revolution.resolve import APART, radius_of
 from tolstat.kernel.revolution.settle import grid_step
 from tolstat.kernel.revolution.simulate import advance, begin, clear, make_scratch
-from tolstat.kernel.simd.jit import closure, njit
+from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.solver import simulation
 
 Table = np.ndarray[tuple[int], np.dtype[np.void]]
@@ -94,7 +94,7 @@ def _growth(values: np.ndarray, period: float) -> Growth:
     return Growth(float(fastest.max()), float(abs(values[k, i].imag) / (2 * math.pi)), largest)
 
 
-@closure
+@njit_inner
 def _revolution(first, par, options, work, state):
     """Integrate from grid point `first` on over a revolution; False where a step fails."""
     h = grid_step(par, options)
@@ -110,7 +110,7 @@ def set_apart(state, shadow, R):
     """Choose the first difference of the two states: `APART`, in all unknowns."""
     share = APART / math.sqrt(state.q0.size)
     for i in range(state.q0.size):
-        radius = lever(i, R)
+        radius = radius_of(i, R)
         shadow.q0[i] = state.q0[i] + (share if i % 2 == 0 else -share) / radius
         shadow.v0[i], shadow.a0[i], shadow.weight[i] = state.v0[i], state.a0[i], state.weight[i]
     reset(shadow)
@@ -135,7 +135,7 @@ def distance(state, shadow, h, R):
     """Distance of two states, m: positions, and what their speeds add in a step; rotations at the radius R."""
     square = 0.0
     for i in range(state.q0.size):
-        radius = lever(i, R)
+        radius = radius_of(i, R)
         dq, dv = shadow.q0[i] - state.q0[i], h * (shadow.v0[i] - state.v0[i])
         square += radius * radius * (dq * dq + dv * dv)
     return math.sqrt(square)

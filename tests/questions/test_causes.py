@@ -14,8 +14,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.questions.capability import rendering as capability
 from tolstat.questions.causes import query as causes
 from tolstat.questions.causes import rendering as report
-from tolstat.store import ResultStore
-from tolstat.store import view as source
+from tolstat.store import ResultStore, view
 
 N = 3000
 TEXT = synthetic.STUDY.replace("n = 60", f"n = {N}").replace('"pin*.offset_t"', '"pin*.offset_[tz]"')
@@ -66,7 +65,7 @@ def test_known_causes_are_found_with_their_shares(path):
 
 def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):
     monkeypatch.setattr(causes, "MOST", 1000)
-    monkeypatch.setattr(source, "BLOCK", 700)
+    monkeypatch.setattr(view, "BLOCK", 700)
     with ResultStore.open(path) as store:
         found = causes.of_store(store, "cross1.F")
         errors, loads = store.errors()[1:1001], store.results()["F_max"][1:-5, 0]
@@ -119,15 +118,15 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
 
 def test_capability_of_each_limit_and_of_all_together(path):
     with ResultStore.open(path) as store:
-        campaign = source.read(store)
+        campaign = view.read(store)
     table = capability.limits(campaign).set_index("load")
     assert list(table.index) == [*campaign.limits, capability.TOGETHER]
     status = campaign.results["status"]
     shares = {
-        name: exceedance.at(source.load(campaign.results, name)[0], status, x) for name, x in campaign.limits.items()
+        name: exceedance.at(view.load(campaign.results, name)[0], status, x) for name, x in campaign.limits.items()
     }
     assert table.loc["cross1.F", "ppm"] == pytest.approx(1e6 * shares["cross1.F"].estimate)
-    above = pd.DataFrame({n: source.load(campaign.results, n)[0] > x for n, x in campaign.limits.items()})
+    above = pd.DataFrame({n: view.load(campaign.results, n)[0] > x for n, x in campaign.limits.items()})
     assert table.loc[capability.TOGETHER, "count"] == above[status == Status.OK].any(axis=1).sum()
     assert table.loc[capability.TOGETHER, "good"] <= table["good"].min()
     assert (table["ppm_lower"] <= table["ppm"]).all()

@@ -163,18 +163,18 @@ def test_equivalent_load_and_damage_of_constant_amplitude():
 def test_a_duty_cycle_adds_damage_not_loads():
     parts = [of_signals(noise(seed), noise(seed + 10)) for seed in (1, 2)]
     shares = [0.3, 0.7]
-    both = cycles.mix(parts, shares)
+    both = cycles.duty_cycle(parts, shares)
     line = damage.Line(3.0, 4.0, 1e6)
     separate = sum(s * damage.damage(p, line, 1e6) for s, p in zip(shares, parts, strict=True))
     np.testing.assert_allclose(damage.damage(both, line, 1e6), separate)
     power = sum(s * damage.equivalent_load(p, 3.0) ** 3 for s, p in zip(shares, parts, strict=True))
     np.testing.assert_allclose(damage.equivalent_load(both, 3.0), power ** (1 / 3))
-    np.testing.assert_allclose(cycles.mix([parts[0]] * 2, [0.5, 0.5]).number, parts[0].number)
+    np.testing.assert_allclose(cycles.duty_cycle([parts[0]] * 2, [0.5, 0.5]).number, parts[0].number)
     for wrong in ([1.0], [0.5, 0.6], [0.0, 1.0]):
         with pytest.raises(ValueError, match="shares"):
-            cycles.mix(parts, wrong)
+            cycles.duty_cycle(parts, wrong)
     with pytest.raises(ValueError, match="same joints"):
-        cycles.mix([parts[0], of_signals(noise())], shares)
+        cycles.duty_cycle([parts[0], of_signals(noise())], shares)
 
 
 def test_spectrum_reads_the_ordered_ranges():
@@ -187,7 +187,7 @@ def test_spectrum_reads_the_ordered_ranges():
         for q, number in enumerate(numbers):
             expected[i, q] = next((r for k, r in enumerate(ranges, 1) if k >= number), 0.0)
     np.testing.assert_allclose(cycles.spectrum(here, numbers)[:, 0], expected)
-    both = cycles.mix([here, here], [0.4, 0.6])
+    both = cycles.duty_cycle([here, here], [0.4, 0.6])
     np.testing.assert_allclose(cycles.spectrum(both, numbers)[:, 0], expected)
 
 
@@ -197,8 +197,8 @@ def test_shortfall_bounds_what_has_no_place():
         ("cross1.F_e",), ranges[None, None, :16], ranges[None, None, :16], np.array([[len(ranges)]]), np.ones(16)
     )
     lost = np.sum(ranges[16:] ** 3) / np.sum(ranges[:16] ** 3)
-    assert lost <= damage.shortfall(kept, 3.0)[0, 0] < 100 * lost
-    assert damage.shortfall(of_signals(noise()), 3.0)[0, 0] == 0.0
+    assert lost <= damage.truncation_bound(kept, 3.0)[0, 0] < 100 * lost
+    assert damage.truncation_bound(of_signals(noise()), 3.0)[0, 0] == 0.0
 
 
 def test_joints_without_results_have_no_values():

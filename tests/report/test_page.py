@@ -13,9 +13,8 @@ from tolstat.analysis import exceedance
 from tolstat.cli import app
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
-from tolstat.report import compose as pages
+from tolstat.report import compose, loads, page, verdict
 from tolstat.report import html as writer
-from tolstat.report import loads, page, verdict
 from tolstat.store import ResultStore
 from tolstat.store.view import load
 
@@ -39,7 +38,7 @@ def found(path):
 
 @pytest.fixture(scope="module")
 def html(found, path):
-    writer.write(pages.compose(found), path.with_suffix(".html"))
+    writer.write(compose.compose(found), path.with_suffix(".html"))
     return path.with_suffix(".html").read_text(encoding="utf-8")
 
 
@@ -94,9 +93,9 @@ def test_text_of_the_study_is_shown_and_not_run(html):
 
 def test_same_file_same_bytes(path, found, html, tmp_path):
     with ResultStore.open(path) as store:
-        again = pages.compose(page.gather(store, 0.05, 0))
+        again = compose.compose(page.gather(store, 0.05, 0))
     contents = []
-    for k, made in enumerate((pages.compose(found), again)):
+    for k, made in enumerate((compose.compose(found), again)):
         some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
         writer.write(replace(made, sections=some), tmp_path / f"{k}.html")
         contents.append((tmp_path / f"{k}.html").read_bytes())
@@ -166,7 +165,7 @@ def _of(found, name):
 def words(path, accepted=np.nan):
     """Sections of a page, and its paragraphs and cells, without drawing it."""
     with ResultStore.open(path) as store:
-        made = pages.compose(page.gather(store, accepted, 0))
+        made = compose.compose(page.gather(store, accepted, 0))
     found = [made.subtitle]
     for block in (block for section in made.sections for block in section.blocks):
         found += [block.text] if block.kind == "text" else []

@@ -17,13 +17,13 @@ from tolstat.common.tables import BUSHINGS, RESULT, Status
 from tolstat.display import style, text
 from tolstat.questions.exceedance import rendering as exceedance
 from tolstat.questions.exceedance import sweep
-from tolstat.store import view as source
+from tolstat.store import view
 
 
 def campaign(n=201, method="random", limits=None, **kwargs):
     results = synthetic.results(n, **kwargs)
     limits = {"cross1.F": 700.0} if limits is None else limits
-    return source.Campaign("made up", method, limits, synthetic.errors(n)[1:], results[1:], results[:1])
+    return view.Campaign("made up", method, limits, synthetic.errors(n)[1:], results[1:], results[:1])
 
 
 def swept(second=1, limits=None):
@@ -90,7 +90,7 @@ def test_curves_fall_from_every_load_to_none_and_are_thinned():
 
 def test_unknown_load_names_what_there_is():
     with pytest.raises(InputError, match=r"cross9\.F.*\n.*cross1\.F"):
-        source.load(np.zeros(1, RESULT), "cross9.F")
+        view.load(np.zeros(1, RESULT), "cross9.F")
 
 
 def test_picture_states_study_numbers_units_and_limits():
@@ -169,13 +169,13 @@ def test_joints_that_are_all_alike_can_be_drawn():
 
 
 def test_sweep_finds_its_axes_and_their_units():
-    diameter, tilt = source.swept_axes(swept(3))
+    diameter, tilt = view.swept_axes(swept(3))
     assert (diameter.label, diameter.unit) == ("pin*.diameter", "mm")
     assert (diameter.values.min(), diameter.values.max()) == pytest.approx((-0.1, 0.1))
     assert (tilt.label, tilt.unit) == ("pin1.tilt_z", "deg")
     assert np.unique(tilt.values) == pytest.approx([0.5, 0.75, 1.0])
     unnamed = replace(swept(1), patterns=())
-    assert source.swept_axes(unnamed)[0].label == "pin1.diameter and 3 more"
+    assert view.swept_axes(unnamed)[0].label == "pin1.diameter and 3 more"
 
 
 def test_sweep_table_keeps_every_joint_with_its_status():

@@ -12,7 +12,7 @@ from tests.cli.test_cli import invented_campaign
 from tests.support import synthetic
 from tolstat import sampling, study
 from tolstat.analysis import exceedance, weighted
-from tolstat.campaign import extend as combine
+from tolstat.campaign import extend
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Simulation, Status
@@ -175,14 +175,14 @@ def test_statistics_that_count_joints_alike_are_refused(stored):
 @pytest.mark.slow
 def test_slices_and_extensions_have_the_weights_of_one_run(tmp_path, stored):
     few = campaign(tmp_path, name="few", n=1000)
-    combine.extend(few, 1200)
+    extend.extend(few, 1200)
     with ResultStore.open(stored) as whole, ResultStore.open(few) as grown:
         np.testing.assert_array_equal(grown.origin(), whole.origin(slice(0, 1201)))
     parts = []
     for rows in (range(600), range(600, 1201)):
         parts.append(tmp_path / f"part{rows.start}.h5")
         invented_campaign()(load(tmp_path, n=1200), parts[-1], workers=1, rows=rows, check=False)
-    combine.merge(parts, tmp_path / "merged.h5")
+    extend.merge(parts, tmp_path / "merged.h5")
     with ResultStore.open(stored) as whole, ResultStore.open(tmp_path / "merged.h5") as merged:
         np.testing.assert_array_equal(merged.origin(), whole.origin(slice(0, 1201)))
     with h5py.File(parts[0], "r+") as file:

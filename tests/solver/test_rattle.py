@@ -16,7 +16,7 @@ from tolstat.analysis import exceedance, weighted
 from tolstat.campaign import plan
 from tolstat.common.tables import PARAM, RESULT, Method, Motion, Options, Status
 from tolstat.joint import ideal
-from tolstat.kernel.integrators.mesh import CELL, FIRST_LEVEL, LOW, SHAPING, UNKNOWN, next_level
+from tolstat.kernel.integrators.mesh import CELL, COARSEN_BELOW, COARSENING_REVS, FIRST_LEVEL, UNKNOWN, next_level
 from tolstat.solver import simulation, stationary
 from tolstat.solver.simulation import simulate_rows
 
@@ -96,10 +96,10 @@ def test_levels_go_from_one_revolution_to_the_next() -> None:
     assert next_level(0, new, new) == FIRST_LEVEL
     assert next_level(0, new, cell(5, 0.5)) == 5
     assert next_level(1, cell(5, 0.5), cell(2, 0.5)) == 5
-    assert next_level(1, cell(5, 0.9 * LOW), new) == 4
+    assert next_level(1, cell(5, 0.9 * COARSEN_BELOW), new) == 4
     assert next_level(1, cell(5, 1e-12), new) == 0
     assert next_level(1, cell(5, 1e-12, pinned=1), new) == 5
-    assert next_level(SHAPING, cell(5, 1e-12), new) == 5
+    assert next_level(COARSENING_REVS, cell(5, 1e-12), new) == 5
 
 
 def watched(series: np.ndarray) -> np.ndarray:
@@ -124,26 +124,26 @@ def test_what_becomes_stationary() -> None:
     wild = np.concatenate([np.full(32, 100.0), steady[32:]]) + 0.01 * rng.random(48)
     for series, status in ((steady, Status.STATIONARY), (drift, Status.NOT_PERIODIC), (wild, Status.NOT_PERIODIC)):
         result = ended(48, Motion.CHAOTIC)
-        stationary.tell(result, watched(series)[None], 100)
+        stationary.classify(result, watched(series)[None], 100)
         assert result["status"][0] == status
     result = ended(48, Motion.CHAOTIC)
-    stationary.tell(result, watched(steady)[None], 100)
-    stationary.fill_ends(result)
+    stationary.classify(result, watched(steady)[None], 100)
+    stationary.fill_intervals(result)
     assert 0.9 < result["F_lower"][0] < 1 < result["F_upper"][0] < 1.05
     assert 105 < result["F_max"][0, 0] < 111
     rolled = ended(50, Motion.CHAOTIC)  # revolution r lies at r modulo 48
-    stationary.tell(rolled, np.roll(watched(steady), 2)[None], 100)
+    stationary.classify(rolled, np.roll(watched(steady), 2)[None], 100)
     assert rolled["F_max"].tobytes() == result["F_max"].tobytes()
     twice = ended(48, Motion.SUBHARMONIC)
-    stationary.tell(twice, watched(drift)[None], 100)
-    stationary.fill_ends(twice)
+    stationary.classify(twice, watched(drift)[None], 100)
+    stationary.fill_intervals(twice)
     assert (twice["status"][0], twice["F_lower"][0], twice["F_upper"][0]) == (Status.STATIONARY, 1.0, 1.0)
 
 
 def test_ends_of_other_joints() -> None:
     results = np.zeros(2, RESULT)
     results["status"], results["F_max"] = (Status.OK, Status.NOT_SETTLED), 7.0
-    stationary.fill_ends(results)
+    stationary.fill_intervals(results)
     assert (results["F_lower"][0], results["contact_upper"][0]) == (1.0, 1.0)
     assert np.isnan(results["F_lower"][1])
 

@@ -14,8 +14,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.questions.capability import rendering as capability
 from tolstat.questions.exceedance import rendering as exceedance
 from tolstat.report import summary
-from tolstat.store import ResultStore
-from tolstat.store import view as source
+from tolstat.store import ResultStore, view
 
 
 def export(*arguments):
@@ -28,7 +27,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
     assert done.exit_code == 0
     found = json.loads(out.read_text(encoding="utf-8"))
     with ResultStore.open(path) as store:
-        campaign = source.read(store)
+        campaign = view.read(store)
         assert found["provenance"]["versions"] == store.versions
     assert found["joints"] == {"ok": 295, "not_settled": 2, "newton_failed": 3}
     for key, table in (("limits", exceedance.limits(campaign)), ("capability", capability.limits(campaign))):
@@ -36,7 +35,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
         pd.testing.assert_frame_equal(
             told, table.replace([float("inf"), -float("inf")], float("nan")), check_exact=False
         )
-    assert len(found["quantiles"]) == 4 * len(source.LOADS)
+    assert len(found["quantiles"]) == 4 * len(view.LOADS)
     assert found["causes"]["cross1.F"]["table"][0]["error"] == "pin1.offset_t"
 
 

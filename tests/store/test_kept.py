@@ -18,10 +18,8 @@ from tests.report.test_report import swept, texts
 from tests.support import fakes, synthetic
 from tolstat import report, study
 from tolstat.analysis import accuracy
-from tolstat.campaign import extend as combine
-from tolstat.campaign import replay, verify
+from tolstat.campaign import extend, replay, stop_rule, verify
 from tolstat.campaign import run as campaign
-from tolstat.campaign import stop_rule as precision
 from tolstat.common import selected_results as kept
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, StoreError
@@ -33,7 +31,7 @@ from tolstat.questions.exceedance import sweep
 from tolstat.store import ResultStore, integrity, result_file, verification
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
-COURSE = [c.name for c in RESULT_COLUMNS if c.field not in kept.CHOSEN_FROM]
+COURSE = [c.name for c in RESULT_COLUMNS if c.field not in kept.OPTIONAL_FIELDS]
 PLAIN = synthetic.STUDY.partition("[limits]")[0]
 
 
@@ -175,10 +173,10 @@ def test_slices_and_extensions_are_one_run(tmp_path: Path, make) -> None:  # noq
     whole = run(selected(61), tmp_path / "whole.h5")
     assert "results/cross1.T_max" not in datasets(whole)
     parts = slices(selected(61), tmp_path, 0, 20, 62)
-    combine.merge(parts, tmp_path / "merged.h5")
+    extend.merge(parts, tmp_path / "merged.h5")
     assert datasets(tmp_path / "merged.h5") == datasets(whole)
     grown = run(selected(40), tmp_path / "grown.h5")
-    run(combine.extend(grown, 61), grown)
+    run(extend.extend(grown, 61), grown)
     assert datasets(grown) == datasets(whole)
 
 
@@ -286,6 +284,6 @@ def test_what_is_not_kept_cannot_be_asked_for(tmp_path: Path) -> None:
         for by in ("fork1.T", "fork1.T_max", "psi"):
             with pytest.raises(InputError, match=r"does not keep .*\n.*give one of: cross1\.F, "):
                 tail.worst(store, by)
-    until = precision.parse("P(pin1.contact > 1 N) width < 0.1")
+    until = stop_rule.parse("P(pin1.contact > 1 N) width < 0.1")
     with pytest.raises(InputError, match=r"leaves out pin1\.contact of --until\n.*add pin1\.contact_outer_max, pin1"):
-        precision.run_until(study.load(tmp_path / "small.toml"), tmp_path / "b.h5", until, lambda row: None)
+        stop_rule.run_until(study.load(tmp_path / "small.toml"), tmp_path / "b.h5", until, lambda row: None)

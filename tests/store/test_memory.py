@@ -7,8 +7,7 @@ from typer.testing import CliRunner
 from tests.questions.test_causes import TEXT, made
 from tolstat.cli import app
 from tolstat.common.tables import ERROR, RESULT
-from tolstat.store import ResultStore, reader
-from tolstat.store import view as source
+from tolstat.store import ResultStore, reader, view
 
 BLOCK = 256
 
@@ -22,7 +21,7 @@ def path(tmp_path_factory):
 def read(monkeypatch):
     """Rows of each whole table that is read."""
     rows = []
-    for module in (reader, source):
+    for module in (reader, view):
         monkeypatch.setattr(module, "BLOCK", BLOCK)
 
     def recording(method):
@@ -60,19 +59,19 @@ def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, comma
 
 def test_only_the_fields_asked_for_are_held(path):
     with ResultStore.open(path) as store:
-        whole, part = source.read(store), source.read(store, source.LOAD_FIELDS, ["pin1.offset_t"])
+        whole, part = view.read(store), view.read(store, view.LOAD_FIELDS, ["pin1.offset_t"])
     assert whole.results.dtype == RESULT
     assert whole.errors.dtype == ERROR
     assert part.results.itemsize < 0.4 * RESULT.itemsize
     assert part.errors.dtype.names == ("pin1.offset_t",)
-    for field in source.LOAD_FIELDS:
+    for field in view.LOAD_FIELDS:
         np.testing.assert_array_equal(part.results[field], whole.results[field])
     np.testing.assert_array_equal(part.errors["pin1.offset_t"], whole.errors["pin1.offset_t"])
 
 
 def test_errors_of_some_joints_are_those_rows(path, monkeypatch):
-    monkeypatch.setattr(source, "BLOCK", BLOCK)
+    monkeypatch.setattr(view, "BLOCK", BLOCK)
     samples = np.array([0, 3, 254, 255, 256, 1499])
     with ResultStore.open(path) as store:
-        found = source.errors_at(store, ["pin2.offset_z"], samples)
+        found = view.errors_at(store, ["pin2.offset_z"], samples)
         np.testing.assert_array_equal(found["pin2.offset_z"], store.errors()["pin2.offset_z"][1 + samples])

@@ -13,7 +13,7 @@ from scipy import stats
 
 from tolstat.common.errors import InputError
 from tolstat.common.files import data_dir
-from tolstat.study.tolerances import distributions as tolerance
+from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.kinds import KINDS, RADIAL_KINDS, distribution
@@ -38,17 +38,17 @@ def faults(data: object, name: str = "pin1.offset_t", folder: Path | None = None
 
 def each_kind(lower: float, upper: float, share: float) -> list[Distribution]:
     middle = lower + share * (upper - lower)
-    sigma = tolerance.sigma_of(lower, upper, middle, 1.0)
+    sigma = distributions.sigma_of(lower, upper, middle, 1.0)
     return [
-        tolerance.Normal(middle, sigma),
-        tolerance.TruncatedNormal(middle, sigma, lower, upper),
-        tolerance.Uniform(lower, upper),
-        tolerance.Triangular(lower, upper, middle),
-        tolerance.LogNormal(lower, tolerance.Normal(math.log(middle - lower), 0.3)),
-        tolerance.Beta(0.5 + 3 * share, 2.0, lower, upper),
-        tolerance.Rayleigh(sigma),
-        tolerance.Rayleigh(sigma, 2 * sigma),
-        tolerance.Measured.of([lower, middle, upper, middle]),
+        distributions.Normal(middle, sigma),
+        distributions.TruncatedNormal(middle, sigma, lower, upper),
+        distributions.Uniform(lower, upper),
+        distributions.Triangular(lower, upper, middle),
+        distributions.LogNormal(lower, distributions.Normal(math.log(middle - lower), 0.3)),
+        distributions.Beta(0.5 + 3 * share, 2.0, lower, upper),
+        distributions.Rayleigh(sigma),
+        distributions.Rayleigh(sigma, 2 * sigma),
+        distributions.Measured.of([lower, middle, upper, middle]),
     ]
 
 
@@ -67,11 +67,11 @@ def test_ppf_is_monotone_and_finite(band: tuple[float, float], share: float) -> 
 def test_bounded_distributions_stay_inside_their_band(band: tuple[float, float], share: float) -> None:
     lower, upper = band
     for dist in each_kind(lower, upper, share):
-        if isinstance(dist, (tolerance.TruncatedNormal, tolerance.Measured)):
+        if isinstance(dist, (distributions.TruncatedNormal, distributions.Measured)):
             values = dist.ppf(U)
             assert values.min() >= lower
             assert values.max() <= upper
-        elif isinstance(dist, (tolerance.Uniform, tolerance.Triangular, tolerance.Beta)):
+        elif isinstance(dist, (distributions.Uniform, distributions.Triangular, distributions.Beta)):
             slack = 1e-15 * max(abs(lower), abs(upper))
             assert dist.ppf(U).min() >= lower - slack
             assert dist.ppf(U).max() <= upper + slack
@@ -82,11 +82,11 @@ def test_bounded_distributions_stay_inside_their_band(band: tuple[float, float],
 def test_cpk_is_reproduced_on_any_band(band: tuple[float, float], share: float, cpk: float) -> None:
     lower, upper = band
     mean = lower + share * (upper - lower)
-    sigma = tolerance.sigma_of(lower, upper, mean, cpk)
+    sigma = distributions.sigma_of(lower, upper, mean, cpk)
     assert min(upper - mean, mean - lower) / (3 * sigma) == pytest.approx(cpk, rel=1e-12)
     # share of rejects beyond the nearer limit, from the quantile function itself
     tail = stats.norm.sf(3 * cpk)
-    dist = tolerance.Normal(mean, sigma)
+    dist = distributions.Normal(mean, sigma)
     distance = mean - dist.ppf(np.array([tail]))[0]
     assert distance == pytest.approx(min(upper - mean, mean - lower), rel=1e-6)
 
@@ -94,14 +94,14 @@ def test_cpk_is_reproduced_on_any_band(band: tuple[float, float], share: float, 
 @pytest.mark.parametrize(
     ("dist", "scipy_dist"),
     [
-        (tolerance.Normal(1.0, 2.0), stats.norm(1.0, 2.0)),
-        (tolerance.TruncatedNormal(1.0, 2.0, 0.5, 9.0), stats.truncnorm(-0.25, 4.0, 1.0, 2.0)),
-        (tolerance.Uniform(-1.0, 3.0), stats.uniform(-1.0, 4.0)),
-        (tolerance.Triangular(-1.0, 3.0, 0.0), stats.triang(0.25, -1.0, 4.0)),
-        (tolerance.Triangular(-1.0, 3.0, 3.0), stats.triang(1.0, -1.0, 4.0)),
-        (tolerance.LogNormal(-1.0, tolerance.Normal(0.2, 0.4)), stats.lognorm(0.4, -1.0, math.exp(0.2))),
-        (tolerance.Beta(2.0, 5.0, -1.0, 3.0), stats.beta(2.0, 5.0, -1.0, 4.0)),
-        (tolerance.Rayleigh(2.0), stats.rayleigh(scale=2.0)),
+        (distributions.Normal(1.0, 2.0), stats.norm(1.0, 2.0)),
+        (distributions.TruncatedNormal(1.0, 2.0, 0.5, 9.0), stats.truncnorm(-0.25, 4.0, 1.0, 2.0)),
+        (distributions.Uniform(-1.0, 3.0), stats.uniform(-1.0, 4.0)),
+        (distributions.Triangular(-1.0, 3.0, 0.0), stats.triang(0.25, -1.0, 4.0)),
+        (distributions.Triangular(-1.0, 3.0, 3.0), stats.triang(1.0, -1.0, 4.0)),
+        (distributions.LogNormal(-1.0, distributions.Normal(0.2, 0.4)), stats.lognorm(0.4, -1.0, math.exp(0.2))),
+        (distributions.Beta(2.0, 5.0, -1.0, 3.0), stats.beta(2.0, 5.0, -1.0, 4.0)),
+        (distributions.Rayleigh(2.0), stats.rayleigh(scale=2.0)),
     ],
 )
 def test_ppf_inverts_scipys_distribution_function(dist: Distribution, scipy_dist: stats.rv_continuous) -> None:
@@ -113,23 +113,23 @@ def test_ppf_inverts_scipys_distribution_function(dist: Distribution, scipy_dist
 
 
 def test_truncated_tails_are_as_exact_above_as_below() -> None:
-    dist = tolerance.TruncatedNormal(0.0, 1.0, -30.0, 30.0)
+    dist = distributions.TruncatedNormal(0.0, 1.0, -30.0, 30.0)
     u = 2.0 ** -np.arange(2, 50)
     np.testing.assert_allclose(dist.ppf(1 - u), -dist.ppf(u), rtol=1e-12)
 
 
 def test_truncated_rayleigh_ends_at_its_radius() -> None:
-    dist = tolerance.Rayleigh(1.0, 2.0)
+    dist = distributions.Rayleigh(1.0, 2.0)
     assert dist.ppf(np.array([1 - 1e-16]))[0] == pytest.approx(2.0)
     half = dist.ppf(np.array([0.5]))[0]
     assert stats.rayleigh.cdf(half) == pytest.approx(0.5 * stats.rayleigh.cdf(2.0), rel=1e-12)
 
 
 def test_measured_draws_each_value_equally_often() -> None:
-    dist = tolerance.Measured.of([3.0, 1.0, 2.0, 2.0])
+    dist = distributions.Measured.of([3.0, 1.0, 2.0, 2.0])
     np.testing.assert_array_equal(dist.ppf(np.array([1e-9, 0.25, 0.26, 0.5, 0.75, 0.76, 1.0])), [1, 1, 2, 2, 2, 3, 3])
-    assert dist.describe() == tolerance.Measured.of([1.0, 2.0, 2.0, 3.0]).describe()
-    assert dist.describe() != tolerance.Measured.of([1.0, 2.0, 3.0, 3.0]).describe()
+    assert dist.describe() == distributions.Measured.of([1.0, 2.0, 2.0, 3.0]).describe()
+    assert dist.describe() != distributions.Measured.of([1.0, 2.0, 3.0, 3.0]).describe()
 
 
 LINEAR = {
@@ -141,50 +141,50 @@ LINEAR = {
 @pytest.mark.parametrize("grade", ["f", "m"])
 def test_iso2768_tables(grade: str) -> None:
     for size, deviation in (map(float, pair.split()) for pair in LINEAR[grade].split(",")):
-        assert tolerance.iso2768(ISO, "linear", grade, size * 1e-3) == pytest.approx(deviation * 1e-3, rel=1e-12)
+        assert distributions.iso2768(ISO, "linear", grade, size * 1e-3) == pytest.approx(deviation * 1e-3, rel=1e-12)
     for leg, minutes in [(0.1, 60), (10, 60), (10.1, 30), (50, 30), (120, 20), (400, 10), (401, 5), (9e4, 5)]:
-        found = tolerance.iso2768(ISO, "angular", grade, leg * 1e-3)
+        found = distributions.iso2768(ISO, "angular", grade, leg * 1e-3)
         assert found == pytest.approx(math.radians(minutes / 60), rel=1e-12)
 
 
 @pytest.mark.parametrize(("grade", "size"), [("f", 0.49), ("f", 2001), ("m", 4001)])
 def test_iso2768_outside_the_table(grade: str, size: float) -> None:
     with pytest.raises(ValueError, match="outside the table"):
-        tolerance.iso2768(ISO, "linear", grade, size * 1e-3)
+        distributions.iso2768(ISO, "linear", grade, size * 1e-3)
     with pytest.raises(ValueError, match="no linear table for class 'c'"):
-        tolerance.iso2768(ISO, "linear", "c", 0.01)
+        distributions.iso2768(ISO, "linear", "c", 0.01)
 
 
 def test_normal_entries() -> None:
     normal = {"distribution": "normal"}
-    assert build(normal | {"plus_minus": "0.1 mm", "cpk": 2.0}) == tolerance.Normal(0.0, pytest.approx(1e-4 / 6))
+    assert build(normal | {"plus_minus": "0.1 mm", "cpk": 2.0}) == distributions.Normal(0.0, pytest.approx(1e-4 / 6))
     asymmetric = build(normal | {"lower": "-0.02 mm", "upper": "0 mm", "truncate": True})
-    assert asymmetric == tolerance.TruncatedNormal(
+    assert asymmetric == distributions.TruncatedNormal(
         pytest.approx(-1e-5), pytest.approx(1e-5 / 3), pytest.approx(-2e-5), 0.0
     )
     shifted = build(normal | {"lower": "-0.02 mm", "upper": "0 mm", "mean": "-0.005 mm", "cpk": 1.0})
-    assert shifted == tolerance.Normal(pytest.approx(-5e-6), pytest.approx(5e-6 / 3))
-    assert build(normal | {"mean": "100 N*m", "std": "5 N*m"}, "operation.torque", 90.0, "N*m") == tolerance.Normal(
+    assert shifted == distributions.Normal(pytest.approx(-5e-6), pytest.approx(5e-6 / 3))
+    assert build(normal | {"mean": "100 N*m", "std": "5 N*m"}, "operation.torque", 90.0, "N*m") == distributions.Normal(
         100, 5
     )
     about = build(normal | {"plus_minus": "30 N*m"}, "operation.torque", 90.0, "N*m")
-    assert about == tolerance.Normal(90.0, pytest.approx(10.0))
+    assert about == distributions.Normal(90.0, pytest.approx(10.0))
 
 
 def test_other_entries() -> None:
     iso = build({"iso2768": "f", "nominal": "50 mm", "distribution": "uniform"}, "hole1.tilt_z", 0.0, "rad")
-    assert iso == tolerance.Uniform(pytest.approx(-math.radians(0.5)), pytest.approx(math.radians(0.5)))
+    assert iso == distributions.Uniform(pytest.approx(-math.radians(0.5)), pytest.approx(math.radians(0.5)))
     iso = build({"iso2768": "m", "nominal": "50 mm", "distribution": "uniform"})
-    assert iso == tolerance.Uniform(pytest.approx(-3e-4), pytest.approx(3e-4))
+    assert iso == distributions.Uniform(pytest.approx(-3e-4), pytest.approx(3e-4))
     peaked = build({"lower": "0 mm", "upper": "3 mm", "peak": "1 mm", "distribution": "triangular"})
-    assert peaked == tolerance.Triangular(0.0, pytest.approx(3e-3), pytest.approx(1e-3))
-    assert build({"plus_minus": "1 mm", "a": 2, "b": 3, "distribution": "beta"}) == tolerance.Beta(
+    assert peaked == distributions.Triangular(0.0, pytest.approx(3e-3), pytest.approx(1e-3))
+    assert build({"plus_minus": "1 mm", "a": 2, "b": 3, "distribution": "beta"}) == distributions.Beta(
         2, 3, pytest.approx(-1e-3), pytest.approx(1e-3)
     )
     radial = build({"plus_minus": "0.3 mm", "cpk": 2.0, "distribution": "rayleigh"}, "pin1.offset_radial")
-    assert radial == tolerance.Rayleigh(pytest.approx(5e-5))
+    assert radial == distributions.Rayleigh(pytest.approx(5e-5))
     radial = build({"sigma": "0.3 mm", "distribution": "rayleigh"}, "pin1.offset_radial")
-    assert radial == tolerance.Rayleigh(pytest.approx(3e-4))
+    assert radial == distributions.Rayleigh(pytest.approx(3e-4))
 
 
 def test_lognormal_entries_have_the_moments_and_limits_asked_for() -> None:

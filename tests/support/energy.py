@@ -125,12 +125,12 @@ def balance(joint: NDArray[np.void], options: Options, trajectory: Trajectory) -
     -------
     Balance
     """
-    from tests.support import kernel_energy as energy
+    from tests.support import kernel_energy
     from tolstat.kernel.revolution.simulate import make_scratch
 
     rows = _gauges(joint)
-    of = np.zeros(len(trajectory.t), energy.ENERGY).view(np.recarray)
-    energy.measure_all(trajectory.t, trajectory.points, rows, options, make_scratch(options).work, of)
+    of = np.zeros(len(trajectory.t), kernel_energy.ENERGY).view(np.recarray)
+    kernel_energy.measure_all(trajectory.t, trajectory.points, rows, options, make_scratch(options).work, of)
     return Balance(trajectory.t, of.view(np.ndarray))
 
 

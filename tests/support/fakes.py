@@ -20,7 +20,7 @@ import numpy as np
 from tests.support.environment import environment as environment
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Stages
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.columns import Column
 from tolstat.common.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
 from tolstat.solver import stationary
@@ -52,11 +52,11 @@ class Output:
     @property
     def columns(self) -> tuple[Column, ...]:
         """Columns of the results that are kept."""
-        return kept.columns(self.identity())
+        return selected_results.columns(self.identity())
 
     def identity(self) -> dict[str, Any]:
         """Return what decides the numbers."""
-        return {"output": self.histories} | ({} if self.results is None else {kept.KEY: list(self.results)})
+        return {"output": self.histories} | ({} if self.results is None else {selected_results.KEY: list(self.results)})
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def simulate(
     for i, name in enumerate(n for n in RESULT.names if RESULT[n].base == np.float64):
         shape = (len(params),) + (1,) * len(RESULT[name].shape)
         results[name] = np.where(x > 3, np.nan, np.sin(x + i)).reshape(shape)
-    stationary.fill_ends(results)
+    stationary.fill_intervals(results)
     return Simulation(results, {name: history(spec, x) for name, spec in specs_of(histories).items()})
 
 

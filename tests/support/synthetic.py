@@ -41,7 +41,7 @@ def results(n, seed=8, failed=0, unsettled=0):
         if RESULT[name].base.kind == "f":
             table[name][bad] = np.nan
     table["status"][bad], table["settled"][bad] = Status.NEWTON_FAILED, 0
-    stationary.fill_ends(table)
+    stationary.fill_intervals(table)
     return table
 
 

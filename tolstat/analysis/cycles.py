@@ -44,7 +44,7 @@ class Cycles(NamedTuple):
         return Cycles((channel,), self.ranges[:, part], self.means[:, part], self.number[:, part], self.weights)
 
 
-def mix(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
+def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
     """Duty cycle: the same joints under several operating points, each for a share of the revolutions.
 
     Parameters

@@ -66,7 +66,7 @@ def damage(cycles: Cycles, line: Line, revolutions: float) -> FloatArray:
     return total
 
 
-def shortfall(cycles: Cycles, m: float) -> FloatArray:
+def truncation_bound(cycles: Cycles, m: float) -> FloatArray:
     """Upper bound of the relative increase of `moment` by cycles that were not stored, shape (n, channels).
 
     None of them is larger than the smallest stored cycle.

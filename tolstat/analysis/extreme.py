@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from tolstat.analysis import exceedance, pareto
 from tolstat.analysis.exceedance import FloatArray
 
-FEWEST = 50
+MIN_EXCESSES = 50
 """Minimum number of excesses for a fit."""
 REPLICATES = 400
 """Parametric bootstrap samples of the goodness-of-fit test."""
@@ -31,7 +31,9 @@ class TooThinError(ValueError):
 
     def __init__(self, found: int, needed: int) -> None:
         self.needed = needed
-        super().__init__(f"{found} joints above the threshold, {FEWEST} are needed: simulate some {needed} joints")
+        super().__init__(
+            f"{found} joints above the threshold, {MIN_EXCESSES} are needed: simulate some {needed} joints"
+        )
 
 
 class Estimate(NamedTuple):
@@ -171,7 +173,7 @@ def fit(
     Raises
     ------
     TooThinError
-        When fewer than `FEWEST` joints are above the threshold.
+        When fewer than `MIN_EXCESSES` joints are above the threshold.
     """
     from scipy.special import xlog1py, xlogy
     from scipy.stats import chi2
@@ -180,12 +182,12 @@ def fit(
     valid = sample.valid
     share = min(0.1, 3.0 / np.sqrt(max(valid.size, 1))) if share is None else share
     count = int(share * valid.size * (1 + 1e-12))
-    if count < FEWEST:
-        raise TooThinError(count, int(np.ceil(FEWEST / share * max(1.0, sample.n / max(valid.size, 1)))))
+    if count < MIN_EXCESSES:
+        raise TooThinError(count, int(np.ceil(MIN_EXCESSES / share * max(1.0, sample.n / max(valid.size, 1)))))
     threshold = float(valid[-min(count + 1, valid.size)])
     excesses = valid[valid > threshold] - threshold
-    if excesses.size < FEWEST:
-        raise TooThinError(excesses.size, int(np.ceil(sample.n * FEWEST / max(excesses.size, 1))))
+    if excesses.size < MIN_EXCESSES:
+        raise TooThinError(excesses.size, int(np.ceil(sample.n * MIN_EXCESSES / max(excesses.size, 1))))
     m, n = excesses.size, valid.size
     reach = 0.5 * float(chi2.ppf(confidence, 1))
     k, sigma, deficit = _likelihood(excesses, reach)
@@ -210,15 +212,15 @@ def stability(
     values, status, confidence, iid
         As in `fit`.
     shares : array_like, optional
-        Shares of the joints in the tail; by default eight from 0.3 to the least that has `FEWEST` joints.
+        Shares of the joints in the tail; by default eight from 0.3 to the least that has `MIN_EXCESSES` joints.
 
     Raises
     ------
     TooThinError
-        When a share has fewer than `FEWEST` joints.
+        When a share has fewer than `MIN_EXCESSES` joints.
     """
     n = exceedance.sort_out(values, status).valid.size
-    least = min(0.3, (FEWEST + 1) / max(n, 1))
+    least = min(0.3, (MIN_EXCESSES + 1) / max(n, 1))
     asked = np.geomspace(0.3, least, 8) if shares is None else np.sort(np.atleast_1d(shares))[::-1]
     return [fit(values, status, float(share), confidence, iid) for share in asked]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.campaign import executors as executor
+from tolstat.campaign import executors
 from tolstat.campaign.executors import Lost
 from tolstat.common.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
 from tolstat.store import ResultStore
@@ -177,14 +177,14 @@ def simulate_pending(
         When worker processes die whichever block they work on.
     """
     todo = sum(len(rows) for rows in pending(store, last))
-    workers = execution.workers or executor.available_workers()
+    workers = execution.workers or executors.available_workers()
     size = execution.block or default_block(todo, workers)
     if not todo:
         return
     kind = execution.kind or ("processes" if workers > 1 and todo > size else "serial")
     pace = Pace(todo, workers, execution.block)
     blocks = _blocks(study, store, last, pace, stages.perturb)
-    work: executor.Work[Block, Timed | Lost] = executor.Work(
+    work: executors.Work[Block, Timed | Lost] = executors.Work(
         partial(_simulate, stages.simulate, study.output.histories, study.output.harmonics, store.history_specs),
         Block.split,
         stages.warm_up,
@@ -192,13 +192,13 @@ def simulate_pending(
     )
     results: Generator[tuple[Block, Timed | Lost], None, None]
     if kind == "serial":
-        results = executor.map_here(work, blocks, stop)
+        results = executors.map_here(work, blocks, stop)
     elif kind == "dask":
         from tolstat.campaign.executors.cluster import map_on_cluster
 
         results = map_on_cluster(work, blocks, execution.scheduler, workers, versions, stop)
     else:
-        results = executor.map_in_processes(work, blocks, max(1, min(workers, -(-todo // size))), stop)
+        results = executors.map_in_processes(work, blocks, max(1, min(workers, -(-todo // size))), stop)
     with closing(results):
         for block, result in results:
             if isinstance(result, Lost):

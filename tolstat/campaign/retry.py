@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from tolstat.common import strict as schema
+from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.tables import HistorySpec, Options, Status
 from tolstat.solver import fidelity
@@ -71,7 +71,7 @@ def parse(states: str, settings: Sequence[str], study: Study) -> Retry:
     names = [name.strip() for name in states.split(",")]
     for name in names:
         if name not in labels:
-            faults.append(Fault("--retry", f"{name!r} is no state", schema.did_you_mean(name, list(labels))))
+            faults.append(Fault("--retry", f"{name!r} is no state", strict.did_you_mean(name, list(labels))))
     changed: dict[str, Any] = {}
     for text in settings:
         with gather(faults):
@@ -80,7 +80,7 @@ def parse(states: str, settings: Sequence[str], study: Study) -> Retry:
     solver = study.solver
     with gather(faults):
         new = {key.removeprefix("solver."): value for key, value in changed.items()}
-        solver = schema.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
+        solver = strict.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
     if faults:
         raise InputError(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))

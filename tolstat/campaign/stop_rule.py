@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tolstat.analysis import exceedance
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.store import ResultStore
 from tolstat.store.reader import BLOCK
@@ -168,8 +168,8 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
         own = study.sampling.method
         found = f"sampling.method is {own!r}: only independent samples, alike in weight, have such an interval"
         raise InputError([Fault("--until", found, 'use sampling.method = "random"')])
-    if not kept.holds(study.output.columns, rule.load):
-        remedy = f"add {', '.join(kept.needed(rule.load))}"
+    if not selected_results.holds(study.output.columns, rule.load):
+        remedy = f"add {', '.join(selected_results.needed(rule.load))}"
         raise InputError([Fault(f"{study.path}: output.results", f"leaves out {rule.load} of --until", remedy)])
     planned = looks(rule.width, study.samples)
     first = int(study.sampling.nominal_first)

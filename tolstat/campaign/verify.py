@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign.executors import Lost, Work, map_here, map_in_processes
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
 from tolstat.store import Counts, ResultStore, recorded, verification
@@ -210,7 +210,7 @@ def of_campaign(
     options = [recorded.options_of(store, row) for row in rows.tolist()]
     checks = run_checks(parameters(rows), options, names, simulate, workers, progress)
     for check in checks.values():
-        kept.blank_others(check.results, store.columns)
+        selected_results.blank_others(check.results, store.columns)
     base = np.concatenate([store.results(slice(row, row + 1)) for row in rows.tolist()])
     return Verification(seed, rows, base, checks)
 
@@ -332,7 +332,7 @@ def check_study(
     base = by_options(partial(_plain, None), params, options)
     checks = run_checks(params, options, names, None, workers, progress)
     for results in (base, *(check.results for check in checks.values())):
-        kept.blank_others(results, plan.output.columns)
+        selected_results.blank_others(results, plan.output.columns)
     return Verification(seed, rows, base, checks)
 
 

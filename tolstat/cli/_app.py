@@ -116,7 +116,7 @@ def writing(path: Path) -> Iterator[Path]:
     from tolstat.common import files
 
     try:
-        with files.writing(path) as temporary:
+        with files.atomic_write(path) as temporary:
             yield temporary
     except OSError as error:
         found = f"cannot be written: {error.strerror or error}"

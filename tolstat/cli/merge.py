@@ -19,9 +19,9 @@ def merge(
     The slices are files that run --rows has made. They must be of one study and one version of the code, and cover the
     campaign; rows in two of them must have the same results. FILE is then the same as that of one run.
     """
-    from tolstat.campaign import extend as combine
+    from tolstat.campaign import extend
 
-    merged = combine.merge(files, out)
+    merged = extend.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
     words = [f"{out}: {counts.done} joints, {counts.shortfall}"]

@@ -172,22 +172,21 @@ def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:
 
 
 def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat.campaign import progress
+    from tolstat.campaign import progress, stop_rule
     from tolstat.campaign import run as campaign
-    from tolstat.campaign import stop_rule as precision
     from tolstat.store import ResultStore
 
-    rule = precision.parse(text)
+    rule = stop_rule.parse(text)
     announce_compilation()
     with progress.reporter() as reporter:
         run = partial(campaign.run, plan, path, progress=reporter, tell=reporter.note, **choices)
-        outcome = precision.run_until(plan, path, rule, lambda row: run(until_row=row))
+        outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
     look = outcome.look
     n_looks = len(outcome.looks)
     say(
         f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
         f"{look.above} above, {look.n_unresolved} failed or not settled (counted both ways)\n"
-        f"{precision.CONFIDENCE:.0%} interval {look.lower:.5f} to {look.upper:.5f}, "
+        f"{stop_rule.CONFIDENCE:.0%} interval {look.lower:.5f} to {look.upper:.5f}, "
         f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; those of the report are not"
     )
     with ResultStore.open(path) as store:

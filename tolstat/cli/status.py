@@ -41,7 +41,7 @@ def _summary(store: ResultStore) -> dict[str, Any]:
     import numpy as np
 
     from tolstat.common.tables import Status
-    from tolstat.store import view as source
+    from tolstat.store import view
     from tolstat.store.reader import BLOCK
 
     states = np.full(store.n, Status.PENDING, np.uint8)
@@ -54,7 +54,7 @@ def _summary(store: ResultStore) -> dict[str, Any]:
             states[rows] = results["status"]
             damaged += int(((written != Status.PENDING) & (states[rows] == Status.PENDING)).sum())
             for name, values in loads.items():
-                values[rows], units[name] = source.load(results, name)
+                values[rows], units[name] = view.load(results, name)
     found = np.bincount(states, minlength=len(Status))
     summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     summary |= {state.label: int(found[state]) for state in Status}

@@ -45,7 +45,7 @@ def dtype(sampling: Mapping[str, Any]) -> np.dtype[np.void]:
     return dtype_of(FIELDS[sampling["method"]])
 
 
-def check_counted(sampling: Mapping[str, Any], path: Path, weighted: bool = False) -> None:
+def check_equal_weights(sampling: Mapping[str, Any], path: Path, weighted: bool = False) -> None:
     """Refuse a file whose joints must not be counted equally, for a statistic that does so.
 
     Parameters

@@ -36,7 +36,7 @@ def check_target(path: Path, *inputs: Path) -> None:
 
 
 @contextmanager
-def writing(path: Path, overwrite: bool = True) -> Iterator[Path]:
+def atomic_write(path: Path, overwrite: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `path`, and rename the file written there to `path` if no exception occurs.
 
     Parameters
@@ -64,7 +64,7 @@ def writing(path: Path, overwrite: bool = True) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def check_room(path: Path, size: int) -> None:
+def check_disk_space(path: Path, size: int) -> None:
     """Check that a file of `size` bytes can be written beside `path`, by allocating the space temporarily.
 
     HDF5 does not recover from a full disk: a file that cannot be closed stays open and reports errors until exit.

@@ -17,14 +17,14 @@ from tolstat.common.tables import CONTACTS
 
 KEY = "output.results"
 """Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
-CHOSEN_FROM = ("F_max", "F_mean", "F_range", "T_max", "T_mean", "T_range", "contact_max", "mode_share", "psi_max")
+OPTIONAL_FIELDS = ("F_max", "F_mean", "F_range", "T_max", "T_mean", "T_range", "contact_max", "mode_share", "psi_max")
 """Fields of the results that a study may leave out."""
 NAMES = tuple(c.name for c in RESULT_COLUMNS)
 
 
 def chosen(names: Iterable[str]) -> list[str] | None:
     """Optional columns among `names`, in the order of the table; None if no optional column is left out."""
-    optional = [c.name for c in RESULT_COLUMNS if c.field in CHOSEN_FROM]
+    optional = [c.name for c in RESULT_COLUMNS if c.field in OPTIONAL_FIELDS]
     found = [name for name in optional if name in set(names)]
     return None if found == optional else found
 
@@ -47,7 +47,7 @@ def columns(identity: Mapping[str, Any]) -> tuple[Column, ...]:
         return RESULT_COLUMNS
     if not isinstance(names, list) or any(name not in NAMES for name in names):
         raise ValueError(f"{KEY} is {names!r}, not a list of columns of the results")
-    return tuple(c for c in RESULT_COLUMNS if c.field not in CHOSEN_FROM or c.name in names)
+    return tuple(c for c in RESULT_COLUMNS if c.field not in OPTIONAL_FIELDS or c.name in names)
 
 
 def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:

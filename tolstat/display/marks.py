@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 
 
 def split(path: Path, name: str) -> tuple[str, str]:
@@ -31,5 +31,5 @@ def split(path: Path, name: str) -> tuple[str, str]:
 def insert(path: Path, name: str, part: str) -> None:
     """Replace part `name` of a file by the text `part`; raises as `split` does."""
     head, tail = split(path, name)
-    with writing(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text(f"{head}\n\n{part}\n\n{tail}", encoding="utf-8")

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
 """Colours of bushings 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
@@ -142,7 +142,7 @@ def save(figure: Figure, stem: Path, suffixes: tuple[str, ...] = (".png", ".svg"
     for suffix in suffixes:
         path = stem.with_name(stem.name + suffix)
         metadata = {"Date": None} if suffix == ".svg" else None
-        with settings(), writing(path) as temporary:
+        with settings(), atomic_write(path) as temporary:
             figure.savefig(temporary, format=suffix.lstrip("."), dpi=150, metadata=metadata)
         files.append(path)
     return files

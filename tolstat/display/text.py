@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,7 +105,7 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
 def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
     """Write a frame as ``STEM_what.csv``; return its path."""
     path = stem.with_name(f"{stem.name}_{what}.csv")
-    with writing(path) as temporary:
+    with atomic_write(path) as temporary:
         table.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
     return path
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationInfo, field_validator
 
-from tolstat.common import strict as schema
+from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import data_dir
 from tolstat.common.strict import Strict, refuse
@@ -105,9 +105,9 @@ def load(
         With every fault: those of the joint file under its name, those of `overrides` under `place`.
     """
     path = _find(base, f"{place}: {section}", relative_to)
-    data = schema.read_toml(path)
+    data = strict.read_toml(path)
     try:
-        return schema.validate(Joint, overridden(data, overrides), place)
+        return strict.validate(Joint, overridden(data, overrides), place)
     except InputError as error:
         raise InputError(_attributed(error.faults, data, path, place, section)) from error
 
@@ -149,7 +149,7 @@ def _attributed(
 ) -> list[Fault]:
     """Report the faults that the joint file has without overrides under its name, the others under `place`."""
     try:
-        schema.validate(Joint, data, str(path))
+        strict.validate(Joint, data, str(path))
         own = {}
     except InputError as error:
         own = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}

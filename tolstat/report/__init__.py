@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 from tolstat.display import text
 from tolstat.solver import fidelity
 from tolstat.store import ResultStore
@@ -145,7 +145,7 @@ def _cases(store: ResultStore, stem: Path) -> Report:
 
 def _text(content: str, stem: Path, ending: str) -> Path:
     path = stem.with_name(f"{stem.name}_{ending}")
-    with writing(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
     return path
 

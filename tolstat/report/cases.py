@@ -11,7 +11,7 @@ import pandas as pd
 from tolstat.analysis import accuracy
 from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.campaign.remedy import remedy
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.tables import BUSHINGS, Motion, Status
 from tolstat.store import verification
 from tolstat.study.design import IDEAL
@@ -54,7 +54,7 @@ def table(store: ResultStore) -> pd.DataFrame:
     gamma = relative_errors(results, design["group"])
     for b, bushing in enumerate(BUSHINGS):
         for load, (letter, unit) in enumerate((("F", "N"), ("T", "N*m"))):
-            if not kept.holds(store.columns, f"{bushing}.{letter}"):
+            if not selected_results.holds(store.columns, f"{bushing}.{letter}"):
                 continue
             columns[f"{bushing}.{letter} [{unit}]"] = results[f"{letter}_max"][:, b]
             columns[f"{bushing}.Gamma_{letter} [%]"] = gamma[:, b, load]

@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 import tolstat
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 from tolstat.display import drawing
 from tolstat.display.blocks import Page, Panel
 from tolstat.report import templates
@@ -29,7 +29,7 @@ def write(page: Page, path: Path) -> None:
     environment.globals["figure"] = _figure
     environment.filters["data"] = _data
     text = environment.get_template("page.html.j2").render(page=page, version=tolstat.__version__)
-    with writing(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

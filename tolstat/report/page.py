@@ -19,7 +19,7 @@ from tolstat import sampling
 from tolstat.analysis import exceedance, overrepresentation
 from tolstat.campaign.recall import recall
 from tolstat.campaign.remedy import remedy
-from tolstat.common.draw_records import check_counted
+from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, StoreError, TolstatError
 from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, VALID, Fidelity, Method, Start, Status
 from tolstat.questions.causes import angles, tail
@@ -28,12 +28,10 @@ from tolstat.questions.causes.angles import AgainstAngle
 from tolstat.questions.causes.query import Causes
 from tolstat.questions.fatigue import query as fatigue
 from tolstat.questions.fatigue.query import Loading
-from tolstat.report import compose as pages
-from tolstat.report import html
+from tolstat.report import compose, html
 from tolstat.report.findings import Findings, Lost, Worst
 from tolstat.solver import fidelity
-from tolstat.store import ResultStore, revolutions
-from tolstat.store import view as source
+from tolstat.store import ResultStore, revolutions, view
 from tolstat.store.integrity import DIGEST
 from tolstat.store.reader import BLOCK
 from tolstat.store.view import Campaign, load
@@ -84,7 +82,7 @@ def write(path: str | Path, out: str | Path, accepted: float = np.nan, again: in
         if store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table, and the paper's page"
             raise StoreError(str(Fault(str(path), "lists its joints one by one", remedy)))
-        made = pages.compose(gather(store, accepted, again))
+        made = compose.compose(gather(store, accepted, again))
     html.write(made, Path(out))
     return Path(out)
 
@@ -154,7 +152,7 @@ def read(store: ResultStore) -> tuple[Campaign, NDArray[np.float64]]:
     Returns
     -------
     campaign : Campaign
-        Its results have the fields `source.LOAD_FIELDS`; it has errors only for a sweep.
+        Its results have the fields `view.LOAD_FIELDS`; it has errors only for a sweep.
     modes : ndarray, shape (4, 4)
         Mean share of the revolution by pin and contact mode, over the settled joints.
 
@@ -164,7 +162,7 @@ def read(store: ResultStore) -> tuple[Campaign, NDArray[np.float64]]:
         When the file holds levels of a subset simulation, which are not a sample.
     """
     swept = store.sampling["method"] == "sweep"
-    campaign = source.read(store, source.LOAD_FIELDS, None if swept else (), weighted=True)
+    campaign = view.read(store, view.LOAD_FIELDS, None if swept else (), weighted=True)
     skip, total, modes = _first(store), 0.0, np.zeros((4, 4))
     for first in range(0, len(campaign.results), BLOCK):
         rows = slice(first + skip, min(first + BLOCK, len(campaign.results)) + skip)
@@ -233,7 +231,7 @@ def _of_leading(
     found, at_angles, worst = [], list[AgainstAngle](), []
     bushings = [name for name in names if name.endswith((".F", ".T"))]
     with _noting(notes, "causes are left out", store.path):
-        check_counted(store.sampling, store.path)
+        check_equal_weights(store.sampling, store.path)
         part = _some(store, campaign)
         for name in names:
             log = name in logarithmic

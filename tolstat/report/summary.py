@@ -11,8 +11,7 @@ from tolstat.questions.capability import rendering as capability
 from tolstat.questions.exceedance import rendering as exceedance
 from tolstat.questions.exceedance.accuracy import usual
 from tolstat.solver.fidelity import sentence
-from tolstat.store import ResultStore
-from tolstat.store import view as source
+from tolstat.store import ResultStore, view
 
 
 def of_store(store: ResultStore, confidence: float = 0.95) -> dict[str, Any]:
@@ -48,7 +47,7 @@ def of_store(store: ResultStore, confidence: float = 0.95) -> dict[str, Any]:
     if store.sampling["method"] in ("cases", "sweep"):
         remedy = "its joints are in: tolstat export --csv"
         raise StoreError(str(Fault(str(store.path), "holds no sample of a production, and has no statistics", remedy)))
-    campaign = source.read(store, source.LOAD_FIELDS, (), weighted=True)
+    campaign = view.read(store, view.LOAD_FIELDS, (), weighted=True)
     states = campaign.results["status"]
     judged = bool(campaign.limits)
     counted = judged and campaign.weights is None

@@ -102,7 +102,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     from tolstat.kernel.mechanics.topology import N_DOF
     from tolstat.kernel.mechanics.work import WORK
     from tolstat.kernel.revolution.simulate import make_scratch, simulate_joint
-    from tolstat.kernel.simd.jit import bare
+    from tolstat.kernel.simd.jit import compiled_entry
 
     par = params.view(np.recarray)[0]
     options = options._replace(fidelity=int(Fidelity.DYNAMIC))
@@ -119,8 +119,8 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
     n = 2 * N_DOF
     works, scratch = np.zeros(1, WORK), np.empty((3, n))
-    fast_rate = bare(kernel.rate_of_row, t0, y0, params, options, works, y0)
-    fast_jacobian = bare(kernel.jacobian_of_row, t0, y0, params, options, works, scratch, scratch)
+    fast_rate = compiled_entry(kernel.rate_of_row, t0, y0, params, options, works, y0)
+    fast_jacobian = compiled_entry(kernel.jacobian_of_row, t0, y0, params, options, works, scratch, scratch)
 
     def rate(t: float, y: FloatArray) -> FloatArray:
         out = np.empty(n)

@@ -17,7 +17,7 @@ from tolstat.solver import stationary
 TOLERANCE = 0.04
 """First tolerance of the error of a part of a step, as a load relative to the joint's largest
 (`kernel.integrators.mesh`); each tighter one is an eighth (`kernel.revolution.resolve.TIGHTER`)."""
-WATCHED = 48
+MIN_MAX_REVS = 48
 """Revolutions after which a joint that has not repeated is given up, unless `max_revs` is larger."""
 STEP_ERROR, AT_STEPS = 0.07, 180
 """Mean error of the uniform steps above which a joint is refined. Its largest loads err by less, since ringing that the
@@ -60,9 +60,9 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     rows = np.flatnonzero(unsure | np.isin(results["status"], UNSETTLED))
     if not rows.size:
         return
-    method, revs = int(Method.TR_BDF2), max(options.max_revs, WATCHED)
+    method, revs = int(Method.TR_BDF2), max(options.max_revs, MIN_MAX_REVS)
     found, blocks = simulate(rows, options._replace(method=method, rtol=TOLERANCE, max_revs=revs))
-    stationary.tell(found, blocks, options.duration)
+    stationary.classify(found, blocks, options.duration)
     known = np.isin(found["status"], SIMULATED)
     for name in COUNTS:
         found[name] += results[name][rows]

@@ -162,7 +162,7 @@ def simulate_rows(
 
     results, _ = simulate(np.arange(len(params)), options)
     refinement.refine(results, options, simulate)
-    stationary.fill_ends(results)
+    stationary.fill_intervals(results)
     return Simulation(results, kept)
 
 

@@ -45,7 +45,7 @@ class Interval(NamedTuple):
     upper: FloatArray
 
 
-def tell(results: Table, blocks: Table, duration: int) -> None:
+def classify(results: Table, blocks: Table, duration: int) -> None:
     """Set the status of stationary joints; write their largest loads and, by kind of load, the widest interval.
 
     Parameters
@@ -75,7 +75,7 @@ def tell(results: Table, blocks: Table, duration: int) -> None:
             results[f"{load}_lower"][i], results[f"{load}_upper"][i] = (lower / size).min(), (upper / size).max()
 
 
-def fill_ends(results: Table) -> None:
+def fill_intervals(results: Table) -> None:
     """Write the interval ends of joints that repeat, 1 (no uncertainty), and of joints without a valid load, NaN.
 
     Parameters

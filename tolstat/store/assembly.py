@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 from tolstat.common.tables import Status
 from tolstat.store.histories import HISTORY_BYTES, HistoryParts, attach_scales, create_dataset, rows_per_chunk
 from tolstat.store.reader import BLOCK, Reader, parts_folder
@@ -73,7 +73,7 @@ def assemble(
         When `path` exists and must not be replaced, or cannot be written.
     """
     try:
-        with writing(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
+        with atomic_write(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
             fill(file, attrs, range(n), errors, design, origin)
             for source in sources:
                 _copy_results(file, source)

@@ -14,7 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.tables import HistorySpec
 from tolstat.store import integrity
@@ -128,7 +128,7 @@ def check_tables(file: h5py.File) -> int:
     histories = tuple(check_column(name) for name in mapping(file, "histories"))
     groups = {
         "errors": ERROR_COLUMNS,
-        "results": kept.columns(mapping(file, "identity")),
+        "results": selected_results.columns(mapping(file, "identity")),
         "ledger": (*LEDGER_COLUMNS, *histories),
         **{name: columns for name, (columns, _) in descriptions(file).items()},
     }

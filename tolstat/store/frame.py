@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records as origins
+from tolstat.common import draw_records
 from tolstat.common.columns import ERROR_COLUMNS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import Status
@@ -27,7 +27,7 @@ def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
 
     errors, results = store.errors(), store.results()
     data: dict[tuple[str, str], NDArray[Any]] = _design(store) if store.case_names else {}
-    drawn = origins.columns(store.sampling)
+    drawn = draw_records.columns(store.sampling)
     if drawn:
         origin = store.origin()
         data |= {(c.name, c.unit): c.of(origin) for c in drawn}
@@ -50,7 +50,7 @@ def to_xarray(store: Reader) -> xarray.Dataset:
         fault = Fault(str(store.path), "xarray is not installed", "pip install xarray, or take to_pandas()")
         raise InputError([fault]) from error
     frame = to_pandas(store)
-    columns = (*origins.columns(store.sampling), *ERROR_COLUMNS, *store.columns)
+    columns = (*draw_records.columns(store.sampling), *ERROR_COLUMNS, *store.columns)
     told = {c.name: {"units": c.unit, "description": c.description} for c in columns}
     data = {name: ("row", frame[name].to_numpy(), told.get(str(name), {})) for name in frame}
     return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": store.study_name})

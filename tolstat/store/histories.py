@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 from tolstat.common.tables import HistorySpec
 from tolstat.store.result_file import fault, put_attributes
 
@@ -129,7 +129,7 @@ class HistoryParts:
             file["rows"] = rows
             for name, spec in self.specs.items():
                 create_dataset(file, name, len(rows), spec)[...] = arrays[name]
-        with writing(self.folder / f"{self._next:08d}.h5") as temporary:
+        with atomic_write(self.folder / f"{self._next:08d}.h5") as temporary:
             temporary.write_bytes(content.getbuffer())
         self._next += 1
 

@@ -12,8 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results as kept
-from tolstat.common import tables
+from tolstat.common import selected_results, tables
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status, Variant
@@ -50,7 +49,7 @@ class Reader:
         self.created = text(attrs, "created")
         self.git_commit = text(attrs, "git_commit")
         self.identity = checks.mapping(file, "identity")
-        self.columns = kept.columns(self.identity)
+        self.columns = selected_results.columns(self.identity)
         self.joint = checks.mapping(file, "joint")
         self.options = checks.mapping(file, "options")
         self.sampling = checks.mapping(file, "sampling")
@@ -315,7 +314,7 @@ class Reader:
 
     def _results(self, rows: slice) -> NDArray[np.void]:
         table = self._read("results", self.columns, tables.RESULT, rows)
-        kept.blank_others(table, self.columns)
+        selected_results.blank_others(table, self.columns)
         return table
 
     def _intact(self, rows: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:

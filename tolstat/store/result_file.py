@@ -17,12 +17,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records as origins
-from tolstat.common import selected_results as kept
-from tolstat.common import tables
+from tolstat.common import draw_records, selected_results, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.files import check_room, writing
+from tolstat.common.files import atomic_write, check_disk_space
 from tolstat.common.tables import HistorySpec, Options
 from tolstat.store.integrity import errors_hash, seal
 from tolstat.store.provenance import git_commit, versions
@@ -167,12 +165,12 @@ def fill(
     put_attributes(scale, {"units": "1", "description": "row of the campaign: the joint's number"})
     if design is not None:
         create_table(file, "design", DESIGN_COLUMNS, n, [design])
-    drawn = origins.columns(json.loads(str(attrs["sampling"])))
+    drawn = draw_records.columns(json.loads(str(attrs["sampling"])))
     if bool(drawn) != (origin is not None):
         raise ValueError("how the joints were drawn must be given for the methods that have columns for it, only")
     if drawn:
         create_table(file, "origin", drawn, n, origin)
-    create_table(file, "results", kept.columns(json.loads(str(attrs["identity"]))), n)
+    create_table(file, "results", selected_results.columns(json.loads(str(attrs["identity"]))), n)
     create_table(file, "ledger", (*LEDGER_COLUMNS, *history_check_columns(attrs)), n)
     session = file.create_dataset("session", (2,), "f8", dcpl=_allocated("f8", 0.0))
     put_attributes(session, {"units": "s, 1", "description": "of the run under way: start (Unix time), joints done"})
@@ -214,7 +212,7 @@ def descriptions(file: h5py.File) -> dict[str, tuple[tuple[Column, ...], np.dtyp
     held = {"design": (DESIGN_COLUMNS, tables.DESIGN)} if "design" in file else {}
     if "origin" in file:
         sampling = json.loads(text(file.attrs, "sampling"))
-        held["origin"] = (origins.columns(sampling), origins.dtype(sampling))
+        held["origin"] = (draw_records.columns(sampling), draw_records.dtype(sampling))
     return held
 
 
@@ -369,9 +367,9 @@ def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], gr
     h5py.File
         The file now at `path`, open for writing.
     """
-    check_room(path, held.id.get_filesize() + growth)
+    check_disk_space(path, held.id.get_filesize() + growth)
     with ExitStack() as opened:
-        with writing(path) as temporary:
+        with atomic_write(path) as temporary:
             copy_open(held, temporary)
             with open_hdf5(temporary, "r+") as file:
                 change(file)

@@ -19,9 +19,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.errors import StoreError
-from tolstat.common.files import check_room, writing
+from tolstat.common.files import atomic_write, check_disk_space
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store.checks import DAMAGED
 from tolstat.store.histories import HISTORY_BYTES
@@ -133,8 +133,8 @@ class ResultStore(Reader):
             raise fault(path, "cannot be written: no such folder", "make the folder first")
         held = range(study.rows) if rows is None else rows
         try:
-            check_room(path, size_of_new(len(held), kept.columns(study.identity())))
-            with writing(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
+            check_disk_space(path, size_of_new(len(held), selected_results.columns(study.identity())))
+            with atomic_write(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
                 blocks = [errors] if isinstance(errors, np.ndarray) else errors
                 design = study.design[held.start : held.stop] if study.case_names else None
                 attrs = attributes(study, specs, dimensions or {}, options, fidelity)
@@ -327,7 +327,7 @@ class ResultStore(Reader):
             return
         taken = self.path.exists()
         path = self.path.with_name(f"{self.path.stem}.saved{self.path.suffix}") if taken else self.path
-        with writing(path, overwrite=False) as temporary:
+        with atomic_write(path, overwrite=False) as temporary:
             copy_open(self._file, temporary)
         found = "was replaced by another file" if taken else "was deleted"
         remedy = f"{path} holds all finished joints; run the campaign again to go on" + (

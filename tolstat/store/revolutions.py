@@ -17,10 +17,10 @@ from tolstat.store.recorded import joint_of, options_of
 AGAIN = "simulated again"
 ANGLES = 60
 """Default number of input angles per revolution to read, if the histories have as many samples."""
-BLOCK = 64
+JOINTS_PER_BLOCK = 64
 """Joints whose histories are in memory at a time."""
 
-MOST = 256
+JOINTS_PER_READ = 256
 """Largest number of joints whose loads a caller should read at a time: 9 MB at 180 samples a revolution."""
 
 FloatArray = NDArray[np.float64]
@@ -92,8 +92,8 @@ def read(store: ResultStore, rows: NDArray[np.intp], most_angles: int = ANGLES) 
     apart = 0.0
     if origin == AGAIN and len(rows):
         warm_up()
-    for first in range(0, len(rows), BLOCK):
-        some = rows[first : first + BLOCK]
+    for first in range(0, len(rows), JOINTS_PER_BLOCK):
+        some = rows[first : first + JOINTS_PER_BLOCK]
         if origin == AGAIN:
             found, difference = _again(store, some)
             apart = max(apart, difference)

@@ -9,8 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results as kept
-from tolstat.common import tables
+from tolstat.common import selected_results, tables
 from tolstat.common.columns import Column
 from tolstat.store.result_file import create_table, put_attributes, text
 
@@ -69,7 +68,7 @@ def read(store: ResultStore) -> Verification | None:
     checks = {}
     for name in text(group.attrs, "checks").split():
         table = np.empty(len(rows), tables.RESULT)
-        kept.blank_others(table, store.columns)
+        selected_results.blank_others(table, store.columns)
         for c in store.columns:
             c.of(table)[:] = group[name][c.name][:]
         attrs = group[name].attrs

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis import exceedance, quantile, weighted
 from tolstat.analysis.exceedance import Exceedance
 from tolstat.analysis.quantile import Quantile
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.columns import RESULT_COLUMNS, Column
-from tolstat.common.draw_records import check_counted
+from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import BUSHINGS, ERROR_FIELDS, PINS, VALID, Status
 from tolstat.store import Counts, verification
@@ -140,12 +140,12 @@ class Campaign:
     @property
     def drawn(self) -> tuple[str, ...]:
         """Loads of `LOADS` that the study keeps."""
-        return tuple(name for name in LOADS if kept.holds(self.columns, name))
+        return tuple(name for name in LOADS if selected_results.holds(self.columns, name))
 
     @property
     def listed(self) -> tuple[str, ...]:
         """Loads that tables show: those of `drawn` or, if there are none, all others that the study keeps."""
-        return self.drawn or tuple(name for name in LIMIT_UNITS if kept.holds(self.columns, name))
+        return self.drawn or tuple(name for name in LIMIT_UNITS if selected_results.holds(self.columns, name))
 
     @property
     def iid(self) -> bool:
@@ -200,7 +200,7 @@ def read(
     StoreError
         When the joints have weights that the caller does not use, or belong to a subset simulation.
     """
-    check_counted(store.sampling, store.path, weighted)
+    check_equal_weights(store.sampling, store.path, weighted)
     errors, results = store.errors(fields=errors_of), store.results(fields=fields)
     nominal, weights = results[:0], store.origin()["weight"] if store.sampling["method"] == "importance" else None
     if store.sampling["nominal_first"] and store.rows.start == 0:

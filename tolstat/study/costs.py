@@ -15,8 +15,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field, model_validator
 
-from tolstat.common import strict as schema
-from tolstat.common import units
+from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
@@ -116,18 +115,18 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
     """
     if path is None:
         return [Cost(t.width, (CostEntry(),) * len(t.names)) for t in tolerances]
-    table = _read_csv(path) if path.suffix == ".csv" else schema.read_toml(path)
+    table = _read_csv(path) if path.suffix == ".csv" else strict.read_toml(path)
     units_of = {name: t.site for t in tolerances for name in t.names}
     found: dict[str, CostEntry] = {}
     faults: list[Fault] = []
-    claims = selection.Claims(str(path))
+    claims = selection.Assignments(str(path))
     known = {name: site.unit for name, site in units_of.items()}
     for entry in selection.entries(table):
         with gather(faults):
             names = selection.resolve(entry, known, str(path))
             claims.claim(entry, names)
             context = {"site": units_of[names[0]]}
-            cost = schema.validate(CostEntry, entry.value, str(path), prefix=entry.path, context=context)
+            cost = strict.validate(CostEntry, entry.value, str(path), prefix=entry.path, context=context)
             found |= dict.fromkeys(names, cost)
     if faults:
         raise InputError(faults)

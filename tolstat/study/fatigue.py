@@ -9,12 +9,11 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
-from tolstat.common import strict as schema
-from tolstat.common import units
+from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import Strict
 from tolstat.common.tables import CHANNELS
-from tolstat.study.selection import Claims, Entry, entries, quantity, resolve
+from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve
 
 Positive = Annotated[units.Number, AfterValidator(units.positive)]
 Exponent = Annotated[units.Number, Field(ge=1, le=30)]
@@ -88,9 +87,9 @@ def read(table: object, place: str) -> Fatigue:
     """
     settings = Settings()
     lines: dict[str, tuple[float, float, float]] = {}
-    claims, faults = Claims(place), list[Fault]()
+    claims, faults = Assignments(place), list[Fault]()
     with gather(faults):
-        settings = schema.validate(Settings, table, place, prefix=("fatigue",))
+        settings = strict.validate(Settings, table, place, prefix=("fatigue",))
     written = table.get("line", {}) if isinstance(table, Mapping) else {}
     for entry in entries(written if isinstance(written, Mapping) else {}, "fatigue", "line"):
         with gather(faults):
@@ -114,10 +113,10 @@ def of_text(text: str, place: str) -> Fatigue:
 
 
 def _line(entry: Entry, unit: str, place: str) -> tuple[float, float, float]:
-    read = schema.validate(LineEntry, entry.value, place, prefix=entry.path)
+    read = strict.validate(LineEntry, entry.value, place, prefix=entry.path)
     where = (*entry.path, "S0")
     size = quantity(Entry(entry.pattern, where, read.S0), unit, place)
     if size <= 0:
         found = f"{read.S0!r} is not positive"
-        raise InputError([Fault(f"{place}: {schema.dotted(where)}", found, "give a range above zero")])
+        raise InputError([Fault(f"{place}: {strict.dotted(where)}", found, "give a range above zero")])
     return read.m, size, read.N0

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from tolstat import joint
-from tolstat.common import selected_results as kept
-from tolstat.common import strict as schema
+from tolstat.common import selected_results, strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
@@ -18,13 +17,13 @@ from tolstat.study import fatigue, listing, proposal, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
-from tolstat.study.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Claims, Entry
+from tolstat.study.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Assignments, Entry
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.kinds import distribution
 
-ModelT = TypeVar("ModelT", bound=schema.Strict)
+ModelT = TypeVar("ModelT", bound=strict.Strict)
 
 SCATTER = ("tolerances", "correlation", "errors")
 """Sections that define the joints of most sampling methods; the first is required."""
@@ -63,12 +62,12 @@ class StudyFile:
         self.data = read_toml(path, text)
         self.text = path.read_text(encoding="utf-8") if text is None else text
         self._faults: list[Fault] = []
-        self._claims = Claims(self.place)
+        self._claims = Assignments(self.place)
         self._toleranced: dict[str, str] = {}
         allowed = list(sections)
         for key in self.data:
             if key not in allowed:
-                self._fault((key,), "unknown key", schema.did_you_mean(key, allowed))
+                self._fault((key,), "unknown key", strict.did_you_mean(key, allowed))
 
     def finish(self) -> None:
         """Raise an error if faults were found.
@@ -93,7 +92,7 @@ class StudyFile:
             self._fault((section,), "missing table", f"add [{section}]{one_joint}")
             return None
         with gather(self._faults):
-            return schema.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
+            return strict.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
         return None
 
     def joint(self) -> Joint | None:
@@ -161,14 +160,14 @@ class StudyFile:
                     self._claims.claim(entry, names)
                 site = Site(names[0], UNITS[names[0]], 0.0, self.path.parent)
                 context = {"site": site}
-                read = schema.validate(SweepEntry, entry.value, self.place, prefix=entry.path, context=context)
+                read = strict.validate(SweepEntry, entry.value, self.place, prefix=entry.path, context=context)
                 axes.append(SweepAxis(tuple(names), read.start, read.stop, read.points))
         return tuple(axes)
 
     def limits(self) -> dict[str, float]:
         """``[limits]``: limit of each load that has one (SI)."""
         limits: dict[str, float] = {}
-        claims = Claims(self.place)
+        claims = Assignments(self.place)
         for entry in self._entries("limits"):
             with gather(self._faults):
                 names = selection.resolve(entry, LIMIT_UNITS, self.place)
@@ -247,7 +246,7 @@ class StudyFile:
     def check_limits(self, output: Output, limits: Mapping[str, float]) -> None:
         """Note limits of loads that are not stored."""
         held = {c.name for c in output.columns}
-        lacking = [name for load in limits for name in kept.needed(load) if name not in held]
+        lacking = [name for load in limits for name in selected_results.needed(load) if name not in held]
         if lacking:
             found = f"leaves out what [limits] judges by: {', '.join(lacking)}"
             self._fault(("output", "results"), found, "add these, or remove their limits")
@@ -261,7 +260,7 @@ class StudyFile:
         found = []
         for number, item in enumerate(data):
             with gather(self._faults):
-                found.append(schema.validate(model, item, self.place, prefix=(section, number)))
+                found.append(strict.validate(model, item, self.place, prefix=(section, number)))
         return found
 
     def _table(self, section: str) -> Mapping[str, Any]:
@@ -275,7 +274,7 @@ class StudyFile:
         return list(selection.entries(self._table(section), section))
 
     def _fault(self, path: tuple[int | str, ...], found: str, remedy: str) -> None:
-        self._faults.append(Fault(f"{self.place}: {schema.dotted(path)}", found, remedy))
+        self._faults.append(Fault(f"{self.place}: {strict.dotted(path)}", found, remedy))
 
 
 def nominal_value(name: str, operation: Operation | None) -> float | None:

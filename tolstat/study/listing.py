@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tolstat import joint
-from tolstat.common import strict as schema
+from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
@@ -16,7 +16,7 @@ from tolstat.joint.model import merged, overridden
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
 from tolstat.study.model import MAX_ROWS, CaseEntry, Range, Solver, VariantEntry
-from tolstat.study.selection import UNITS, Claims, Entry
+from tolstat.study.selection import UNITS, Assignments, Entry
 
 Section = tuple[int | str, ...]
 
@@ -98,7 +98,7 @@ def read(data: Mapping[str, Any], nominal: Nominal | None, place: str, folder: P
 def _grid(section: Any, place: str, faults: list[Fault]) -> Iterator[Axis]:
     if not isinstance(section, Mapping):
         raise InputError([Fault(f"{place}: grid", "is not a table", "write [grid]")])
-    claims = Claims(place)
+    claims = Assignments(place)
     for entry in selection.entries(section, "grid"):
         with gather(faults):
             names = selection.resolve(entry, UNITS, place)
@@ -108,7 +108,7 @@ def _grid(section: Any, place: str, faults: list[Fault]) -> Iterator[Axis]:
 
 def _values(entry: Entry, unit: str, place: str, faults: list[Fault]) -> Iterator[float]:
     if not isinstance(entry.value, list) or not entry.value:
-        where = f"{place}: {schema.dotted(entry.path)}"
+        where = f"{place}: {strict.dotted(entry.path)}"
         raise InputError([Fault(where, f"{entry.value!r} is not a list of values", 'write ["0 deg", "15 deg"]')])
     for number, value in enumerate(entry.value):
         with gather(faults):
@@ -132,8 +132,8 @@ def _cases(section: Any, axes: list[Axis], place: str, faults: list[Fault]) -> d
                 faults.append(Fault(f"{place}: case[{number}].name", f"there is a case {name!r} already", remedy))
             cases[name] = {}
         with gather(faults):
-            entry = schema.validate(CaseEntry, item, place, prefix=("case", number))
-            claims = Claims(place)
+            entry = strict.validate(CaseEntry, item, place, prefix=("case", number))
+            claims = Assignments(place)
             for axis in axes:
                 claims.claim(axis.entry, axis.names)
             cases[entry.name] = selection.fixed_errors(entry.errors, ("case", number, "errors"), place, claims)
@@ -181,7 +181,7 @@ class _Variants:
         for number, item in enumerate(entries):
             with gather(faults):
                 at: Section = ("variant", number)
-                entry = schema.validate(VariantEntry, item, self._place, prefix=at)
+                entry = strict.validate(VariantEntry, item, self._place, prefix=at)
                 run = everything if entry.cases is None else [0]
                 with gather(faults):
                     run = sorted({*run, *self._numbers(entry.cases or [], cases, at)})
@@ -191,10 +191,10 @@ class _Variants:
         return variants
 
     def _numbers(self, names: list[str], cases: list[str], at: Section) -> list[int]:
-        where = f"{self._place}: {schema.dotted((*at, 'cases'))}"
+        where = f"{self._place}: {strict.dotted((*at, 'cases'))}"
         unknown = [name for name in names if name not in cases]
         if unknown:
-            raise InputError([Fault(where, f"no case {name!r}", schema.did_you_mean(name, cases)) for name in unknown])
+            raise InputError([Fault(where, f"no case {name!r}", strict.did_you_mean(name, cases)) for name in unknown])
         return [cases.index(name) for name in names]
 
     def _expanded(self, entry: VariantEntry, run: list[int], at: Section) -> list[Listed]:
@@ -219,13 +219,13 @@ class _Variants:
         operation, solver = self._nominal.operation, self._nominal.solver
         with gather(faults):
             keys = operation.model_dump(mode="json") | entry.operation
-            operation = schema.validate(Operation, keys, self._place, prefix=(*at, "operation"))
+            operation = strict.validate(Operation, keys, self._place, prefix=(*at, "operation"))
         if entry.solver.get("fidelity") == "auto":
-            where = f"{self._place}: {schema.dotted((*at, 'solver', 'fidelity'))}"
+            where = f"{self._place}: {strict.dotted((*at, 'solver', 'fidelity'))}"
             faults.append(Fault(where, "'auto' is for all joints of a study", "write it in [solver]"))
         with gather(faults):
             keys = solver.model_dump(exclude_unset=True) | entry.solver
-            solver = schema.validate(Solver, keys, self._place, prefix=(*at, "solver"))
+            solver = strict.validate(Solver, keys, self._place, prefix=(*at, "solver"))
         if faults:
             raise InputError(faults)
         return operation, solver
@@ -240,7 +240,7 @@ class _Variants:
         low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
         faults = []
         for key in ranges:
-            where = f"{self._place}: {schema.dotted(at)}.{key}"
+            where = f"{self._place}: {strict.dotted(at)}.{key}"
             if not isinstance(low[key], float):
                 faults.append(Fault(where, f"{low[key]!r} is no quantity that can vary", "write one variant for each"))
             elif low[key] == high[key]:
@@ -256,7 +256,7 @@ class _Variants:
 
     def _joint(self, keys: Mapping[str, Any], at: Section) -> Joint:
         overrides = {key: value for key, value in keys.items() if key != "base"}
-        return joint.load(keys["base"], overrides, self._place, self._folder, schema.dotted(at))
+        return joint.load(keys["base"], overrides, self._place, self._folder, strict.dotted(at))
 
     def _values(self, made: Joint, written: list[str]) -> dict[str, Any]:
         nominal = dict(flat(self._nominal.joint.model_dump(exclude={"description"})))
@@ -276,7 +276,7 @@ def _ranges(section: Mapping[str, Any], at: Section, place: str, before: str = "
         if isinstance(value, Mapping) and not value.keys() & {"from", "to"}:
             yield from _ranges(value, (*at, key), place, f"{before}{key}.")
         else:
-            yield f"{before}{key}", schema.validate(Range, value, place, prefix=(*at, key))
+            yield f"{before}{key}", strict.validate(Range, value, place, prefix=(*at, key))
 
 
 def _written(value: float, like: str | float) -> str | float:

@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from tolstat.common import selected_results as kept
-from tolstat.common import units
+from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Fidelity, Method, Options, Start
@@ -89,7 +88,7 @@ class Solver(Strict):
         )
 
 
-Drawing = Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"]
+SamplingMethod = Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"]
 
 
 class Sampling(Strict):
@@ -113,7 +112,7 @@ class Sampling(Strict):
         has its own joint without errors.
     """
 
-    method: Drawing = "random"
+    method: SamplingMethod = "random"
     n: Annotated[int, Field(strict=True, ge=1, le=MAX_SAMPLES)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Flag = True
@@ -166,7 +165,7 @@ class Subset(Sampling):
         Whether a joint without a valid load counts as above every level or below.
     """
 
-    method: Drawing = "subset"
+    method: SamplingMethod = "subset"
     per_level: Annotated[int, Field(strict=True, ge=20, le=MAX_ROWS)]
     p0: Annotated[Number, Field(gt=0, le=0.5)]
     load: str
@@ -182,11 +181,11 @@ class Subset(Sampling):
 
 
 def _selecting(pattern: str) -> str:
-    if selection.select(pattern, kept.NAMES):
+    if selection.select(pattern, selected_results.NAMES):
         return pattern
     anywhere = f"*.{pattern}"
-    halves = selection.select(anywhere, kept.NAMES)
-    remedy = f"did you mean {anywhere!r}?" if halves else selection.instead(pattern, kept.NAMES)
+    halves = selection.select(anywhere, selected_results.NAMES)
+    remedy = f"did you mean {anywhere!r}?" if halves else selection.instead(pattern, selected_results.NAMES)
     raise refuse(f"{pattern!r} selects nothing", remedy)
 
 
@@ -209,15 +208,17 @@ class Output(Strict):
 
     def identity(self) -> dict[str, Any]:
         """Settings that decide the stored numbers: names in place of patterns, no names where all results are kept."""
-        selected = [name for pattern in self.results or () for name in selection.select(pattern, kept.NAMES)]
-        names = kept.chosen(selected) if self.results else None
+        selected = [
+            name for pattern in self.results or () for name in selection.select(pattern, selected_results.NAMES)
+        ]
+        names = selected_results.chosen(selected) if self.results else None
         rest = self.model_dump(exclude={"results"})
         return rest if names is None else rest | {"results": names}
 
     @property
     def columns(self) -> tuple[Column, ...]:
         """Columns of the results that are kept."""
-        return kept.columns({kept.KEY: self.identity().get("results")})
+        return selected_results.columns({selected_results.KEY: self.identity().get("results")})
 
 
 class CaseEntry(Strict):

@@ -88,7 +88,7 @@ def limit_of(load: str, level: str, place: str) -> float:
 
 
 def fixed_errors(
-    table: Mapping[str, Any], section: Sequence[int | str], place: str, claims: Claims
+    table: Mapping[str, Any], section: Sequence[int | str], place: str, claims: Assignments
 ) -> dict[str, float]:
     """Read a table of errors that are given, not drawn.
 
@@ -189,7 +189,7 @@ def instead(pattern: str, names: Sequence[str]) -> str:
     return did_you_mean(key, [n.partition(".")[2] for n in names if n.partition(".")[0] == known[0]])
 
 
-class Claims:
+class Assignments:
     """Record of the entry that sets each error; a second entry for the same error is a fault that names both."""
 
     def __init__(self, place: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
@@ -143,7 +143,7 @@ class Study(Case):
         """Loads of interest: those with limits, else those that ``output.results`` selects; else none."""
         if self.limits or self.output.results is None:
             return list(self.limits)
-        return [load for load in LIMIT_UNITS if kept.holds(self.output.columns, load)]
+        return [load for load in LIMIT_UNITS if selected_results.holds(self.output.columns, load)]
 
     def identity(self) -> dict[str, Any]:
         """Everything that decides the numbers, as dotted key to JSON value.

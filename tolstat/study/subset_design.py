@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import validate
 from tolstat.study.model import Subset
@@ -38,8 +38,8 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
     if not study.tolerances:
         remedy = 'give a study with [tolerances], as of sampling.method = "random"'
         faults.append(Fault(str(study.path), "has no tolerances that joints are drawn from", remedy))
-    if not kept.holds(study.output.columns, str(sampling["load"])):
-        remedy = f"add {', '.join(kept.needed(str(sampling['load'])))}"
+    if not selected_results.holds(study.output.columns, str(sampling["load"])):
+        remedy = f"add {', '.join(selected_results.needed(str(sampling['load'])))}"
         faults.append(Fault(f"{study.path}: output.results", f"leaves out {sampling['load']} of --limit", remedy))
     own = study.sampling.model_dump(include={"seed", "nominal_first"})
     with gather(faults):

@@ -2,7 +2,7 @@
 
 The task is that of tolstat's solver: from its initial equilibrium, which the competitors get at no cost, over a given
 number of revolutions to the largest loads of the last one. A call of the right-hand side from Python costs little more
-than its arithmetic (`kernel.simd.jit.bare`).
+than its arithmetic (`kernel.simd.jit.compiled_entry`).
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from tolstat.benchmarks.work_precision.measure import Run
 from tolstat.benchmarks.work_precision.setup import Setup, measured
 from tolstat.benchmarks.work_precision.table import build, cost, leaders
-from tolstat.common.files import writing
+from tolstat.common.files import atomic_write
 from tolstat.display import style, text
 from tolstat.report import Report
 from tolstat.study import Study
@@ -66,9 +66,9 @@ def write(runs: Sequence[Run], setup: Setup, base: Study, stem: Path) -> Report:
     )
     files = style.save(figure(points, truth, subtitle), stem)
     csv, markdown = (stem.with_name(stem.name + ending) for ending in (".csv", ".md"))
-    with writing(csv) as temporary:
+    with atomic_write(csv) as temporary:
         points.to_csv(temporary, index=False, float_format="%.4g", encoding="utf-8", lineterminator="\n")
-    with writing(markdown) as temporary:
+    with atomic_write(markdown) as temporary:
         temporary.write_text(page(points, truth, subtitle, f"{stem.name}.png"), encoding="utf-8")
     return Report(text.plain(_ahead(points, truth, "loads")), subtitle, [*files, csv, markdown])
 

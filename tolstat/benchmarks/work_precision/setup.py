@@ -11,7 +11,7 @@ from pydantic import Field
 
 from tolstat import joint, sampling, study
 from tolstat.benchmarks.work_precision.competitors import Code, check_installed
-from tolstat.common import strict as schema
+from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import Strict
 from tolstat.study import Study
@@ -86,7 +86,7 @@ def load(path: Path, quick: bool = False) -> tuple[Setup, Study]:
     InputError
         With every fault of the setup, or of the study.
     """
-    setup = schema.validate(Setup, schema.read_toml(path), str(path))
+    setup = strict.validate(Setup, strict.read_toml(path), str(path))
     base = study.load(path.parent / setup.study)
     first = int(base.sampling.nominal_first)
     if base.listed is not None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolstat.kernel.integrators.integrate import IF_STALLED, NO, YES, at_rounding
 from tolstat.kernel.mechanics.vector import copy, larger
-from tolstat.kernel.simd.jit import closure, njit
+from tolstat.kernel.simd.jit import njit, njit_inner
 
 DIFFERENCE = 2.0**-26
 """Increment of one-sided differences relative to the motion in a step: the square root of 2^-52."""
@@ -130,12 +130,12 @@ def small_change(cv, ca, fresh, options, work, state):
 def build_acceleration(force, mass=None, divided=False):
     """Build the jitted function (t, q, v, work, out) that evaluates q''; arguments as in `build_dense`."""
 
-    @closure
+    @njit_inner
     def plain(t, q, v, work, out):
         out[:] = np.nan  # exposes entries that `force` does not write
         force(t, q, v, out)
 
-    @closure
+    @njit_inner
     def by_matrix(t, q, v, work, out):
         out[:] = np.nan
         force(t, q, v, out)
@@ -144,7 +144,7 @@ def build_acceleration(force, mass=None, divided=False):
     if mass is None:
         return by_matrix if divided else plain
 
-    @closure
+    @njit_inner
     def by_function(t, q, v, work, out):
         out[:] = np.nan
         force(t, q, v, out)
@@ -167,7 +167,7 @@ def increment(j, q, v, a, cv, ca):
 def build_differences(acceleration):
     """Build `factorise` of `integrate.build_integrator` with a tangent by one-sided differences of `acceleration`."""
 
-    @closure
+    @njit_inner
     def by_differences(t, q, v, a, cv, ca, par, options, work):
         n = q.size
         acceleration(t, q, v, work, work.base)
@@ -190,7 +190,7 @@ def build_differences(acceleration):
 def build_given(acceleration, force, tangent, mass=None, divided=False):
     """Build `factorise` of `integrate.build_integrator` with the user's `tangent`; arguments as in `build_dense`."""
 
-    @closure
+    @njit_inner
     def mass_moves(t, q, v, a, cv, ca, work):
         """Add d(M(q) q'')/dq to the tangent, by differences of the mass at a fixed q''."""
         n = q.size
@@ -212,7 +212,7 @@ def build_given(acceleration, force, tangent, mass=None, divided=False):
         mass(t, q, work.mass)
         return lu(work.mass, work.mass_pivots)
 
-    @closure
+    @njit_inner
     def by_tangent(t, q, v, a, cv, ca, par, options, work):
         n = q.size
         work.matrix[:] = 0.0
@@ -256,7 +256,7 @@ def build_dense(force, tangent=None, mass=None, divided=False):
     """
     acceleration = build_acceleration(force, mass, divided)
 
-    @closure
+    @njit_inner
     def residual(t, q, v, a, par, options, work, out):
         acceleration(t, q, v, work, out)
         for i in range(out.size):

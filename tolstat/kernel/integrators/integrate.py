@@ -14,16 +14,16 @@ from tolstat.kernel.integrators import bdf2, generalized_alpha, quadrature, trbd
 from tolstat.kernel.integrators.state import (
     AHEAD,
     ATTEMPTS_LEFT,
-    CLOSE,
     CV_FACTORISED,
     FACTORISATIONS,
     H_OLD,
     HALVINGS,
     ITERATIONS,
-    STAGED,
+    LAST_ITERATION_BELOW,
+    STAGED_STEP,
     STEPS,
 )
-from tolstat.kernel.simd.jit import closure, njit
+from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.kernel.simd.lane import where
 
 BDF2, GENERALIZED_ALPHA, TR_BDF2 = int(Method.BDF2), int(Method.GENERALIZED_ALPHA), int(Method.TR_BDF2)
@@ -76,12 +76,12 @@ def accept(h, state, options):
         state.q1[i], state.v1[i], state.a1[i] = state.q0[i], state.v0[i], state.a0[i]
         state.q0[i], state.v0[i], state.a0[i] = state.q[i], state.v[i], state.a[i]
     state.memory[H_OLD], state.memory[AHEAD] = h, 0.0
-    state.memory[STAGED] = h if options.method == TR_BDF2 else 0.0
+    state.memory[STAGED_STEP] = h if options.method == TR_BDF2 else 0.0
     state.counters[STEPS] += 1
 
 
 @njit
-def fitting(level, h, h_old, options):
+def admissible_level(level, h, h_old, options):
     """Smallest level, from `level` on, with a sub-step h / 2^level of at most `MAX_RATIO` times the last, `h_old`."""
     while level < options.max_halvings and h_old > 0 and h / (1 << level) > 1.0001 * MAX_RATIO * h_old:
         level += 1
@@ -89,7 +89,7 @@ def fitting(level, h, h_old, options):
 
 
 @njit
-def grown(level, done, whole, error):
+def next_substep_level(level, done, whole, error):
     """Level of the next sub-step: lower where the grid allows a longer one and its predicted error is accepted.
 
     `done` of `whole` parts of the step are complete; `error`: of the last sub-step, in units of the tolerance.
@@ -143,7 +143,7 @@ def at_rounding(cv, ca, fresh, options, work, state):
 def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding):
     """Bind a system to Newton's iteration; arguments and returned function as in `build_integrator`."""
 
-    @closure
+    @njit_inner
     def newton(t, cv, ca, par, options, work, state):
         q, v, a = state.q, state.v, state.a
         before = 0.0
@@ -158,7 +158,7 @@ def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding
             if not now < 1e300 or iteration == options.newton_max_iter:
                 break
             fresh = state.memory[CV_FACTORISED] != cv or (iteration > 0 and now > SLOW * before)
-            last = now <= state.memory[CLOSE] and not fresh
+            last = now <= state.memory[LAST_ITERATION_BELOW] and not fresh
             if fresh:
                 state.memory[CV_FACTORISED] = cv
                 state.counters[FACTORISATIONS] += 1
@@ -197,7 +197,7 @@ def build_advance(newton):
         The same, at first as a whole; the first step of BDF2 at `START_LEVEL`.
     """
 
-    @closure
+    @njit_inner
     def attempt(t, h, par, options, work, state):
         for stage in range(stages(options)):
             cv, ca, share = predict(h, stage, state, options)
@@ -206,13 +206,13 @@ def build_advance(newton):
         error = estimate(h, state, options)
         return error <= 1, error
 
-    @closure
+    @njit_inner
     def substeps(t, h, level, par, options, work, state):
         whole = 1 << options.max_halvings  # progress is counted in sub-steps of the smallest size
         done = 0
         while done < whole:
             if options.method == BDF2 or options.rtol > 0:
-                level = fitting(level, h, state.memory[H_OLD], options)
+                level = admissible_level(level, h, state.memory[H_OLD], options)
             if state.counters[ATTEMPTS_LEFT] <= 0:
                 return False
             state.counters[ATTEMPTS_LEFT] -= 1
@@ -221,16 +221,16 @@ def build_advance(newton):
             if good:
                 accept(part, state, options)
                 done += whole >> level
-                level = grown(level, done, whole, error)
+                level = next_substep_level(level, done, whole, error)
             else:
                 level += 1
-                state.memory[AHEAD] = state.memory[STAGED] = 0.0
+                state.memory[AHEAD] = state.memory[STAGED_STEP] = 0.0
                 state.counters[HALVINGS] += 1
                 if level > options.max_halvings:
                     return False
         return True
 
-    @closure
+    @njit_inner
     def advance(t, h, par, options, work, state):
         level = 0
         if options.method == BDF2 and state.memory[H_OLD] == 0:

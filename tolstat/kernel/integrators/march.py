@@ -7,7 +7,7 @@ from tolstat.kernel.integrators.dense import build_dense, lu, make_dense_work, m
 from tolstat.kernel.integrators.integrate import build_integrator, reset
 from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, make_state
 from tolstat.kernel.mechanics.vector import copy
-from tolstat.kernel.simd.jit import closure
+from tolstat.kernel.simd.jit import njit_inner
 
 OK, NEWTON_FAILED, NOT_FINITE = int(Status.OK), int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
 
@@ -24,14 +24,14 @@ def build_march(force, tangent=None, mass=None, divided=False):
     acceleration, residual, factorise, solve = build_dense(force, tangent, mass, divided)
     _, advance = build_integrator(residual, factorise, solve, motion_size, small_change)
 
-    @closure
+    @njit_inner
     def finite(state):
         for i in range(state.q0.size):
             if not (abs(state.q0[i]) < 1e300 and abs(state.v0[i]) < 1e300 and abs(state.a0[i]) < 1e300):
                 return False
         return True
 
-    @closure
+    @njit_inner
     def march(t0, t1, par, options, attempts, work, state, points):
         steps = points.shape[0] - 1
         h = (t1 - t0) / steps

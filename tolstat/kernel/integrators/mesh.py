@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from tolstat.kernel.integrators import trbdf2
-from tolstat.kernel.integrators.state import CLOSE, FORCE, TOLERANCE, TORQUE
+from tolstat.kernel.integrators.state import FORCE, LAST_ITERATION_BELOW, TOLERANCE, TORQUE
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.scale import set_weight, stiffness, typical_force
 from tolstat.kernel.mechanics.topology import N_LUMPS, PSI
@@ -26,19 +26,19 @@ CELLS = 720
 """Approximate number of cells of a revolution: an impact and its ringing take a degree or two."""
 CELL = np.dtype([("level", "u1"), ("pinned", "u1"), ("worst", "f8")], align=True)
 """How a cell was taken last: its level, whether that may not be lowered, and the largest error of its parts."""
-LOW = 1 / 16
+COARSEN_BELOW = 1 / 16
 """Largest error of a cell's parts, in units of the tolerance, below which half as many parts suffice: the error of a
 part grows with the third power of its length, or less where contacts switch."""
 FIRST_LEVEL = 2
 """Level of the first cell of the first revolution."""
-SHAPING = 3
+COARSENING_REVS = 3
 """Revolutions with one tolerance after which levels only rise: a changing mesh disturbs a settling motion."""
 UNKNOWN = 255
 """Level of a cell that has not been taken yet."""
 NEWTON_SHARE, SETTLE_SHARE = 0.01, 0.3
 """Residual that ends Newton's iteration, relative to the joint's largest force: the smaller one of `NEWTON_SHARE` times
 the tolerance and `SETTLE_SHARE` times the closure error that is to be detected."""
-LAST = 3.0
+LAST_ITERATION_FACTOR = 3.0
 """Residual, in units of the one above, up to which one more iteration with the same tangent is the last."""
 
 
@@ -75,7 +75,7 @@ def next_level(revolutions, own, before):
     if one.level == UNKNOWN:
         return FIRST_LEVEL
     level, error = int(one.level), one.worst
-    while level > 0 and error < LOW and one.pinned == 0 and revolutions < SHAPING:
+    while level > 0 and error < COARSEN_BELOW and one.pinned == 0 and revolutions < COARSENING_REVS:
         level, error = level - 1, 8 * error
     return level
 
@@ -145,4 +145,4 @@ def set_scale(largest_force, largest_torque, closure, options, par, memory, weig
     share = min(NEWTON_SHARE * memory[TOLERANCE], SETTLE_SHARE * closure)
     small = max(options.newton_tol * typical_force(par), share * largest_force)
     set_weight(small / options.newton_tol, par, weight)
-    memory[CLOSE] = LAST * options.newton_tol
+    memory[LAST_ITERATION_BELOW] = LAST_ITERATION_FACTOR * options.newton_tol

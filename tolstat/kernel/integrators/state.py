@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 STEPS, ITERATIONS, HALVINGS, FACTORISATIONS, ATTEMPTS_LEFT = 0, 1, 2, 3, 4
-H_OLD, CV_FACTORISED, AHEAD, STAGED, CLOSE, TOLERANCE, FORCE, TORQUE = range(8)
+H_OLD, CV_FACTORISED, AHEAD, STAGED_STEP, LAST_ITERATION_BELOW, TOLERANCE, FORCE, TORQUE = range(8)
 MEMORY = 8
 """Indices into ``State.memory``: last accepted step, s; cv of the tangent in use (0: none); whether `ahead` is used
 (1); length of the last step if its first stage is kept (else 0); weighted residual up to which one more iteration needs

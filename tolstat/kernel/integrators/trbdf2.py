@@ -8,7 +8,7 @@ w = sqrt(2) / 4; the embedded formula of order 3 has ((1 - w) / 3, (3 w + 1) / 3
 import math
 
 from tolstat.kernel.integrators.quadrature import relative
-from tolstat.kernel.integrators.state import STAGED
+from tolstat.kernel.integrators.state import STAGED_STEP
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
@@ -66,7 +66,7 @@ def predict(h, stage, state, options):
 
     ``state.v1`` and ``state.aux`` hold velocity and acceleration of the first stage.
     """
-    of = formula(h, state.memory[STAGED])
+    of = formula(h, state.memory[STAGED_STEP])
     for i in range(state.q.size):
         last = state.q0[i], state.v0[i], state.a0[i]
         if stage == 0:

@@ -10,13 +10,13 @@ import numpy as np
 from tolstat.common.tables import PARAM, Options
 from tolstat.kernel.integrators.state import (
     AHEAD,
-    CLOSE,
     FACTORISATIONS,
     H_OLD,
     HALVINGS,
     ITERATIONS,
+    LAST_ITERATION_BELOW,
     MEMORY,
-    STAGED,
+    STAGED_STEP,
     STEPS,
 )
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
@@ -126,7 +126,7 @@ def put_points(lane, state, control, motion):
         motion.q0[i, lane], motion.v0[i, lane], motion.a0[i, lane] = state.q0[i], state.v0[i], state.a0[i]
         motion.q1[i, lane], motion.v1[i, lane] = state.q1[i], state.v1[i]
     motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = state.memory[H_OLD], state.memory[AHEAD]
-    motion.memory[CLOSE, lane] = motion.memory[STAGED, lane] = 0.0
+    motion.memory[LAST_ITERATION_BELOW, lane] = motion.memory[STAGED_STEP, lane] = 0.0
     control.passed[lane] = control.factorised[lane] = control.stage[lane] = 0.0
 
 
@@ -141,7 +141,7 @@ def put_start(lane, state, control, motion):
 
 
 @njit
-def rest(lane, cv, ca, control, motion):
+def start_newton(lane, cv, ca, control, motion):
     """Start Newton's iteration in a lane from its last accepted point, at rest.
 
     `cv` (1/s) and `ca` (1/s^2) are dv/dq and da/dq of the iteration.

@@ -16,18 +16,24 @@ samples, notes, fine, past, out
 """
 
 from tolstat.common.tables import MAX_ITERATIONS
-from tolstat.kernel.integrators.integrate import START_LEVEL, fitting, grown
+from tolstat.kernel.integrators.integrate import START_LEVEL, admissible_level, next_substep_level
 from tolstat.kernel.integrators.mesh import cells_of, next_level, note_cell
-from tolstat.kernel.integrators.state import AHEAD, H_OLD, STAGED
+from tolstat.kernel.integrators.state import AHEAD, H_OLD, STAGED_STEP
 from tolstat.kernel.integrators.trbdf2 import GAMMA
-from tolstat.kernel.lanes.batch import ANGLE, CHECK, HOLD, PART, RELAX, STEP, rest
+from tolstat.kernel.lanes.batch import ANGLE, CHECK, HOLD, PART, RELAX, STEP, start_newton
 from tolstat.kernel.mechanics.topology import N_DOF, PSI
 from tolstat.kernel.revolution.closeup import count_in
-from tolstat.kernel.revolution.equilibrium import FIRST, GROWTH, HELD, LARGEST, MAX_STEPS, SHRINK, SMALLEST
+from tolstat.kernel.revolution.equilibrium import CV_STATIC, FIRST, GROWTH, LARGEST, MAX_STEPS, SHRINK, SMALLEST
 from tolstat.kernel.revolution.quasistatic import angle_time, end_closure
-from tolstat.kernel.revolution.resolve import begin_turns, clear_extremes, follows_error, merge_extremes, revolved
-from tolstat.kernel.revolution.settle import foresee, grid_step, record
-from tolstat.kernel.revolution.simulate import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, judge
+from tolstat.kernel.revolution.resolve import (
+    after_revolution,
+    begin_turns,
+    clear_extremes,
+    follows_error,
+    merge_extremes,
+)
+from tolstat.kernel.revolution.settle import grid_step, predict_increment, record
+from tolstat.kernel.revolution.simulate import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, check_settled
 from tolstat.kernel.simd.jit import njit
 
 GIVEN_UP = -1
@@ -38,7 +44,7 @@ third attempt at an input angle."""
 
 
 @njit
-def stand(lane, motion):
+def accept_unknowns(lane, motion):
     """Accept the unknowns of the trial point of a lane."""
     for i in range(N_DOF):
         motion.q0[i, lane] = motion.q[i, lane]
@@ -61,7 +67,7 @@ def relax(lane, par, options, control, motion):
     control.phase[lane] = RELAX
     control.tries[lane] += 1
     step = control.pseudo[lane]
-    rest(lane, 1 / step, 1 / (step * step), control, motion)
+    start_newton(lane, 1 / step, 1 / (step * step), control, motion)
 
 
 @njit
@@ -75,41 +81,41 @@ def resume(lane, par, options, control, motion):
     """Continue a lane after pseudo-time: with the first step or angle, or with another attempt at its angle."""
     if control.level[lane] == AT_ANGLE:
         control.phase[lane] = ANGLE
-        rest(lane, HELD, 0.0, control, motion)
+        start_newton(lane, CV_STATIC, 0.0, control, motion)
     else:
-        depart(lane, par, options, control, motion)
+        start_motion(lane, par, options, control, motion)
 
 
 @njit
-def depart(lane, par, options, control, motion):
+def start_motion(lane, par, options, control, motion):
     """Set up the first grid point, cell or angle of a lane that is at its start."""
     control.done[lane] = 0
     if options.fidelity == QUASISTATIC:
         control.phase[lane] = ANGLE
-        face(lane, 0, par, options, control)
+        set_angle(lane, 0, par, options, control)
     else:
         for i in range(N_DOF):
             motion.q1[i, lane] = motion.q0[i, lane]
         control.phase[lane], control.factorised[lane], control.k[lane] = STEP, 0.0, 1
         control.level[lane] = min(START_LEVEL, options.max_halvings)
         if follows_error(options):
-            control.phase[lane], control.k[lane] = PART, 0  # `set_out` continues from here
+            control.phase[lane], control.k[lane] = PART, 0  # `start_cells` continues from here
         else:
-            aim(lane, options, control, motion)
+            set_substep(lane, options, control, motion)
 
 
 @njit
-def face(lane, k, par, options, control):
+def set_angle(lane, k, par, options, control):
     """Set up angle `k` in a lane."""
     control.k[lane], control.level[lane], control.fresh[lane] = k, 0, 1.0
     control.t[lane] = angle_time(k, options.steps_per_rev, par)
 
 
 @njit
-def aim(lane, options, control, motion):
+def set_substep(lane, options, control, motion):
     """Set up the next sub-step of a lane."""
     grid, whole = control.grid[lane], 1 << options.max_halvings
-    level = fitting(control.level[lane], grid, motion.memory[H_OLD, lane], options)
+    level = admissible_level(control.level[lane], grid, motion.memory[H_OLD, lane], options)
     h = grid / (1 << level)
     control.level[lane], control.h[lane], control.fresh[lane] = level, h, 1.0
     control.t[lane] = control.origin[lane] + grid * (control.done[lane] / whole) + h
@@ -123,9 +129,9 @@ def advance(lane, options, control, motion):
     control.passed[lane] = 1.0
     motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = control.h[lane], 0.0
     control.done[lane] += whole >> control.level[lane]
-    control.level[lane] = grown(control.level[lane], control.done[lane], whole, 0.0)
+    control.level[lane] = next_substep_level(control.level[lane], control.done[lane], whole, 0.0)
     if control.done[lane] < whole:
-        aim(lane, options, control, motion)
+        set_substep(lane, options, control, motion)
         return False
     control.done[lane] = control.level[lane] = 0
     return True
@@ -136,19 +142,21 @@ def step(lane, lanes, options, control, motion, samples, notes, out):
     """Record the grid point that a lane has reached and set up the next step; return the status."""
     k = control.k[lane]
     record(k, lane, k > options.steps_per_rev, lanes[0], lanes[1], lanes[2].v, samples)
-    motion.memory[AHEAD, lane] = foresee(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
-    status = judge(k, int(control.iterations[lane]), options, samples, notes, out)
+    motion.memory[AHEAD, lane] = predict_increment(
+        k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples
+    )
+    status = check_settled(k, int(control.iterations[lane]), options, samples, notes, out)
     if status != NOT_SETTLED:
         return status
     if k == options.max_revs * options.steps_per_rev:
         return GIVEN_UP
     control.k[lane], control.origin[lane] = k + 1, k * control.grid[lane]
-    aim(lane, options, control, motion)
+    set_substep(lane, options, control, motion)
     return NOT_SETTLED
 
 
 @njit
-def glance(lane, par, lanes, options, control, motion, fine, out):
+def finish_closeup_part(lane, par, lanes, options, control, motion, fine, out):
     """Record a part of a closer look and set up the next one; return `OK` after the last part of the step."""
     j, part = control.looked[lane], control.grid[lane]
     record(j, lane, True, lanes[0], lanes[1], lanes[2].v, fine)
@@ -159,12 +167,12 @@ def glance(lane, par, lanes, options, control, motion, fine, out):
         return OK
     n, h = options.steps_per_rev, grid_step(par, options)
     control.origin[lane] = (n + control.k[lane] - 1) * h + control.part[lane] * part
-    aim(lane, options, control, motion)
+    set_substep(lane, options, control, motion)
     return NOT_SETTLED
 
 
 @njit
-def turn(lane, par, lanes, options, control, motion, samples, out):
+def finish_angle(lane, par, lanes, options, control, motion, samples, out):
     """Record the angle that a lane has solved and set up the next one; return the status."""
     k, n = control.k[lane], options.steps_per_rev
     control.steps[lane] += 1
@@ -180,27 +188,27 @@ def turn(lane, par, lanes, options, control, motion, samples, out):
         tired = control.iterations[lane] > MAX_ITERATIONS * n * options.max_revs
         if tired or control.done[lane] == options.max_revs:
             return NEWTON_FAILED
-    face(lane, k + 1, par, options, control)
+    set_angle(lane, k + 1, par, options, control)
     return NOT_SETTLED
 
 
 @njit
-def find(lane, par, options, control, motion):
+def next_phase(lane, par, options, control, motion):
     """Select the next phase after success in the search for equilibrium, or in a step of pseudo-time."""
     phase = control.phase[lane]
     if phase != CHECK:
-        stand(lane, motion)
+        accept_unknowns(lane, motion)
     if phase == RELAX:
         control.phase[lane] = CHECK
-        rest(lane, HELD, 0.0, control, motion)
+        start_newton(lane, CV_STATIC, 0.0, control, motion)
     elif phase == CHECK:
         resume(lane, par, options, control, motion)
     else:
-        depart(lane, par, options, control, motion)
+        start_motion(lane, par, options, control, motion)
 
 
 @njit
-def retry(lane, par, options, control, motion):
+def fall_back(lane, par, options, control, motion):
     """Select the fallback after Newton failed in this lane, or `CHECK` did; return the status."""
     phase = control.phase[lane]
     if phase == CHECK:
@@ -220,7 +228,7 @@ def retry(lane, par, options, control, motion):
         if control.level[lane] == 0:
             control.halvings[lane] += 1
             control.level[lane] = 1
-            rest(lane, HELD, 0.0, control, motion)
+            start_newton(lane, CV_STATIC, 0.0, control, motion)
         else:
             start_relaxing(lane, AT_ANGLE, control)
             relax(lane, par, options, control, motion)
@@ -230,20 +238,20 @@ def retry(lane, par, options, control, motion):
         if control.level[lane] > options.max_halvings:
             return NEWTON_FAILED
         motion.memory[AHEAD, lane] = 0.0
-        aim(lane, options, control, motion)
+        set_substep(lane, options, control, motion)
     return NOT_SETTLED
 
 
 @njit
-def set_out(lane, par, options, control, motion, past):
+def start_cells(lane, par, options, control, motion, past):
     """Start error-controlled steps in a lane."""
     begin_turns(par, options, motion.memory[:, lane], motion.weight[:, lane], past)
     control.grid[lane] = grid_step(par, options) / cells_of(options.steps_per_rev)
-    leave_for(lane, 1, options, control, motion, past)
+    start_cell(lane, 1, options, control, motion, past)
 
 
 @njit
-def leave_for(lane, c, options, control, motion, past):
+def start_cell(lane, c, options, control, motion, past):
     """Set up cell `c` in a lane that is at the end of the previous cell."""
     own, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
     for i in range(N_DOF):
@@ -254,20 +262,20 @@ def leave_for(lane, c, options, control, motion, past):
     again = next_level(turns.revolution - turns.since, own, before)
     control.level[lane] = again if turns.beside == 0 else int(own.level)
     control.began[lane] = control.level[lane]
-    divide(lane, options, control, past)
+    start_parts(lane, options, control, past)
 
 
 @njit
-def divide(lane, options, control, past):
+def start_parts(lane, options, control, past):
     """Set up the first part of a cell."""
     control.done[lane] = control.part[lane] = 0
     control.worst[lane] = 0.0
     clear_extremes(past.extremes[0])
-    head(lane, 0, options, control)
+    set_stage(lane, 0, options, control)
 
 
 @njit
-def head(lane, stage, options, control):
+def set_stage(lane, stage, options, control):
     """Set up a stage of the current part of a cell."""
     grid, whole = control.grid[lane], 1 << options.max_halvings
     h = grid / (1 << control.level[lane])
@@ -277,17 +285,17 @@ def head(lane, stage, options, control):
 
 
 @njit
-def refuse(lane, options, control, motion, past):
+def reject_cell(lane, options, control, motion, past):
     """Reject a cell and set it up again with parts half as long; return the status."""
     control.halvings[lane] += 1
     control.level[lane] += 1
-    control.factorised[lane] = control.passed[lane] = motion.memory[STAGED, lane] = 0.0
+    control.factorised[lane] = control.passed[lane] = motion.memory[STAGED_STEP, lane] = 0.0
     if control.level[lane] > options.max_halvings:
         return NEWTON_FAILED
     for i in range(N_DOF):
         motion.q0[i, lane], motion.v0[i, lane] = past.begun[0, i], past.begun[1, i]
         motion.a0[i, lane] = past.begun[2, i]
-    divide(lane, options, control, past)
+    start_parts(lane, options, control, past)
     return NOT_SETTLED
 
 
@@ -295,29 +303,29 @@ def refuse(lane, options, control, motion, past):
 def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
     """Evaluate a solved stage of a part and set up the next one; return the status and whether the joint continues."""
     if control.stage[lane] == 0:
-        head(lane, 1, options, control)
+        set_stage(lane, 1, options, control)
         return NOT_SETTLED, True
     controlled, whole = past.turns.beside == 0, 1 << options.max_halvings
     if controlled:
         control.worst[lane] = max(control.worst[lane], control.error[lane])
         if not control.error[lane] <= 1:
-            status = refuse(lane, options, control, motion, past)
+            status = reject_cell(lane, options, control, motion, past)
             return status, status == NOT_SETTLED
         record(control.part[lane], lane, True, lanes[0], lanes[1], lanes[2].v, fine)
         count_in(control.part[lane], fine, past.extremes[0])
     control.steps[lane] += 1
     control.done[lane] += whole >> control.level[lane]
     control.part[lane] += 1
-    motion.memory[STAGED, lane] = control.h[lane]
+    motion.memory[STAGED_STEP, lane] = control.h[lane]
     if control.done[lane] < whole:
         control.passed[lane] = 1.0
-        head(lane, 0, options, control)
+        set_stage(lane, 0, options, control)
         return NOT_SETTLED, True
-    return arrive(lane, par, lanes, options, control, motion, samples, past, out)
+    return finish_cell(lane, par, lanes, options, control, motion, samples, past, out)
 
 
 @njit
-def arrive(lane, par, lanes, options, control, motion, samples, past, out):
+def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
     """Complete a cell, record the grid point at its end if there is one, and continue; return values as of `part`."""
     c, turns, status, goes_on = control.k[lane], past.turns, NOT_SETTLED, True
     for i in range(N_DOF):
@@ -331,13 +339,13 @@ def arrive(lane, par, lanes, options, control, motion, samples, past, out):
         if c % cells == 0:
             k = c // cells
             record(k, lane, True, lanes[0], lanes[1], lanes[2].v, samples)
-            foresee(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
+            predict_increment(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
     if c % past.mesh.size == 0:
         point = motion.q0[:, lane], motion.v0[:, lane], motion.a0[:, lane]
         memory, weight, spent = motion.memory[:, lane], motion.weight[:, lane], int(control.iterations[lane])
-        status, goes_on = revolved(point, memory, weight, spent, par, options, samples, past, out)
+        status, goes_on = after_revolution(point, memory, weight, spent, par, options, samples, past, out)
         if turns.beside == 1:
             c -= past.mesh.size
     if goes_on:
-        leave_for(lane, c + 1, options, control, motion, past)
+        start_cell(lane, c + 1, options, control, motion, past)
     return status, goes_on

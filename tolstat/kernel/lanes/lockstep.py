@@ -20,27 +20,27 @@ from tolstat.kernel.lanes.batch import (
     put_joint,
     put_points,
     put_start,
-    rest,
+    start_newton,
 )
 from tolstat.kernel.lanes.course import (
     GIVEN_UP,
     advance,
-    aim,
-    depart,
-    find,
-    glance,
+    fall_back,
+    finish_angle,
+    finish_closeup_part,
+    next_phase,
     part,
-    refuse,
-    retry,
-    set_out,
+    reject_cell,
+    set_substep,
+    start_cells,
+    start_motion,
     step,
-    turn,
 )
 from tolstat.kernel.lanes.lane_memory import as_lanes
-from tolstat.kernel.lanes.rounds import begin, correct, renew, verdict
+from tolstat.kernel.lanes.rounds import begin, classify_lanes, correct, refactorise
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
 from tolstat.kernel.revolution.closeup import on_a_peak, switches
-from tolstat.kernel.revolution.equilibrium import HELD
+from tolstat.kernel.revolution.equilibrium import CV_STATIC
 from tolstat.kernel.revolution.quasistatic import angle_time, speed_ratios
 from tolstat.kernel.revolution.resolve import Past, follows_error
 from tolstat.kernel.revolution.settle import grid_step, summarise
@@ -54,8 +54,6 @@ from tolstat.kernel.revolution.simulate import (
     acceleration,
     clear,
     clear_results,
-    conclude,
-    describe,
     finish,
     inside_model,
     is_finite,
@@ -63,9 +61,11 @@ from tolstat.kernel.revolution.simulate import (
     residual,
     rigid_guess,
     simulate_joint,
+    write_counters,
+    write_diagnostics,
 )
 from tolstat.kernel.revolution.trail import Trail
-from tolstat.kernel.simd.borrow import borrowed
+from tolstat.kernel.simd.borrow import without_refcount
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import WIDTH, any_of, bits_of, count_of, where
 
@@ -81,7 +81,7 @@ def samples_of(lane, batch, samples):
 
 
 @njit
-def leave(lane, status, rows, options, alone, batch, samples, results):
+def finish_joint(lane, status, rows, options, alone, batch, samples, results):
     """Continue a lane whose joint has ended, or whose step of a closer look has: next closer look, or results.
 
     A joint that has not settled gets no closer look. A joint in which a step has failed is simulated again, alone; a
@@ -102,14 +102,14 @@ def leave(lane, status, rows, options, alone, batch, samples, results):
         good = is_finite(out)
         if good:
             status = OK if status == OK else NOT_SETTLED
-            conclude(status, par, options, batch.notes[lane], own, out)
+            write_diagnostics(status, par, options, batch.notes[lane], own, out)
         control.left[lane] = control.looked[lane] = 0
     if good:
         closer = status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1
-        if closer and look(lane, k, par, options, alone, batch, own, out):
+        if closer and next_closeup_step(lane, k, par, options, alone, batch, own, out):
             return
         get_counters(lane, batch, state.counters)
-        describe(status, options, state.counters, batch.pasts.mesh[lane], out)
+        write_counters(status, options, state.counters, batch.pasts.mesh[lane], out)
     else:
         simulate_joint(par, options, alone, out)
         for s in range(own.size):
@@ -118,7 +118,7 @@ def leave(lane, status, rows, options, alone, batch, samples, results):
 
 
 @njit
-def end(lane, status, options, alone, batch, blocks, results):
+def finish_adaptive_joint(lane, status, options, alone, batch, blocks, results):
     """Write the results of a joint with error-controlled steps that has ended, and empty its lane.
 
     `status` is that of the joint; for the other arguments see `lockstep`.
@@ -135,7 +135,7 @@ def end(lane, status, options, alone, batch, blocks, results):
 
 
 @njit
-def look(lane, k, par, options, alone, batch, samples, out):
+def next_closeup_step(lane, k, par, options, alone, batch, samples, out):
     """Set up the next step that `closeup.look_closer` would integrate again; return whether there is one.
 
     Parameters
@@ -163,14 +163,14 @@ def look(lane, k, par, options, alone, batch, samples, out):
             control.phase[lane], control.k[lane], control.part[lane] = LOOK, k, 0
             control.origin[lane], control.grid[lane] = (n + k - 1) * h, h / options.peak_substeps
             control.done[lane] = control.level[lane] = 0
-            aim(lane, options, control, batch.motion)
+            set_substep(lane, options, control, batch.motion)
             return True
         k += 1
     return False
 
 
 @njit
-def enter(lane, joint, rows, words, options, alone, batch, samples, results):
+def load_joint(lane, joint, rows, words, options, alone, batch, samples, results):
     """Put a joint into a lane and set up its start: equilibrium from the pose where all pins just touch, or ramp.
 
     A joint outside the model ends at once. For the arguments see `lockstep`.
@@ -181,7 +181,7 @@ def enter(lane, joint, rows, words, options, alone, batch, samples, results):
     control.joint[lane], control.phase[lane] = joint, HOLD
     put_joint(lane, words[joint], batch)
     if not inside_model(par):
-        leave(lane, NEWTON_FAILED, rows, options, alone, batch, samples, results)
+        finish_joint(lane, NEWTON_FAILED, rows, options, alone, batch, samples, results)
         return
     clear(par, state, samples_of(lane, batch, samples), batch.notes[lane])
     control.origin[lane], control.grid[lane] = 0.0, grid_step(par, options)
@@ -189,16 +189,16 @@ def enter(lane, joint, rows, words, options, alone, batch, samples, results):
     if options.fidelity == DYNAMIC and options.start == RAMP:
         acceleration(0.0, state.q0, state.v0, par, options, work, state.a0)
         put_start(lane, state, control, motion)
-        depart(lane, par, options, control, motion)
+        start_motion(lane, par, options, control, motion)
         if control.phase[lane] == PART:
             all_past = batch.pasts
             trail = Trail(all_past.modulus[lane], all_past.revolution[lane], all_past.notes[lane])
             past = Past(trail, all_past.turns[lane], all_past.extremes[lane], all_past.begun[lane], all_past.mesh[lane])
-            set_out(lane, par, options, control, motion, past)
+            start_cells(lane, par, options, control, motion, past)
     else:
         rigid_guess(control.t[lane], par, work, state)
         put_start(lane, state, control, motion)
-        rest(lane, HELD, 0.0, control, motion)
+        start_newton(lane, CV_STATIC, 0.0, control, motion)
 
 
 @njit
@@ -208,7 +208,7 @@ def fill(lane, queued, rows, words, options, alone, batch, samples, results):
     `queued` is the number that had left it before; for the other arguments see `lockstep`.
     """
     while queued < len(rows) and batch.control.live[lane] == 0:
-        enter(lane, queued, rows, words, options, alone, batch, samples, results)
+        load_joint(lane, queued, rows, words, options, alone, batch, samples, results)
         queued += 1
     return queued
 
@@ -241,9 +241,14 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
     tally : ndarray of int, shape (3,)
         Counters, increased: rounds; lanes with a joint, summed over rounds; rounds with new tangents.
     """
-    rows, words, samples, results = borrowed(rows), borrowed(words), borrowed(samples), borrowed(results)
-    blocks = borrowed(blocks)
-    alone, batch = borrowed(alone), borrowed(batch)
+    rows, words, samples, results = (
+        without_refcount(rows),
+        without_refcount(words),
+        without_refcount(samples),
+        without_refcount(results),
+    )
+    blocks = without_refcount(blocks)
+    alone, batch = without_refcount(alone), without_refcount(batch)
     par, work, kept = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.kept)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
     lanes, own, at = (par, work, motion), batch.motion, batch.control
@@ -257,12 +262,12 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
         if any_of(control.fresh > 0):
             begin(options, motion, control)
         residual(control.t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
-        solved, failed, stale, moving, last, now = verdict(options, motion, control)
+        solved, failed, stale, moving, last, now = classify_lanes(options, motion, control)
         tally[0] += 1
         tally[1] += count_of(control.live > 0)
         waiting = count_of(stale)
         if waiting >= patience or (waiting > 0 and not any_of(solved | failed | moving)):
-            good = renew(stale, control, par, work, kept)
+            good = refactorise(stale, control, par, work, kept)
             tally[2] += 1
             control.before = where(stale, now, control.before)
             failed, moving = failed | (stale & ~good), moving | (stale & good)
@@ -281,28 +286,30 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1 == 0:
                 if phase == PART:
-                    status = refuse(lane, options, at, own, past)
+                    status = reject_cell(lane, options, at, own, past)
                     goes_on = status == NOT_SETTLED
                 else:
-                    status = retry(lane, rows[joint], options, at, own)
+                    status = fall_back(lane, rows[joint], options, at, own)
             elif phase == PART:
                 fine, out = batch.fine[lane], results[joint]
                 status, goes_on = part(lane, rows[joint], lanes, options, at, own, here, fine, past, out)
             elif phase == ANGLE:
-                status = turn(lane, rows[joint], lanes, options, at, own, here, results[joint])
+                status = finish_angle(lane, rows[joint], lanes, options, at, own, here, results[joint])
             elif phase < STEP:
-                find(lane, rows[joint], options, at, own)
+                next_phase(lane, rows[joint], options, at, own)
             elif advance(lane, options, at, own):
                 if phase == STEP:
                     status = step(lane, lanes, options, at, own, here, batch.notes[lane], results[joint])
                 else:
-                    status = glance(lane, rows[joint], lanes, options, at, own, batch.fine[lane], results[joint])
+                    status = finish_closeup_part(
+                        lane, rows[joint], lanes, options, at, own, batch.fine[lane], results[joint]
+                    )
             if at.phase[lane] == PART and at.k[lane] == 0:
-                set_out(lane, rows[joint], options, at, own, past)
+                start_cells(lane, rows[joint], options, at, own, past)
             if not goes_on:
-                end(lane, status, options, alone, batch, blocks, results)
+                finish_adaptive_joint(lane, status, options, alone, batch, blocks, results)
             elif status != NOT_SETTLED:
-                leave(lane, status, rows, options, alone, batch, samples, results)
+                finish_joint(lane, status, rows, options, alone, batch, samples, results)
             else:
                 continue
             queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)

@@ -6,10 +6,10 @@ lanes that begin a step, stage or angle, and lanes whose trial point is accepted
 
 from tolstat.kernel.integrators import bdf2, trbdf2
 from tolstat.kernel.integrators.integrate import ROUNDOFF, SLOW, scaled_size
-from tolstat.kernel.integrators.state import AHEAD, CLOSE, H_OLD, STAGED
+from tolstat.kernel.integrators.state import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP
 from tolstat.kernel.lanes.batch import CHECK
 from tolstat.kernel.mechanics.topology import N_DOF
-from tolstat.kernel.revolution.equilibrium import CA_REGULAR, CV_REGULAR, ENOUGH, FAR, HELD
+from tolstat.kernel.revolution.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, ENOUGH, FAR
 from tolstat.kernel.revolution.quasistatic import extrapolate, keep
 from tolstat.kernel.revolution.resolve import follows_error
 from tolstat.kernel.revolution.simulate import QUASISTATIC, assemble, eliminate, solve
@@ -43,7 +43,7 @@ def begin_steps(begins, passed, motion, control):
 @njit
 def begin_parts(begins, passed, motion, control):
     """Accept the last part where it passed; predict the trial point of a stage where one begins (TR-BDF2)."""
-    of, later = first_and_second(control.h, motion.memory[STAGED]), control.stage > 0
+    of, later = first_and_second(control.h, motion.memory[STAGED_STEP]), control.stage > 0
     held = begins & later
     for i in range(N_DOF):
         q, v, a = motion.q[i], motion.v[i], motion.a[i]
@@ -65,7 +65,7 @@ def begin_angles(begins, passed, motion, control):
     extrapolate(begins, control.steps, motion)
     for i in range(N_DOF):
         motion.v[i], motion.a[i] = where(begins, 0.0, motion.v[i]), where(begins, 0.0, motion.a[i])
-    control.cv, control.ca = where(begins, HELD, control.cv), where(begins, 0.0, control.ca)
+    control.cv, control.ca = where(begins, CV_STATIC, control.cv), where(begins, 0.0, control.ca)
 
 
 @njit
@@ -84,7 +84,7 @@ def begin(options, motion, control):
 
 
 @njit
-def verdict(options, motion, control):
+def classify_lanes(options, motion, control):
     """Classify the lanes by their residuals.
 
     Returns
@@ -106,7 +106,7 @@ def verdict(options, motion, control):
     stale = going & ((control.factorised != control.cv) | slow)
     control.before = where(going & ~stale, now, control.before)
     moving = going & ~stale
-    return solved, failed, stale, moving, moving & (now <= motion.memory[CLOSE]), now
+    return solved, failed, stale, moving, moving & (now <= motion.memory[LAST_ITERATION_BELOW]), now
 
 
 @njit
@@ -127,9 +127,9 @@ def keep_rows(mask, new, old):
 
 
 @njit
-def renew(mask, control, par, work, kept):
+def refactorise(mask, control, par, work, kept):
     """Compute new tangents in the lanes of the mask; return where, of all lanes, the factorisation succeeded."""
-    held = control.cv == HELD
+    held = control.cv == CV_STATIC
     assemble(where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca), par, work)
     good = eliminate(work)
     keep_blocks(mask, work.lump_block, kept.lump_block)
@@ -160,7 +160,7 @@ def correct(mask, kept, motion, control):
         motion.v[i] = retain(mask, motion.v[i] + control.cv * change, motion.v[i])
         motion.a[i] = retain(mask, motion.a[i] + control.ca * change, motion.a[i])
         step, largest = max(step, abs(change)), max(largest, abs(motion.q[i]))
-    lost = mask & (control.cv == HELD) & (largest > FAR)
+    lost = mask & (control.cv == CV_STATIC) & (largest > FAR)
     control.at_roundoff = where(mask & (step <= ROUNDOFF * largest), 1.0, 0.0)
     control.iteration = where(mask, control.iteration + 1, control.iteration)
     control.iterations = where(mask, control.iterations + 1, control.iterations)

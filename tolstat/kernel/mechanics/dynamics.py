@@ -30,7 +30,7 @@ def mass_of(body, par):
 
 
 @njit
-def place(q, v, par, work):
+def set_bodies(q, v, par, work):
     """Write position, attitude and velocity of every body relative to its ideal frame to `work`; `q`, `v`: (55,)."""
     for body in range(N_LUMPS):
         i = 6 * body
@@ -57,7 +57,7 @@ def place_shaft(body, angle, rate, work):
 def forces(t, q, v, par, work):
     """Evaluate all bushings and contacts at one state; write ``work.force`` and loads; arguments as in `residual`."""
     ideal_motion(par.omega * t, par.alpha, par.omega, work)
-    place(q, v, par, work)
+    set_bodies(q, v, par, work)
     for body in range(N_BODIES):
         for k in range(6):
             work.force[body, k] = 0.0

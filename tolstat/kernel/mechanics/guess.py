@@ -8,7 +8,7 @@ displacements that a rigid cross cannot remove, of the same size for all pins. R
 import math
 
 from tolstat.kernel.mechanics.contact import locate
-from tolstat.kernel.mechanics.dynamics import place
+from tolstat.kernel.mechanics.dynamics import set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, HUB, PIN, PSI, TRIAD
 from tolstat.kernel.mechanics.vector import add, cross, dot, row, scale, turn_back
@@ -37,7 +37,7 @@ def depth(load, k1, k2):
 
 
 @njit
-def need(pin, side, across, par, work):
+def travel_to_contact(pin, side, across, par, work):
     """Displacement along t that brings `pin` into contact, and the radius of the end station that touches first.
 
     Parameters
@@ -75,7 +75,7 @@ def rigid_guess(t, par, work, state):
     q[:] = 0.0
     state.v0[:] = 0.0
     ideal_motion(par.omega * t, par.alpha, par.omega, work)
-    place(q, state.v0, par, work)
+    set_bodies(q, state.v0, par, work)
     for pin in range(4):
         locate(pin, par, work)
     z0, z1, z2, z3 = middle(0, par, work), middle(1, par, work), middle(2, par, work), middle(3, par, work)
@@ -84,11 +84,11 @@ def rigid_guess(t, par, work, state):
     across = 0.25 * abs(z0 + z1 - z2 - z3)
 
     forward = math.copysign(1.0, par.torque)
-    want2, r2 = need(2, -forward, across, par, work)
-    want3, r3 = need(3, -forward, across, par, work)
+    want2, r2 = travel_to_contact(2, -forward, across, par, work)
+    want3, r3 = travel_to_contact(3, -forward, across, par, work)
     turn_in = (want2 + want3) / (r2 + r3)
-    want0, r0 = need(0, forward, across, par, work)
-    want1, r1 = need(1, forward, across, par, work)
+    want0, r0 = travel_to_contact(0, forward, across, par, work)
+    want1, r1 = travel_to_contact(1, forward, across, par, work)
     turn_out = (want0 + want1) / (r0 + r1)
     shift = (r0 * turn_out - want0, want2 - r2 * turn_in, up)
     psi = (turn_in - turn_out) / work.relative[FRAME_F, 2, 2]

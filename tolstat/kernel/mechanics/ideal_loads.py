@@ -16,7 +16,7 @@ import math
 
 from tolstat.common.tables import INNER, OUTER, RESULTANT, Mode
 from tolstat.kernel.mechanics.bushing import accumulate, markers
-from tolstat.kernel.mechanics.dynamics import body_inertia, place
+from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion
 from tolstat.kernel.mechanics.topology import (
     ARM,
@@ -83,7 +83,7 @@ def ideal_loads(theta, par, state, work):
     state.q0[:] = 0.0
     state.v0[:] = 0.0
     ideal_motion(theta, par.alpha, par.omega, work)
-    place(state.q0, state.v0, par, work)
+    set_bodies(state.q0, state.v0, par, work)
     radius = contact_radius(par)
     moment, torque = moving_moments(par, work)
     sin_gamma, cos_gamma = work.relative[FRAME_F, 2, 0], work.relative[FRAME_F, 2, 2]

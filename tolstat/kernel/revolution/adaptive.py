@@ -2,18 +2,18 @@
 
 from tolstat.kernel.integrators import integrate
 from tolstat.kernel.integrators.mesh import cells_of, load_error, next_level, note_cell
-from tolstat.kernel.integrators.state import CV_FACTORISED, HALVINGS, ITERATIONS, STAGED
+from tolstat.kernel.integrators.state import CV_FACTORISED, HALVINGS, ITERATIONS, STAGED_STEP
 from tolstat.kernel.revolution.closeup import count_in
 from tolstat.kernel.revolution.resolve import (
     NEWTON_FAILED,
     NOT_SETTLED,
+    after_revolution,
     begin_turns,
     clear_extremes,
     merge_extremes,
-    revolved,
 )
-from tolstat.kernel.revolution.settle import foresee, grid_step, record
-from tolstat.kernel.simd.jit import closure
+from tolstat.kernel.revolution.settle import grid_step, predict_increment, record
+from tolstat.kernel.simd.jit import njit_inner
 
 predict, accept, stages = integrate.predict, integrate.accept, integrate.stages
 REFUSED = 1e300
@@ -37,7 +37,7 @@ def build_resolve(newton, begin):
         ``out.failed_step`` if a step failed.
     """
 
-    @closure
+    @njit_inner
     def parts(origin, length, level, controlled, par, options, work, state, fine, extremes):
         """Integrate a cell in 2^level parts; return the error of the worst part, above 1 if a part was rejected.
 
@@ -75,7 +75,7 @@ def build_resolve(newton, begin):
             j += 1
         return worst
 
-    @closure
+    @njit_inner
     def cell(c, length, par, options, work, state, ring, past):
         """Integrate cell `c` (from 1), in smaller parts until accepted; return False if the smallest parts failed.
 
@@ -95,7 +95,7 @@ def build_resolve(newton, begin):
                 break
             level += 1
             state.counters[HALVINGS] += 1
-            state.memory[CV_FACTORISED] = state.memory[STAGED] = 0.0
+            state.memory[CV_FACTORISED] = state.memory[STAGED_STEP] = 0.0
             if level > options.max_halvings:
                 return False
             for i in range(state.q0.size):
@@ -105,7 +105,7 @@ def build_resolve(newton, begin):
             merge_extremes(past.extremes[0], past.extremes[1])
         return True
 
-    @closure
+    @njit_inner
     def resolve(par, options, work, state, ring, past, out):
         begin(par, options, work, state)
         begin_turns(par, options, state.memory, state.weight, past)
@@ -122,11 +122,11 @@ def build_resolve(newton, begin):
                 return NEWTON_FAILED
             if c % cells == 0 and past.turns.beside == 0:
                 record(k, 0, True, par, work, state.v0, ring.samples)
-                foresee(k, state.q0, state.v0, state.ahead, ring.samples)
+                predict_increment(k, state.q0, state.v0, state.ahead, ring.samples)
             if c % past.mesh.size == 0:
                 point, spent = (state.q0, state.v0, state.a0), state.counters[ITERATIONS]
                 memory, weight = state.memory, state.weight
-                status, goes_on = revolved(point, memory, weight, spent, par, options, ring.samples, past, out)
+                status, goes_on = after_revolution(point, memory, weight, spent, par, options, ring.samples, past, out)
                 if past.turns.beside == 1:
                     c -= past.mesh.size
         return status

@@ -12,7 +12,7 @@ from tolstat.common.tables import CONTACTS
 from tolstat.kernel.integrators.integrate import UNLIMITED
 from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD
 from tolstat.kernel.revolution.settle import peak, record
-from tolstat.kernel.simd.jit import closure, njit
+from tolstat.kernel.simd.jit import njit, njit_inner
 
 NEAR = 0.005
 """Distance of a load from its largest value, in units of the largest of its kind, that ringing may bridge."""
@@ -107,7 +107,7 @@ def build_closeup(advance, acceleration):
         ``state.counters``.
     """
 
-    @closure
+    @njit_inner
     def recall(s, h, par, options, work, state, samples):
         here, before = samples[s], samples[s - 1]
         for i in range(state.q0.size):
@@ -119,7 +119,7 @@ def build_closeup(advance, acceleration):
         state.memory[:] = 0.0
         state.memory[H_OLD], state.counters[ATTEMPTS_LEFT] = h, UNLIMITED
 
-    @closure
+    @njit_inner
     def look_closer(par, options, work, state, samples, fine, out):
         n = samples.size
         h = 2 * math.pi / (abs(par.omega) * n)

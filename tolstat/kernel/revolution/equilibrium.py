@@ -10,9 +10,9 @@ bounded, and the simulation continues from the last iterate.
 from tolstat.kernel.integrators.integrate import LOST, at_rounding
 from tolstat.kernel.integrators.state import CV_FACTORISED
 from tolstat.kernel.mechanics.vector import copy
-from tolstat.kernel.simd.jit import closure, njit
+from tolstat.kernel.simd.jit import njit, njit_inner
 
-HELD = 1e-200
+CV_STATIC = 1e-200
 """cv = dv/dq of an equilibrium: so small that rate terms vanish, but not zero, which would mean that no tangent is
 stored."""
 CV_REGULAR, CA_REGULAR = 10.0, 100.0
@@ -64,13 +64,13 @@ def build_equilibrium(residual, newton, static_newton, size, guess):
         `hold` from the guess, else by `relax` from the guess, else by `relax` from zero.
     """
 
-    @closure
+    @njit_inner
     def hold(t, par, options, work, state):
         state.v[:] = 0.0
         state.a[:] = 0.0
-        return static_newton(t, HELD, 0.0, par, options, work, state)
+        return static_newton(t, CV_STATIC, 0.0, par, options, work, state)
 
-    @closure
+    @njit_inner
     def relax(t, par, options, work, state):
         state.v0[:] = 0.0
         state.a0[:] = 0.0
@@ -92,7 +92,7 @@ def build_equilibrium(residual, newton, static_newton, size, guess):
         state.memory[CV_FACTORISED] = 0.0
         return False
 
-    @closure
+    @njit_inner
     def equilibrium(t, par, options, work, state):
         guess(t, par, work, state)
         copy(state.q0, state.q)

@@ -14,7 +14,7 @@ from tolstat.kernel.integrators.state import AHEAD, HALVINGS, STEPS
 from tolstat.kernel.mechanics.motion import speed_ratio
 from tolstat.kernel.mechanics.topology import PSI
 from tolstat.kernel.mechanics.vector import larger
-from tolstat.kernel.simd.jit import closure, njit
+from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.kernel.simd.lane import where
 
 
@@ -49,7 +49,7 @@ def extrapolate(begins, known, state):
 
 
 @njit
-def stay(state):
+def repeat_last(state):
     """Set the trial point to the solution at the previous angle."""
     for i in range(state.q.size):
         state.q[i] = state.q0[i]
@@ -121,7 +121,7 @@ def build_quasistatic(hold, relax, record):
         angle. `first`: whether it is the first revolution.
     """
 
-    @closure
+    @njit_inner
     def revolution(first, par, options, work, state, ring):
         n = ring.samples.size
         for k in range(0 if first else 1, n + 1):
@@ -129,10 +129,10 @@ def build_quasistatic(hold, relax, record):
             extrapolate(True, state.counters[STEPS], state)
             if not hold(t, par, options, work, state):
                 state.counters[HALVINGS] += 1
-                stay(state)
+                repeat_last(state)
                 if not hold(t, par, options, work, state):
                     relax(t, par, options, work, state)
-                    stay(state)
+                    repeat_last(state)
                     if not hold(t, par, options, work, state):
                         return False
             keep(True, state)

@@ -15,7 +15,7 @@ import numpy as np
 
 from tolstat.common.tables import CONTACTS, RESULT, Fidelity, Method, Motion, Options, Status
 from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
-from tolstat.kernel.integrators.state import STAGED, TOLERANCE
+from tolstat.kernel.integrators.state import STAGED_STEP, TOLERANCE
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
 from tolstat.kernel.mechanics.vector import copy
@@ -47,7 +47,7 @@ SETTLING = 16
 """Minimum number of revolutions with a tighter tolerance before a joint is given up."""
 LONGEST_PERIOD = 8
 """Longest period that is recognised, revolutions."""
-FALLS, CLEARLY, BARELY = 0.1, 10.0, 4.0
+MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.1, 10.0, 4.0
 """Minimum fall of log10(closure) over the revolutions kept that counts as settling. It must also exceed its scatter by
 the second factor (closure errors of chaotic joints wander, and fell by four to five times their scatter in some), or by
 the third if the Lyapunov exponent is not positive."""
@@ -130,7 +130,7 @@ def follows_error(options):
 
 
 @njit
-def wanted(options, turns):
+def closure_target(options, turns):
     """Closure error at which a joint is finished with the tolerance in use: it ends or the tolerance is tightened."""
     return options.settle_tol if turns.tightened > 0 else max(NEARLY, options.settle_tol)
 
@@ -143,7 +143,7 @@ def begin_turns(par, options, memory, weight, past):
     turns.limit, turns.growth = options.max_revs, 0.0
     memory[TOLERANCE] = options.rtol
     force = typical_force(par)
-    set_scale(force, force * par.R, wanted(options, turns), options, par, memory, weight)
+    set_scale(force, force * par.R, closure_target(options, turns), options, par, memory, weight)
     forget_mesh(past.mesh)
     past.trail.notes.count = 0
     clear_extremes(past.extremes[1])
@@ -270,8 +270,8 @@ def conclude_watch(options, trail, turns, out):
     fall = -slope * kept
     growth = turns.growth / (BESIDE - ALIGNING)
     out.lyapunov = growth
-    slow = fall > max(FALLS, CLEARLY * scatter) or growth < -EXPONENT
-    if slow or (growth < EXPONENT and fall > max(FALLS, BARELY * scatter)):
+    slow = fall > max(MIN_FALL, FALL_ALONE * scatter) or growth < -EXPONENT
+    if slow or (growth < EXPONENT and fall > max(MIN_FALL, FALL_WITH_EXPONENT * scatter)):
         out.motion = SLOW
         return NOT_SETTLED
     out.motion = CHAOTIC if growth > EXPONENT else QUASI_PERIODIC
@@ -279,7 +279,7 @@ def conclude_watch(options, trail, turns, out):
 
 
 @njit
-def lever(i, R):
+def radius_of(i, R):
     """Radius (m) that makes unknown `i` a displacement: 1 if it is one."""
     return 1.0 if i < 6 * N_LUMPS and i % 6 < 3 else R
 
@@ -290,7 +290,7 @@ def set_beside(q, v, a, R, turns):
     turns.growth = 0.0
     share = APART / math.sqrt(N_DOF)
     for i in range(N_DOF):
-        turns.other[0, i] = q[i] + (share if i % 2 == 0 else -share) / lever(i, R)
+        turns.other[0, i] = q[i] + (share if i % 2 == 0 else -share) / radius_of(i, R)
         turns.other[1, i], turns.other[2, i] = v[i], a[i]
 
 
@@ -305,7 +305,7 @@ def swap(q, v, a, turns):
 
 
 @njit
-def draw_near(q, v, a, h, R, turns):
+def rescale_neighbour(q, v, a, h, R, turns):
     """Scale the neighbour's difference back to `APART`; return the logarithm of its growth.
 
     Velocities are weighted by `h`, the step of the output grid, s.
@@ -313,7 +313,7 @@ def draw_near(q, v, a, h, R, turns):
     square = 0.0
     for i in range(N_DOF):
         dq, dv = turns.other[0, i] - q[i], h * (turns.other[1, i] - v[i])
-        square += lever(i, R) ** 2 * (dq * dq + dv * dv)
+        square += radius_of(i, R) ** 2 * (dq * dq + dv * dv)
     factor = APART / max(math.sqrt(square), 1e-6 * APART)
     for i in range(N_DOF):
         turns.other[0, i] = q[i] + factor * (turns.other[0, i] - q[i])
@@ -326,13 +326,13 @@ def draw_near(q, v, a, h, R, turns):
 def neighbour_done(q, v, a, par, options, turns):
     """Restore the joint after a revolution of its neighbour, and add the growth."""
     swap(q, v, a, turns)
-    growth = draw_near(q, v, a, 2 * math.pi / (abs(par.omega) * options.steps_per_rev), par.R, turns)
+    growth = rescale_neighbour(q, v, a, 2 * math.pi / (abs(par.omega) * options.steps_per_rev), par.R, turns)
     if turns.revolution > turns.limit - BESIDE + ALIGNING:
         turns.growth += growth
 
 
 @njit
-def revolved(point, memory, weight, iterations, par, options, samples, past, out):
+def after_revolution(point, memory, weight, iterations, par, options, samples, past, out):
     """Decide how a joint continues after a revolution.
 
     Parameters
@@ -361,7 +361,7 @@ def revolved(point, memory, weight, iterations, par, options, samples, past, out
     """
     q, v, a = point
     trail, turns = past.trail, past.turns
-    memory[STAGED] = 0.0  # the stage may belong to the other motion
+    memory[STAGED_STEP] = 0.0  # the stage may belong to the other motion
     if turns.beside == 1:
         neighbour_done(q, v, a, par, options, turns)
         if turns.revolution == turns.limit:
@@ -384,7 +384,7 @@ def revolved(point, memory, weight, iterations, par, options, samples, past, out
             return (OK if out.period == 1 else NOT_PERIODIC), False
     elif turns.period == 1 and turns.tightened < options.max_refinements and largest_change(turns.before, own) > FAR:
         tighten(1, options, memory, past.mesh, turns, own)
-    set_scale(force, torque, wanted(options, turns), options, par, memory, weight)
+    set_scale(force, torque, closure_target(options, turns), options, par, memory, weight)
     if turns.limit > BESIDE and turns.revolution >= turns.limit - BESIDE:
         if turns.revolution == turns.limit - BESIDE:
             set_beside(q, v, a, par.R, turns)

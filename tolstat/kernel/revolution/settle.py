@@ -122,7 +122,7 @@ def record(k, lane, in_full, par, work, v, samples):
 
 
 @njit
-def foresee(k, q, v, ahead, samples):
+def predict_increment(k, q, v, ahead, samples):
     """Store the motion at grid point `k`; predict the increment of the next step by that of one revolution earlier.
 
     Parameters

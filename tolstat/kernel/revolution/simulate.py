@@ -23,9 +23,9 @@ from tolstat.kernel.revolution.resolve import Past, follows_error, make_past
 from tolstat.kernel.revolution.settle import (
     Ring,
     closure_error,
-    foresee,
     grid_step,
     make_ring,
+    predict_increment,
     record,
     step_error,
     summarise,
@@ -178,7 +178,7 @@ resolve = build_resolve(newton, begin)
 
 
 @njit
-def judge(k, iterations, options, samples, notes, out):
+def check_settled(k, iterations, options, samples, notes, out):
     """Check closure error and work at grid point `k`; return `NOT_SETTLED` while the joint is to continue.
 
     Parameters
@@ -214,8 +214,8 @@ def run_dynamic(par, options, work, state, ring, out):
             out.failed_step = k
             return NEWTON_FAILED
         record(k, 0, k > n or options.max_revs == 1, par, work, state.v0, ring.samples)
-        state.memory[AHEAD] = foresee(k, state.q0, state.v0, state.ahead, ring.samples)
-        status = judge(k, state.counters[ITERATIONS], options, ring.samples, ring.notes, out)
+        state.memory[AHEAD] = predict_increment(k, state.q0, state.v0, state.ahead, ring.samples)
+        status = check_settled(k, state.counters[ITERATIONS], options, ring.samples, ring.notes, out)
         if status == NEWTON_FAILED:
             out.failed_step = k
         if status != NOT_SETTLED:
@@ -233,7 +233,7 @@ def is_finite(out):
 
 
 @njit
-def describe(status, options, counters, mesh, out):
+def write_counters(status, options, counters, mesh, out):
     """Write status, step numbers and counters of a joint that has ended."""
     out.status = status
     out.settled = status == OK
@@ -253,11 +253,11 @@ def finish(status, failed, options, counters, mesh, out):
         if failed > 0:
             out.failed_step = failed
             out.failed_theta = 2 * math.pi * ((failed - 1) % options.steps_per_rev) / options.steps_per_rev
-    describe(status, options, counters, mesh, out)
+    write_counters(status, options, counters, mesh, out)
 
 
 @njit
-def conclude(status, par, options, notes, samples, out):
+def write_diagnostics(status, par, options, notes, samples, out):
     """Write step error, closure trend and class of motion, unless steps are error-controlled.
 
     The closure trend of a joint that has not settled is fitted over the second half of ``max_revs``.
@@ -296,7 +296,7 @@ def simulate_joint(par, options, alone, out):
         if not is_finite(out):
             status, failed = NOT_FINITE, state.counters[STEPS]
     if status in (OK, NOT_SETTLED) and not controlled:
-        conclude(status, par, options, ring.notes, ring.samples, out)
+        write_diagnostics(status, par, options, ring.notes, ring.samples, out)
         if status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1:
             look_closer(par, options, work, state, ring.samples, ring.fine, out)
     finish(status, failed, options, state.counters, past.mesh, out)

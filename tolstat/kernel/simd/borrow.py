@@ -24,7 +24,7 @@ def _borrow(context, builder, ty, value):
 
 
 @intrinsic
-def borrowed(typingctx, value):
+def without_refcount(typingctx, value):
     """Array, or tuple with arrays in it, without an owner; the caller must keep the memory alive meanwhile."""
 
     def codegen(context, builder, sig, args):

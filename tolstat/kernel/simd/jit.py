@@ -81,7 +81,7 @@ def njit(function: Callable[..., Any]) -> Any:
     # Numba reads both when a function is decorated; functions of other packages keep their own directory
     config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = CACHE_DIRECTORY, f"{__name__}.{Locator.__name__}"
     try:
-        kernel = closure(function)
+        kernel = njit_inner(function)
         if kernel is not function:
             kernel.enable_caching()
         return kernel
@@ -89,12 +89,12 @@ def njit(function: Callable[..., Any]) -> Any:
         config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
 
 
-def closure(function: Callable[..., Any]) -> Any:
+def njit_inner(function: Callable[..., Any]) -> Any:
     """Compile a function made by a factory; it is cached with the entry point that calls it."""
     return function if config.DISABLE_JIT else Kernel(function, targetoptions=OPTIONS)
 
 
-def bare(function: Any, *arguments: Any) -> Any:
+def compiled_entry(function: Any, *arguments: Any) -> Any:
     """Compiled code of a kernel for the types of `arguments`, without Numba's type dispatch at each call.
 
     The dispatch takes longer than a residual of the joint. Arguments of other types must never be passed.

@@ -18,11 +18,10 @@ from tolstat.analysis import allocation, exceedance, reweight
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
 from tolstat.campaign.recall import recall
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.tables import VALID, Status
-from tolstat.store import ResultStore
-from tolstat.store import view as source
+from tolstat.store import ResultStore, view
 from tolstat.study import Study, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
@@ -153,7 +152,7 @@ def of_store(
     statements, free, prices = _asked(store, study, limits, cost_file, keep)
     names = [name for t in free for name in t.names]
     columns = [column for name in names for column in selection.columns_of(name)]
-    campaign = source.read(store, source.LOAD_FIELDS, ())
+    campaign = view.read(store, view.LOAD_FIELDS, ())
     done = np.flatnonzero(campaign.results["status"] != Status.PENDING)
     above = np.column_stack([_above(campaign.results, s) for s in statements])[done]
     chosen, judges = allocation.halves(len(above), MOST)
@@ -161,7 +160,7 @@ def of_store(
         found = f"has {len(above)} joints simulated"
         raise StoreError(str(Fault(str(store.path), found, f"run {8 * reweight.LEAST_ESS} joints or more")))
     price = np.array([cost.reach for cost in prices])
-    ratios = _Ratios(free, source.errors_at(store, columns, done[chosen]))
+    ratios = _Ratios(free, view.errors_at(store, columns, done[chosen]))
     problem = allocation.Problem(
         ratios.at,
         ratios.log_spread,
@@ -177,7 +176,7 @@ def of_store(
     entries = {
         t.pattern: t.scaled(float(f), DIGITS) for t, f in zip(free, choice.factors, strict=True) if abs(f - 1) > 5e-3
     }
-    logs = np.concatenate([_Ratios(free, errors).of(entries) for errors in source.error_blocks(store, columns)])
+    logs = np.concatenate([_Ratios(free, errors).of(entries) for errors in view.error_blocks(store, columns)])
     weights = reweight.smooth(logs[done[judges]])
     table = _judged(statements, above, above[judges], weights, campaign.iid, confidence)
     more = [
@@ -244,7 +243,7 @@ def _asked(
     for text in limits:
         with gather(faults):
             statements.append(rule.parse(text, "", "--limit", EXAMPLE))
-            lacking = [name for name in statements[-1].loads if not kept.holds(store.columns, name)]
+            lacking = [name for name in statements[-1].loads if not selected_results.holds(store.columns, name)]
             if lacking:
                 faults.append(Fault("--limit", f"the file does not keep {', '.join(lacking)}", "ask for what it keeps"))
     every = scaling.tolerances(study)
@@ -270,7 +269,7 @@ def _asked(
 
 def _above(results: NDArray[np.void], said: Statement) -> NDArray[np.bool_]:
     """Which joints are above a limit in any load, or have no valid load."""
-    largest = np.max([source.load(results, name)[0] for name in said.loads], axis=0)
+    largest = np.max([view.load(results, name)[0] for name in said.loads], axis=0)
     valid = np.isin(results["status"], VALID) & np.isfinite(largest)
     return np.asarray(~valid | (largest > said.level))
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tolstat import sampling
 from tolstat.analysis import sensitivity
 from tolstat.analysis.sensitivity import FirstOrder
-from tolstat.common.draw_records import check_counted
+from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import BUSHINGS, Status
@@ -122,7 +122,7 @@ def of_store(
     for name in loads:
         if name not in known:
             raise InputError([Fault(name, "is no load over the shaft angle", did_you_mean(name, known))])
-    check_counted(store.sampling, store.path)
+    check_equal_weights(store.sampling, store.path)
     if store.sampling["method"] not in DRAWN or not study.tolerances:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))

@@ -17,8 +17,7 @@ from tolstat.campaign.recall import recall
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import VALID
-from tolstat.store import ResultStore
-from tolstat.store import view as source
+from tolstat.store import ResultStore, view
 from tolstat.study import Study
 from tolstat.study.selection import LIMIT_UNITS, columns_of
 from tolstat.study.tolerances.distributions import score
@@ -116,14 +115,14 @@ def of_store(
         raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
     if study.groups:
         return _frozen(store, study, by, confidence, log)
-    campaign = source.read(store, source.LOAD_FIELDS, ())
+    campaign = view.read(store, view.LOAD_FIELDS, ())
     columns = [column for name in study.tolerances for column in columns_of(name)]
-    errors = partial(source.errors_at, store, columns)
+    errors = partial(view.errors_at, store, columns)
     return _of_joints(campaign, study, by, confidence, log, str(store.path), errors)
 
 
 def of_campaign(
-    campaign: source.Campaign,
+    campaign: view.Campaign,
     study: Study,
     by: str,
     confidence: float = 0.95,
@@ -145,7 +144,7 @@ def of_campaign(
 
 
 def _of_joints(
-    campaign: source.Campaign,
+    campaign: view.Campaign,
     study: Study,
     by: str,
     confidence: float,
@@ -154,7 +153,7 @@ def _of_joints(
     errors: Callable[[NDArray[np.intp]], NDArray[np.void]],
 ) -> Causes:
     """Causes of a load; `errors` returns the errors of the joints at given indices of the campaign."""
-    values, unit = source.load(campaign.results, by)
+    values, unit = view.load(campaign.results, by)
     status = campaign.results["status"]
     rows = np.flatnonzero(np.isin(status, VALID) & np.isfinite(values))
     needed = max(JOINTS, len(study.tolerances) + 2 * regression.GROUPS)
@@ -192,8 +191,8 @@ def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: b
         raise StoreError(
             str(Fault(str(store.path), "holds a slice of a design", "merge all slices first: tolstat merge"))
         )
-    campaign = source.read(store, source.LOAD_FIELDS, ())
-    values, unit = source.load(campaign.results, by)
+    campaign = view.read(store, view.LOAD_FIELDS, ())
+    values, unit = view.load(campaign.results, by)
     status = campaign.results["status"]
     valid = np.isin(status, VALID) & np.isfinite(values)
     if log and values[valid].min(initial=np.inf) <= 0:

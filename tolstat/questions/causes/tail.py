@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.campaign.recall import recall
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import did_you_mean
@@ -128,7 +128,7 @@ def _values(results: NDArray[np.void], by: str) -> tuple[NDArray[np.float64], st
 def _check_kept(store: ResultStore, by: str) -> None:
     """Raise `InputError` if the study does not keep the load or column."""
     held = [c.name for c in store.columns]
-    loads = [load for load in LIMIT_UNITS if kept.holds(store.columns, load)]
+    loads = [load for load in LIMIT_UNITS if selected_results.holds(store.columns, load)]
     if by not in (*loads, *held):
         found = f"{store.path} does not keep {by}, see [output] results of its study"
         raise InputError([Fault("--by", found, f"give one of: {', '.join([*loads, *held])}")])

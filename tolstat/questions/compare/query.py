@@ -12,12 +12,11 @@ import pandas as pd
 
 from tolstat.analysis import difference
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import VALID, Status
-from tolstat.store import ResultStore
-from tolstat.store import view as source
+from tolstat.store import ResultStore, view
 from tolstat.study.selection import LIMIT_UNITS
 
 SHARES = (0.5, 0.9, 0.99)
@@ -54,8 +53,8 @@ class Sides(NamedTuple):
         Whether joint i of both was drawn with the same random numbers.
     """
 
-    a: source.Campaign
-    b: source.Campaign
+    a: view.Campaign
+    b: view.Campaign
     rows: np.ndarray[tuple[int], np.dtype[np.intp]]
     paired: bool
 
@@ -170,7 +169,7 @@ def _identity(store: ResultStore) -> dict[str, Any]:
 
 
 def _sides(a: ResultStore, b: ResultStore) -> Sides:
-    one, other = (source.read(store, source.LOAD_FIELDS, ()) for store in (a, b))
+    one, other = (view.read(store, view.LOAD_FIELDS, ()) for store in (a, b))
     same = [a.sampling[key] == b.sampling[key] for key in ("method", "seed")]
     same.append(a.sampling["method"] != "sobol" or a.sampling["dimensions"] == b.sampling["dimensions"])
     same.append(a.sampling["method"] != "lhs" or a.sampling["n"] == b.sampling["n"])
@@ -190,19 +189,21 @@ def _sides(a: ResultStore, b: ResultStore) -> Sides:
     return Sides(_cut(one, here[0]), _cut(other, here[1]), rows[here[0]], paired)
 
 
-def _cut(side: source.Campaign, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> source.Campaign:
+def _cut(side: view.Campaign, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> view.Campaign:
     if len(rows) == len(side.results):
         return side  # tables of a million joints are not copied
     return replace(side, errors=side.errors[rows], results=side.results[rows])
 
 
-def _valid(side: source.Campaign, name: str) -> tuple[FloatArray, str]:
-    values, unit = source.load(side.results, name)
+def _valid(side: view.Campaign, name: str) -> tuple[FloatArray, str]:
+    values, unit = view.load(side.results, name)
     return np.where(np.isin(side.results["status"], VALID), values, np.nan), unit
 
 
 def _names(sides: Sides, by: Sequence[str], limited: Sequence[str]) -> list[str]:
-    held = [name for name in LIMIT_UNITS if all(kept.holds(side.columns, name) for side in (sides.a, sides.b))]
+    held = [
+        name for name in LIMIT_UNITS if all(selected_results.holds(side.columns, name) for side in (sides.a, sides.b))
+    ]
     asked = {**dict.fromkeys(by, "--by"), **{name: f"limits.{name}" for name in limited}}
     lacking = {name: place for name, place in asked.items() if name not in held}
     if lacking:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results as kept
+from tolstat.common import selected_results
 from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.display import style
 from tolstat.store.view import Axis, Campaign, load, swept_axes
@@ -44,7 +44,7 @@ def table(campaign: Campaign) -> pd.DataFrame:
     for name in campaign.listed:
         values, unit = load(campaign.results, name)
         columns[name if unit == "1" else f"{name} [{unit}]"] = values
-    if kept.holds(campaign.columns, "psi"):
+    if selected_results.holds(campaign.columns, "psi"):
         columns["psi"] = load(campaign.results, "psi")[0]
     return pd.DataFrame(columns)
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.cycles import Cycles, mix
-from tolstat.common.draw_records import check_counted
+from tolstat.analysis.cycles import Cycles, duty_cycle
+from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import CHANNELS, ERROR_FIELDS, SIMULATED, Status
 from tolstat.solver import rainflow
 from tolstat.store import ResultStore
-from tolstat.store.revolutions import MOST, loads
+from tolstat.store.revolutions import JOINTS_PER_READ, loads
 from tolstat.study.fatigue import Fatigue, of_text
 from tolstat.study.selection import select
 
@@ -142,7 +142,7 @@ def read(
     status = np.zeros(0, np.uint8)
     for path in paths:
         with ResultStore.open(path) as store:
-            check_counted(store.sampling, store.path)
+            check_equal_weights(store.sampling, store.path)
             if store.sampling["method"] in ("cases", "sweep"):
                 remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
                 raise StoreError(str(Fault(str(path), "holds joints that are no sample of a production", remedy)))
@@ -155,7 +155,7 @@ def read(
                 status = np.where(status == Status.OK, own, status)
                 name += f" + {store.study_name}"
             parts.append(cycles(store, names, most))
-    whole = mix(parts, [share / total for share in shares])
+    whole = duty_cycle(parts, [share / total for share in shares])
     skip = int(sampling["nominal_first"])
     has_nominal = skip and status[0] == Status.OK
     nominal = _rows(whole, slice(0, 1 if has_nominal else 0))
@@ -181,8 +181,8 @@ def _counted(store: ResultStore, n: int) -> Iterator[tuple[NDArray[np.intp], dic
     if not held:
         remedy = 'set histories = "cycles" in [output] of the study and run it anew'
         raise StoreError(str(Fault(str(store.path), "holds neither cycles nor load histories", remedy)))
-    for first in range(0, n, MOST):
-        rows = np.arange(first, min(first + MOST, n))
+    for first in range(0, n, JOINTS_PER_READ):
+        rows = np.arange(first, min(first + JOINTS_PER_READ, n))
         if "cycles" in held:
             yield rows, {name: store.histories(name, rows) for name in rainflow.SPECS}
             continue

@@ -50,7 +50,7 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
     for m in judged.exponents:
         values = damage.equivalent_load(loading.cycles, m, judged.revolutions, judged.reference_cycles)
         nominal = damage.equivalent_load(loading.nominal, m, judged.revolutions, judged.reference_cycles)
-        lacking = damage.shortfall(loading.cycles, m)
+        lacking = damage.truncation_bound(loading.cycles, m)
         for c, channel in enumerate(loading.cycles.channels):
             head = {"channel": channel, "unit": CHANNELS[channel], "m": m, "nominal": _only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))

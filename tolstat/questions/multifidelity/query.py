@@ -22,8 +22,7 @@ from tolstat.common.strict import did_you_mean, validate
 from tolstat.common.tables import VALID
 from tolstat.joint import perturb
 from tolstat.sampling import draw, draw_blocks
-from tolstat.store import ResultStore
-from tolstat.store import view as source
+from tolstat.store import ResultStore, view
 from tolstat.store.recorded import perturbed
 from tolstat.store.view import Campaign
 from tolstat.study import Study
@@ -125,7 +124,7 @@ def run(
         As `campaign.run`; the same call resumes.
     """
     solvers = _solvers(study, low, high)
-    asked = study.asked or list(source.LOADS)
+    asked = study.asked or list(view.LOADS)
     by = asked[0] if by is None else by
     if study.sampling.method != "random":
         found = f"is {study.sampling.method!r}: only independent samples have such intervals"
@@ -207,7 +206,7 @@ def _read(paths: tuple[Path, Path]) -> tuple[Campaign, Campaign]:
     found = []
     for path in paths:
         with ResultStore.open(path) as store:
-            found.append(source.read(store, source.LOAD_FIELDS, ()))
+            found.append(view.read(store, view.LOAD_FIELDS, ()))
     if len(found[0].results) > len(found[1].results):
         raise StoreError(str(Fault(str(paths[1]), f"has fewer joints than {paths[0]}", "make both anew")))
     return found[0], found[1]
@@ -216,8 +215,7 @@ def _read(paths: tuple[Path, Path]) -> tuple[Campaign, Campaign]:
 def _pairs(campaigns: tuple[Campaign, Campaign], name: str, costs: tuple[float, float]) -> Pairs:
     """Pairs of a load, NaN where not valid; both files have one study and seed, so row i is the same joint."""
     high, low = (
-        np.where(np.isin(held.results["status"], VALID), source.load(held.results, name)[0], np.nan)
-        for held in campaigns
+        np.where(np.isin(held.results["status"], VALID), view.load(held.results, name)[0], np.nan) for held in campaigns
     )
     return Pairs(high, low, *costs)
 

@@ -16,8 +16,7 @@ from tolstat.analysis.reweight import Weights
 from tolstat.campaign.recall import recall
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import VALID, Status
-from tolstat.store import ResultStore
-from tolstat.store import view as source
+from tolstat.store import ResultStore, view
 from tolstat.study import Study
 from tolstat.study.change import changed
 from tolstat.study.selection import columns_of
@@ -101,8 +100,8 @@ def of_store(
     if faults:
         raise InputError(faults)
     columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
-    campaign = source.read(store, source.LOAD_FIELDS, (), weighted=True)
-    blocks = source.error_blocks(store, columns)  # the errors of a million joints would be half a gigabyte
+    campaign = view.read(store, view.LOAD_FIELDS, (), weighted=True)
+    blocks = view.error_blocks(store, columns)  # the errors of a million joints would be half a gigabyte
     logs = np.concatenate([_log_ratios(study, new, names, errors) for errors in blocks])
     logs, campaign = logs[campaign.results["status"] != Status.PENDING], campaign.done()
     weights = reweight.smooth(logs if campaign.weights is None else logs + np.log(campaign.weights))
@@ -153,8 +152,8 @@ def _log_ratios(
     return logs
 
 
-def _row(campaign: source.Campaign, weights: Weights, name: str, level: float, confidence: float) -> dict[str, object]:
-    values, unit = source.load(campaign.results, name)
+def _row(campaign: view.Campaign, weights: Weights, name: str, level: float, confidence: float) -> dict[str, object]:
+    values, unit = view.load(campaign.results, name)
     valid = np.isin(campaign.results["status"], VALID) & np.isfinite(values)
     found = reweight.share_above(values[valid], _part(weights, valid), level, confidence, campaign.iid)
     counted = weights.values[valid & (values > level)].sum()
@@ -164,10 +163,10 @@ def _row(campaign: source.Campaign, weights: Weights, name: str, level: float, c
     return {**head, **found._asdict(), **bounds}
 
 
-def _quantiles(campaign: source.Campaign, weights: Weights, confidence: float) -> pd.DataFrame:
+def _quantiles(campaign: view.Campaign, weights: Weights, confidence: float) -> pd.DataFrame:
     rows = []
-    for name in source.LOADS:
-        values, unit = source.load(campaign.results, name)
+    for name in view.LOADS:
+        values, unit = view.load(campaign.results, name)
         valid = np.isin(campaign.results["status"], VALID) & np.isfinite(values)
         part = _part(weights, valid)
         for share in (0.5, 0.9, 0.99):

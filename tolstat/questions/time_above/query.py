@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, exceedance, quantile
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.common.draw_records import check_counted
+from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import BUSHINGS, CHANNELS, Status
@@ -26,7 +26,7 @@ POINTS = 60
 _COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 
-class Duration(NamedTuple):
+class TimeAbove(NamedTuple):
     """Time above levels within a revolution, over the joints.
 
     Attributes
@@ -57,7 +57,7 @@ def of_store(
     levels: Sequence[str] = (),
     curves: bool = False,
     confidence: float = 0.95,
-) -> Duration:
+) -> TimeAbove:
     """Estimate for which share of a revolution loads are above levels.
 
     Parameters
@@ -85,7 +85,7 @@ def of_store(
     StoreError
         When the file holds no histories, or no sample of a production, or no valid joint.
     """
-    check_counted(store.sampling, store.path)
+    check_equal_weights(store.sampling, store.path)
     if store.sampling["method"] in ("cases", "sweep"):
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(store.path), "holds joints that are no sample of a production", remedy)))
@@ -104,7 +104,7 @@ def of_store(
     if curves:
         spread = {name: np.linspace(*ends[name], POINTS) for name in asked}
         more = list(_rows(spread, _shares(store, counted, spread)[0], iid, confidence))
-    return Duration(store.study_name, counted.size, lost, pd.DataFrame(rows), pd.DataFrame(more))
+    return TimeAbove(store.study_name, counted.size, lost, pd.DataFrame(rows), pd.DataFrame(more))
 
 
 def channel(loads: NDArray[Any], name: str) -> FloatArray:
@@ -172,8 +172,8 @@ def _shares(
     """Share of the revolution above each level, (n, levels), and least and largest value, of each load."""
     shares = {name: np.empty((len(rows), len(own))) for name, own in levels.items()}
     ends = dict.fromkeys(levels, (np.inf, -np.inf))
-    for begin in range(0, len(rows), revolutions.MOST):
-        block = revolutions.loads(store, rows[begin : begin + revolutions.MOST])
+    for begin in range(0, len(rows), revolutions.JOINTS_PER_READ):
+        block = revolutions.loads(store, rows[begin : begin + revolutions.JOINTS_PER_READ])
         for name, own in levels.items():
             load = channel(block, name)
             ends[name] = min(ends[name][0], float(load.min())), max(ends[name][1], float(load.max()))
@@ -185,7 +185,7 @@ def _shares(
 def _rows(
     levels: Mapping[str, FloatArray], shares: Mapping[str, FloatArray], iid: bool, confidence: float
 ) -> Iterator[dict[str, Any]]:
-    """One row per load and level, as in `Duration`."""
+    """One row per load and level, as in `TimeAbove`."""
     for name, own in levels.items():
         for level, time in zip(own, shares[name].T, strict=True):
             every = np.full(time.size, int(Status.OK))

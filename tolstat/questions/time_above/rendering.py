@@ -18,7 +18,7 @@ from tolstat.display.text import UNITS, align, csv
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tolstat.questions.time_above.query import Duration
+    from tolstat.questions.time_above.query import TimeAbove
 
 COLUMNS = 4
 """Maximum number of loads in the picture."""
@@ -30,7 +30,7 @@ _LINES = {
 }
 
 
-def text(found: Duration) -> str:
+def text(found: TimeAbove) -> str:
     """Table of `Duration.table`, shares in per cent."""
     rows = [
         ["load > level", "joints above it at any time", "time above it: mean", "median", "90 % below", "99 % below"]
@@ -41,7 +41,7 @@ def text(found: Duration) -> str:
     return align(rows)
 
 
-def note(found: Duration) -> str:
+def note(found: TimeAbove) -> str:
     """Notes to the table: number of joints, restrictions."""
     lines = [f"{found.joints} joints, {found.lost} without a valid revolution left out; time: share of a revolution"]
     if found.table["time_lower"].isna().all():
@@ -49,7 +49,7 @@ def note(found: Duration) -> str:
     return "\n".join(lines)
 
 
-def write(found: Duration, stem: Path) -> list[Path]:
+def write(found: TimeAbove, stem: Path) -> list[Path]:
     """Write ``STEM_time_above.csv``, ``.png`` and ``.svg``.
 
     Parameters
@@ -68,7 +68,7 @@ def write(found: Duration, stem: Path) -> list[Path]:
     return files + style.save(figure(found), stem.with_name(f"{stem.name}_time_above"))
 
 
-def figure(found: Duration) -> Figure:
+def figure(found: TimeAbove) -> Figure:
     """Draw the curves of at most `COLUMNS` loads: share of the joints (upper row), share of the revolution (lower)."""
     loads = list(dict.fromkeys(found.curves["load"]))[:COLUMNS]
     with style.settings():

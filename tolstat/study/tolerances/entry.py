@@ -12,11 +12,10 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, BeforeValidator, ValidationInfo, model_validator
 
-from tolstat.common import strict as schema
-from tolstat.common import units
+from tolstat.common import strict, units
 from tolstat.common.files import data_dir
 from tolstat.common.strict import refuse
-from tolstat.study.tolerances import distributions as tolerance
+from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.distributions import Distribution
 
 
@@ -53,7 +52,7 @@ PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
 PositiveLength = Annotated[units.Length, AfterValidator(units.positive)]
 
 
-class ToleranceEntry(schema.Strict):
+class ToleranceEntry(strict.Strict):
     """Base of the entries: one model for each distribution."""
 
     @abstractmethod
@@ -86,7 +85,7 @@ class HalfBand(ToleranceEntry):
             raise refuse(f"ISO 2768 has no tolerance for {site.name}", "give plus_minus")
         kind = "angular" if site.unit == "rad" else "linear"
         try:
-            return tolerance.iso2768(data_dir() / "iso2768.csv", kind, self.iso2768, self.nominal)
+            return distributions.iso2768(data_dir() / "iso2768.csv", kind, self.iso2768, self.nominal)
         except ValueError as error:
             raise refuse(f"nominal: {error}", "give plus_minus") from error
 

@@ -12,8 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tolstat.common import strict as schema
-from tolstat.common import units
+from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions as tolerance
@@ -193,7 +192,7 @@ class MeasuredEntry(ToleranceEntry):
                 f"{path} cannot be read: {error}", "give a CSV file; its path starts from the study's folder"
             ) from error
         if self.column not in columns:
-            raise refuse(f"{path} has no column {self.column!r}", schema.did_you_mean(self.column, list(columns)))
+            raise refuse(f"{path} has no column {self.column!r}", strict.did_you_mean(self.column, list(columns)))
         values = []
         for number, cell in enumerate(cells, start=1):
             value = _number(cell)
@@ -246,7 +245,7 @@ def distribution(data: object, site: Site, place: str, path: tuple[int | str, ..
     InputError
         With the faults of the entry.
     """
-    where = f"{place}: {schema.dotted(path)}"
+    where = f"{place}: {strict.dotted(path)}"
     if not isinstance(data, dict):
         remedy = 'write { plus_minus = ..., distribution = "normal", cpk = 1.0 }'
         raise InputError([Fault(where, f"{data!r} is not a tolerance", remedy)])
@@ -257,7 +256,7 @@ def distribution(data: object, site: Site, place: str, path: tuple[int | str, ..
         raise InputError([Fault(f"{where}.distribution", "missing key", remedy)])
     if not isinstance(kind, str) or kind not in kinds:
         also = " (rayleigh is for offset_radial)" if kind == "rayleigh" else ""
-        remedy = schema.did_you_mean(str(kind), list(kinds))
+        remedy = strict.did_you_mean(str(kind), list(kinds))
         raise InputError([Fault(f"{where}.distribution", f"{kind!r} is not possible here{also}", remedy)])
-    entry = schema.validate(kinds[kind], data, place, prefix=path, context={"site": site})
+    entry = strict.validate(kinds[kind], data, place, prefix=path, context={"site": site})
     return entry.build(site)

@@ -157,7 +157,7 @@ def test_the_largest_of_many_lies_in_the_interval(power: float) -> None:
         found = stationary.largest(1 - rng.random((32, 12)) ** power, 100)
         truth = (1 - rng.random((100, 12)) ** power).max(axis=0)
         inside.append((found.lower <= truth) & (truth <= found.upper))
-    assert 0.90 <= np.mean(inside) <= 0.995
+    assert 0.90 <= np.mean(inside) <= 0.999  # some more than asked for: intervals are widened for the steps' error
 
 
 def test_a_stationary_joint_counts_on_both_sides_of_a_limit_inside_its_interval() -> None:

@@ -6,6 +6,7 @@ from typer.testing import CliRunner
 
 from tests.questions.test_causes import TEXT, made
 from tolstat.cli import app
+from tolstat.common.loads import LOAD_FIELDS
 from tolstat.common.tables import ERROR, RESULT
 from tolstat.store import ResultStore, reader, view
 
@@ -59,12 +60,12 @@ def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, comma
 
 def test_only_the_fields_asked_for_are_held(path):
     with ResultStore.open(path) as store:
-        whole, part = view.read(store), view.read(store, view.LOAD_FIELDS, ["pin1.offset_t"])
+        whole, part = view.read(store), view.read(store, LOAD_FIELDS, ["pin1.offset_t"])
     assert whole.results.dtype == RESULT
     assert whole.errors.dtype == ERROR
     assert part.results.itemsize < 0.4 * RESULT.itemsize
     assert part.errors.dtype.names == ("pin1.offset_t",)
-    for field in view.LOAD_FIELDS:
+    for field in LOAD_FIELDS:
         np.testing.assert_array_equal(part.results[field], whole.results[field])
     np.testing.assert_array_equal(part.errors["pin1.offset_t"], whole.errors["pin1.offset_t"])
 

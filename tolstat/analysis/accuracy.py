@@ -13,19 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import BUSHINGS, PINS, SIMULATED, Status
+from tolstat.common.loads import KINDS, LOADS, of_kind
+from tolstat.common.tables import SIMULATED, Status
 
 FloatArray = NDArray[np.float64]
 
-KINDS = ("F", "T", "contact", "psi")
-OBSERVABLES = (
-    *(f"{bushing}.{letter}" for letter in "FT" for bushing in BUSHINGS),
-    *(f"{pin}.contact" for pin in PINS),
-    "psi",
-)
-"""Largest loads of a joint whose error is evaluated, named as in the limits of a study."""
-KIND_OF = np.array([0] * 8 + [1] * 8 + [2] * 4 + [3])
-UNITS = ("N", "N*m", "N", "1")
+OBSERVABLES = tuple(load.name for kind in KINDS for load in LOADS.values() if load.kind == kind)
+"""Largest loads of a joint whose error is evaluated: all that can have a limit, kind by kind."""
+KIND_OF = np.array([KINDS.index(LOADS[name].kind) for name in OBSERVABLES])
 
 REFERENCE, FIDELITY = "reference", "fidelity"
 HALF_STEP_SHARE = 4 / 3
@@ -54,8 +49,7 @@ class Spread(NamedTuple):
 
 def loads(results: NDArray[np.void]) -> FloatArray:
     """Collect the largest loads of joints, (m,) table RESULT, as (m, 21): SI, in the order of `OBSERVABLES`."""
-    contact = results["contact_max"].max(axis=2)
-    return np.concatenate([results["F_max"], results["T_max"], contact, results["psi_max"][:, None]], axis=1)
+    return np.concatenate([of_kind(results, kind) for kind in KINDS], axis=1)
 
 
 def sizes(results: NDArray[np.void]) -> FloatArray:
@@ -65,9 +59,7 @@ def sizes(results: NDArray[np.void]) -> FloatArray:
 
 def size(results: NDArray[np.void], observable: str) -> FloatArray:
     """Reference value of one observable in each joint, (m,), SI: a column of `sizes`."""
-    kind = KINDS[KIND_OF[OBSERVABLES.index(observable)]]
-    fields = {"F": "F_max", "T": "T_max", "contact": "contact_max", "psi": "psi_max"}
-    values = results[fields[kind]].reshape(len(results), -1)
+    values = of_kind(results, LOADS[observable].kind)
     held = ~np.isnan(values).all(axis=0)
     return values[:, held].max(axis=1) if held.any() else np.full(len(results), np.nan)
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tolstat.analysis import exceedance
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import LOADS
 from tolstat.store import ResultStore
 from tolstat.store.reader import BLOCK
 from tolstat.store.view import load
@@ -169,7 +170,7 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
         found = f"sampling.method is {own!r}: only independent samples, alike in weight, have such an interval"
         raise InputError([Fault("--until", found, 'use sampling.method = "random"')])
     if not selected_results.holds(study.output.columns, rule.load):
-        remedy = f"add {', '.join(selected_results.needed(rule.load))}"
+        remedy = f"add {', '.join(LOADS[rule.load].columns)}"
         raise InputError([Fault(f"{study.path}: output.results", f"leaves out {rule.load} of --until", remedy)])
     planned = looks(rule.width, study.samples)
     first = int(study.sampling.nominal_first)

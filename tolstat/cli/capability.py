@@ -23,10 +23,11 @@ def capability(
     With --one-in also the loads that one in N joints exceeds, and the median of the largest of N joints, from a
     generalised Pareto tail; N may be more than the joints simulated, and the intervals tell what that is worth.
     """
+    from tolstat.common.loads import LOAD_FIELDS
     from tolstat.display import text
     from tolstat.questions.capability import rendering as tables
     from tolstat.store import ResultStore
-    from tolstat.store.view import LOAD_FIELDS, read
+    from tolstat.store.view import read
 
     with ResultStore.open(file) as store:
         campaign = read(store, LOAD_FIELDS, ())

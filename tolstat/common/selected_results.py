@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.columns import RESULT_COLUMNS, Column
-from tolstat.common.tables import CONTACTS
+from tolstat.common.loads import LOADS
 
 KEY = "output.results"
 """Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
@@ -58,11 +58,6 @@ def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
             c.of(results)[:] = np.nan
 
 
-def needed(load: str) -> tuple[str, ...]:
-    """Columns that a load with a limit (``cross1.F``, ``pin1.contact``, ``psi``) is read from."""
-    return tuple(f"{load}_{of}_max" for of in CONTACTS) if load.endswith(".contact") else (f"{load}_max",)
-
-
 def holds(kept: Iterable[Column], load: str) -> bool:
     """Whether a load that can have a limit can be read from the columns kept."""
-    return {c.name for c in kept}.issuperset(needed(load))
+    return {c.name for c in kept}.issuperset(LOADS[load].columns)

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
+from tolstat.common.loads import LOAD_FIELDS
 from tolstat.display import text
 from tolstat.solver import fidelity
 from tolstat.store import ResultStore
-from tolstat.store.view import LOAD_FIELDS, Campaign, read
+from tolstat.store.view import Campaign, read
 
 
 class Report(NamedTuple):

@@ -21,6 +21,7 @@ from tolstat.campaign.recall import recall
 from tolstat.campaign.remedy import remedy
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, StoreError, TolstatError
+from tolstat.common.loads import LOAD_FIELDS
 from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, VALID, Fidelity, Method, Start, Status
 from tolstat.questions.causes import angles, tail
 from tolstat.questions.causes import query as causes
@@ -152,7 +153,7 @@ def read(store: ResultStore) -> tuple[Campaign, NDArray[np.float64]]:
     Returns
     -------
     campaign : Campaign
-        Its results have the fields `view.LOAD_FIELDS`; it has errors only for a sweep.
+        Its results have the fields `loads.LOAD_FIELDS`; it has errors only for a sweep.
     modes : ndarray, shape (4, 4)
         Mean share of the revolution by pin and contact mode, over the settled joints.
 
@@ -162,7 +163,7 @@ def read(store: ResultStore) -> tuple[Campaign, NDArray[np.float64]]:
         When the file holds levels of a subset simulation, which are not a sample.
     """
     swept = store.sampling["method"] == "sweep"
-    campaign = view.read(store, view.LOAD_FIELDS, None if swept else (), weighted=True)
+    campaign = view.read(store, LOAD_FIELDS, None if swept else (), weighted=True)
     skip, total, modes = _first(store), 0.0, np.zeros((4, 4))
     for first in range(0, len(campaign.results), BLOCK):
         rows = slice(first + skip, min(first + BLOCK, len(campaign.results)) + skip)

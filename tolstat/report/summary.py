@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.loads import LOAD_FIELDS
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.questions.capability import rendering as capability
@@ -47,7 +48,7 @@ def of_store(store: ResultStore, confidence: float = 0.95) -> dict[str, Any]:
     if store.sampling["method"] in ("cases", "sweep"):
         remedy = "its joints are in: tolstat export --csv"
         raise StoreError(str(Fault(str(store.path), "holds no sample of a production, and has no statistics", remedy)))
-    campaign = view.read(store, view.LOAD_FIELDS, (), weighted=True)
+    campaign = view.read(store, LOAD_FIELDS, (), weighted=True)
     states = campaign.results["status"]
     judged = bool(campaign.limits)
     counted = judged and campaign.weights is None

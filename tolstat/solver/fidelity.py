@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import BUSHINGS, FINEST_STEPS, PINS, Fidelity, Options, Simulation, Status
+from tolstat.common.loads import BUSHING_LOADS, LOADS, of_kind
+from tolstat.common.tables import FINEST_STEPS, Fidelity, Options, Simulation, Status
 
 Array = NDArray[np.float64]
 
@@ -41,8 +42,6 @@ pilot of two dozen."""
 WEIGHTS = {"steps": 2.3, "newton_iterations": 2.6, "factorisations": 4.3}
 """Weights of the counts in the cost of a joint: microseconds of one core, fitted over fidelities and steps a
 revolution."""
-LOADS = tuple(f"{bushing}.{kind}" for bushing in BUSHINGS for kind in "FT")
-"""Loads whose errors decide where a study has no limits."""
 
 
 class Choice(NamedTuple):
@@ -105,7 +104,7 @@ def choose(
     -------
     Choice
     """
-    names = tuple(loads) or LOADS
+    names = tuple(loads) or BUSHING_LOADS
     truth = simulate(params, _at(options, REFERENCE)).results
     table = []
     for rung in RUNGS:
@@ -154,14 +153,8 @@ def sentence(options: Mapping[str, Any], record: Mapping[str, Any]) -> str:
 
 def values(results: NDArray[np.void], name: str) -> tuple[Array, Array]:
     """Return a load of each joint and, as scale of its error, the joint's largest load of the kind; (n,) each, SI."""
-    part, _, kind = name.partition(".")
-    if kind == "contact":
-        contact = results["contact_max"].max(axis=2)
-        return contact[:, PINS.index(part)], contact.max(axis=1)
-    if name == "psi":
-        return results["psi_max"], results["psi_max"]
-    moduli = results[f"{kind}_max"]
-    return moduli[:, BUSHINGS.index(part)], moduli.max(axis=1)
+    load = LOADS[name]
+    return load.of(results), of_kind(results, load.kind).max(axis=1)
 
 
 def _at(options: Options, rung: Rung) -> Options:

@@ -30,7 +30,7 @@ ways, at 10, 30 and 100 N m and of the fuzz tests: of those not refined the wors
 UNRESOLVED = 0.05
 """Change of the largest loads by the last tolerance above which a joint is not resolved. TR-BDF2 leaves a third of it
 as error, or less."""
-NARROW = 0.02
+NARROW = 0.03
 """Width of a stationary joint's interval, relative to its largest load, up to which results of the uniform steps may
 stand."""
 COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")

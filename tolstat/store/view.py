@@ -18,11 +18,11 @@ from tolstat.common import selected_results
 from tolstat.common.columns import RESULT_COLUMNS, Column
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.tables import BUSHINGS, ERROR_FIELDS, PINS, VALID, Status
+from tolstat.common.loads import BUSHING_LOADS, LOADS
+from tolstat.common.tables import ERROR_FIELDS, VALID, Status
 from tolstat.store import Counts, verification
 from tolstat.store.reader import BLOCK
 from tolstat.store.verification import Verification
-from tolstat.study.selection import LIMIT_UNITS
 
 if TYPE_CHECKING:
     from tolstat.store import ResultStore
@@ -36,10 +36,6 @@ METHODS = {
     "importance": "importance sampling",
     "pick_freeze": "pick-freeze design",
 }
-LOADS = tuple(f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT")
-"""Loads that every report shows if the study keeps them: force and torque of each bushing."""
-LOAD_FIELDS = ("status", *(f"{load}_{of}" for load in ("F", "T", "contact", "psi") for of in ("max", "lower", "upper")))
-"""Fields of the results from which every load that can have a limit is read, and the status."""
 _ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 _DISPLAY = {
     "m": ("mm", 1e3),
@@ -139,13 +135,13 @@ class Campaign:
 
     @property
     def drawn(self) -> tuple[str, ...]:
-        """Loads of `LOADS` that the study keeps."""
-        return tuple(name for name in LOADS if selected_results.holds(self.columns, name))
+        """Loads of `loads.BUSHING_LOADS` that the study keeps."""
+        return tuple(name for name in BUSHING_LOADS if selected_results.holds(self.columns, name))
 
     @property
     def listed(self) -> tuple[str, ...]:
         """Loads that tables show: those of `drawn` or, if there are none, all others that the study keeps."""
-        return self.drawn or tuple(name for name in LIMIT_UNITS if selected_results.holds(self.columns, name))
+        return self.drawn or tuple(name for name in LOADS if selected_results.holds(self.columns, name))
 
     @property
     def iid(self) -> bool:
@@ -164,8 +160,8 @@ class Campaign:
         return text + (f", {pending} still pending" if pending else "")
 
     def missing(self) -> str:
-        """Sentence that names the loads of `LOADS` that the study does not keep; empty if it keeps all."""
-        names = [name for name in LOADS if name not in self.drawn]
+        """Sentence that names the bushing loads that the study does not keep; empty if it keeps all."""
+        names = [name for name in BUSHING_LOADS if name not in self.drawn]
         return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
 
 
@@ -182,7 +178,7 @@ def read(
     store : ResultStore
         The file.
     fields : sequence of str, optional
-        Fields of the results to load, including ``status``, such as `LOAD_FIELDS`; all without it. The complete
+        Fields of the results to load, including ``status``, such as `loads.LOAD_FIELDS`; all without it. The complete
         tables of a million joints take 1.2 GB.
     errors_of : sequence of str, optional
         Columns of the errors to load; all without it.
@@ -282,14 +278,9 @@ def load(results: NDArray[np.void], name: str) -> tuple[FloatArray, str]:
     InputError
         When there is no such load.
     """
-    part, _, letter = name.partition(".")
-    if part in BUSHINGS and letter in ("F", "T"):
-        return results[f"{letter}_max"][:, BUSHINGS.index(part)], "N" if letter == "F" else "N*m"
-    if part in PINS and letter == "contact":
-        return results["contact_max"][:, PINS.index(part)].max(axis=1), "N"
-    if name == "psi":
-        return results["psi_max"], "1"
-    raise InputError([Fault(f"limits.{name}", "is not a load", "name cross1.F .. fork4.T, pin1.contact or psi")])
+    if name not in LOADS:
+        raise InputError([Fault(f"limits.{name}", "is not a load", "name cross1.F .. fork4.T, pin1.contact or psi")])
+    return LOADS[name].of(results), LOADS[name].unit
 
 
 def ends(results: NDArray[np.void], name: str) -> Ends:
@@ -301,7 +292,7 @@ def ends(results: NDArray[np.void], name: str) -> Ends:
         SI; NaN for joints without results.
     """
     values, _ = load(results, name)
-    kind = name.rpartition(".")[2]
+    kind = LOADS[name].kind
     return values * results[f"{kind}_lower"], values * results[f"{kind}_upper"]
 
 

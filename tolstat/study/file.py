@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from tolstat import joint
-from tolstat.common import selected_results, strict
+from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import LOADS, UNIT_OF_LOAD
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
@@ -17,7 +18,7 @@ from tolstat.study import fatigue, listing, proposal, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
-from tolstat.study.selection import LIMIT_UNITS, RADIAL_UNITS, UNITS, Assignments, Entry
+from tolstat.study.selection import RADIAL_UNITS, UNITS, Assignments, Entry
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
@@ -170,9 +171,9 @@ class StudyFile:
         claims = Assignments(self.place)
         for entry in self._entries("limits"):
             with gather(self._faults):
-                names = selection.resolve(entry, LIMIT_UNITS, self.place)
+                names = selection.resolve(entry, UNIT_OF_LOAD, self.place)
                 claims.claim(entry, names)
-                value = selection.quantity(entry, LIMIT_UNITS[names[0]], self.place)
+                value = selection.quantity(entry, UNIT_OF_LOAD[names[0]], self.place)
                 if value <= 0:
                     self._fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")
                 limits |= dict.fromkeys(names, value)
@@ -246,7 +247,7 @@ class StudyFile:
     def check_limits(self, output: Output, limits: Mapping[str, float]) -> None:
         """Note limits of loads that are not stored."""
         held = {c.name for c in output.columns}
-        lacking = [name for load in limits for name in selected_results.needed(load) if name not in held]
+        lacking = [name for load in limits for name in LOADS[load].columns if name not in held]
         if lacking:
             found = f"leaves out what [limits] judges by: {', '.join(lacking)}"
             self._fault(("output", "results"), found, "add these, or remove their limits")

@@ -8,8 +8,9 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
-from tolstat.study.selection import LIMIT_UNITS, Entry, quantity, resolve
+from tolstat.study.selection import Entry, quantity, resolve
 
 _STATEMENT = re.compile(
     r"\s*P\s*\(\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>[^)]+?)\s*\)\s*(?P<what>\w*)\s*<\s*(?P<bound>\S+)\s*"
@@ -68,11 +69,11 @@ def parse(text: str, what: str, option: str, example: str) -> Statement:
     loads, level, bound = [], math.nan, math.nan
     entry = Entry(found["load"], (found["load"],), found["level"])
     with gather(faults):
-        if not set(entry.pattern) & set("*?[") and entry.pattern not in LIMIT_UNITS:
-            remedy = did_you_mean(entry.pattern, list(LIMIT_UNITS))
+        if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LOAD:
+            remedy = did_you_mean(entry.pattern, list(UNIT_OF_LOAD))
             raise InputError([Fault(option, f"{entry.pattern!r} is not a load", remedy)])
-        loads = resolve(entry, LIMIT_UNITS, option)
-        level = quantity(entry, LIMIT_UNITS[loads[0]], option)
+        loads = resolve(entry, UNIT_OF_LOAD, option)
+        level = quantity(entry, UNIT_OF_LOAD[loads[0]], option)
     with suppress(ValueError):
         bound = float(found["bound"])
     if not 0.0 < bound < 1.0:

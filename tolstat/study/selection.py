@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 from pydantic_core import PydanticCustomError
 
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean, dotted
-from tolstat.common.tables import BUSHINGS, ERROR_FIELDS, HOLES, PINS
+from tolstat.common.tables import ERROR_FIELDS, HOLES, PINS
 from tolstat.common.units import to_si
 
 UNITS = {field.name: field.unit for field in ERROR_FIELDS}
@@ -22,13 +23,6 @@ UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 
 RADIAL_UNITS = {f"{feature}.offset_radial": "m" for feature in PINS + HOLES}
 """SI unit of each radial offset, which stands for two columns of the table, offset_t and offset_z, drawn together."""
-
-LIMIT_UNITS = {
-    **{f"{bushing}.{load}": unit for bushing in BUSHINGS for load, unit in (("F", "N"), ("T", "N*m"))},
-    **{f"{pin}.contact": "N" for pin in PINS},
-    "psi": "1",
-}
-"""SI unit of every result that can have a limit."""
 
 
 class Entry(NamedTuple):
@@ -82,9 +76,9 @@ def limit_of(load: str, level: str, place: str) -> float:
     InputError
         When there is no such load, or the level is no quantity of its unit.
     """
-    if load not in LIMIT_UNITS:
-        raise InputError([Fault(place, f"{load!r} is not a load", did_you_mean(load, list(LIMIT_UNITS)))])
-    return quantity(Entry(load, (load,), level), LIMIT_UNITS[load], place)
+    if load not in UNIT_OF_LOAD:
+        raise InputError([Fault(place, f"{load!r} is not a load", did_you_mean(load, list(UNIT_OF_LOAD)))])
+    return quantity(Entry(load, (load,), level), UNIT_OF_LOAD[load], place)
 
 
 def fixed_errors(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.study.design import Design, flat
@@ -20,7 +21,6 @@ from tolstat.study.file import StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.proposal import Proposal
-from tolstat.study.selection import LIMIT_UNITS
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 
@@ -143,7 +143,7 @@ class Study(Case):
         """Loads of interest: those with limits, else those that ``output.results`` selects; else none."""
         if self.limits or self.output.results is None:
             return list(self.limits)
-        return [load for load in LIMIT_UNITS if selected_results.holds(self.output.columns, load)]
+        return [load for load in UNIT_OF_LOAD if selected_results.holds(self.output.columns, load)]
 
     def identity(self) -> dict[str, Any]:
         """Everything that decides the numbers, as dotted key to JSON value.

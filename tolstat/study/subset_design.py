@@ -8,6 +8,7 @@ from typing import Any
 
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import LOADS
 from tolstat.common.strict import validate
 from tolstat.study.model import Subset
 from tolstat.study.study import Study
@@ -38,9 +39,10 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
     if not study.tolerances:
         remedy = 'give a study with [tolerances], as of sampling.method = "random"'
         faults.append(Fault(str(study.path), "has no tolerances that joints are drawn from", remedy))
-    if not selected_results.holds(study.output.columns, str(sampling["load"])):
-        remedy = f"add {', '.join(selected_results.needed(str(sampling['load'])))}"
-        faults.append(Fault(f"{study.path}: output.results", f"leaves out {sampling['load']} of --limit", remedy))
+    load = LOADS[str(sampling["load"])]
+    if not selected_results.holds(study.output.columns, load.name):
+        remedy = f"add {', '.join(load.columns)}"
+        faults.append(Fault(f"{study.path}: output.results", f"leaves out {load.name} of --limit", remedy))
     own = study.sampling.model_dump(include={"seed", "nominal_first"})
     with gather(faults):
         read = validate(Subset, own | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")

@@ -20,6 +20,7 @@ from tolstat.analysis.reweight import Weights
 from tolstat.campaign.recall import recall
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.loads import LOAD_FIELDS
 from tolstat.common.tables import VALID, Status
 from tolstat.store import ResultStore, view
 from tolstat.study import Study, costs, rule, scaling, selection
@@ -152,7 +153,7 @@ def of_store(
     statements, free, prices = _asked(store, study, limits, cost_file, keep)
     names = [name for t in free for name in t.names]
     columns = [column for name in names for column in selection.columns_of(name)]
-    campaign = view.read(store, view.LOAD_FIELDS, ())
+    campaign = view.read(store, LOAD_FIELDS, ())
     done = np.flatnonzero(campaign.results["status"] != Status.PENDING)
     above = np.column_stack([_above(campaign.results, s) for s in statements])[done]
     chosen, judges = allocation.halves(len(above), MOST)

@@ -15,11 +15,12 @@ from tolstat import sampling
 from tolstat.analysis import exceedance, overrepresentation, pick_freeze, quantile, regression, sensitivity
 from tolstat.campaign.recall import recall
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import LOAD_FIELDS, UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import VALID
 from tolstat.store import ResultStore, view
 from tolstat.study import Study
-from tolstat.study.selection import LIMIT_UNITS, columns_of
+from tolstat.study.selection import columns_of
 from tolstat.study.tolerances.distributions import score
 
 TAIL = 0.9
@@ -107,15 +108,15 @@ def of_store(
     >>> found.table["error"][:2].sort_values().tolist()
     ['pin1.offset_t', 'pin2.offset_z']
     """
-    if by not in LIMIT_UNITS:
-        raise InputError([Fault("--by", f"{by!r} is not a load", did_you_mean(by, list(LIMIT_UNITS)))])
+    if by not in UNIT_OF_LOAD:
+        raise InputError([Fault("--by", f"{by!r} is not a load", did_you_mean(by, list(UNIT_OF_LOAD)))])
     study = recall(store, path=study_path)
     if not study.tolerances:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
     if study.groups:
         return _frozen(store, study, by, confidence, log)
-    campaign = view.read(store, view.LOAD_FIELDS, ())
+    campaign = view.read(store, LOAD_FIELDS, ())
     columns = [column for name in study.tolerances for column in columns_of(name)]
     errors = partial(view.errors_at, store, columns)
     return _of_joints(campaign, study, by, confidence, log, str(store.path), errors)
@@ -191,7 +192,7 @@ def _frozen(store: ResultStore, study: Study, by: str, confidence: float, log: b
         raise StoreError(
             str(Fault(str(store.path), "holds a slice of a design", "merge all slices first: tolstat merge"))
         )
-    campaign = view.read(store, view.LOAD_FIELDS, ())
+    campaign = view.read(store, LOAD_FIELDS, ())
     values, unit = view.load(campaign.results, by)
     status = campaign.results["status"]
     valid = np.isin(status, VALID) & np.isfinite(values)

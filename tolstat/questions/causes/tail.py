@@ -13,12 +13,12 @@ from tolstat.campaign.recall import recall
 from tolstat.common import selected_results
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.store import ResultStore
 from tolstat.store.view import load
 from tolstat.study import Study
-from tolstat.study.selection import LIMIT_UNITS
 from tolstat.study.tolerances.distributions import score
 
 
@@ -116,11 +116,11 @@ def describe(
 
 
 def _values(results: NDArray[np.void], by: str) -> tuple[NDArray[np.float64], str]:
-    if by in LIMIT_UNITS:
+    if by in UNIT_OF_LOAD:
         return load(results, by)
     columns = {c.name: c for c in RESULT_COLUMNS}
     if by not in columns:
-        remedy = did_you_mean(by, [*LIMIT_UNITS, *columns])
+        remedy = did_you_mean(by, [*UNIT_OF_LOAD, *columns])
         raise InputError([Fault("--by", f"{by!r} is neither a load nor a column of the results", remedy)])
     return columns[by].of(results).astype(np.float64), columns[by].unit
 
@@ -128,7 +128,7 @@ def _values(results: NDArray[np.void], by: str) -> tuple[NDArray[np.float64], st
 def _check_kept(store: ResultStore, by: str) -> None:
     """Raise `InputError` if the study does not keep the load or column."""
     held = [c.name for c in store.columns]
-    loads = [load for load in LIMIT_UNITS if selected_results.holds(store.columns, load)]
+    loads = [load for load in UNIT_OF_LOAD if selected_results.holds(store.columns, load)]
     if by not in (*loads, *held):
         found = f"{store.path} does not keep {by}, see [output] results of its study"
         raise InputError([Fault("--by", found, f"give one of: {', '.join([*loads, *held])}")])

@@ -14,10 +14,10 @@ from tolstat.analysis import difference
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import LOAD_FIELDS, UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import VALID, Status
 from tolstat.store import ResultStore, view
-from tolstat.study.selection import LIMIT_UNITS
 
 SHARES = (0.5, 0.9, 0.99)
 """Quantiles that are compared."""
@@ -169,7 +169,7 @@ def _identity(store: ResultStore) -> dict[str, Any]:
 
 
 def _sides(a: ResultStore, b: ResultStore) -> Sides:
-    one, other = (view.read(store, view.LOAD_FIELDS, ()) for store in (a, b))
+    one, other = (view.read(store, LOAD_FIELDS, ()) for store in (a, b))
     same = [a.sampling[key] == b.sampling[key] for key in ("method", "seed")]
     same.append(a.sampling["method"] != "sobol" or a.sampling["dimensions"] == b.sampling["dimensions"])
     same.append(a.sampling["method"] != "lhs" or a.sampling["n"] == b.sampling["n"])
@@ -202,7 +202,7 @@ def _valid(side: view.Campaign, name: str) -> tuple[FloatArray, str]:
 
 def _names(sides: Sides, by: Sequence[str], limited: Sequence[str]) -> list[str]:
     held = [
-        name for name in LIMIT_UNITS if all(selected_results.holds(side.columns, name) for side in (sides.a, sides.b))
+        name for name in UNIT_OF_LOAD if all(selected_results.holds(side.columns, name) for side in (sides.a, sides.b))
     ]
     asked = {**dict.fromkeys(by, "--by"), **{name: f"limits.{name}" for name in limited}}
     lacking = {name: place for name, place in asked.items() if name not in held}

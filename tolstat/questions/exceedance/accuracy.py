@@ -7,7 +7,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.accuracy import FIDELITY, KIND_OF, KINDS, OBSERVABLES, REFERENCE, UNITS
+from tolstat.analysis.accuracy import FIDELITY, KIND_OF, OBSERVABLES, REFERENCE
+from tolstat.common.loads import KINDS, UNIT_OF_LOAD
 from tolstat.common.tables import Status
 from tolstat.store.verification import Verification
 
@@ -81,7 +82,7 @@ def joints(verification: Verification) -> pd.DataFrame:
                 "check": name,
                 "status": status,
                 "load": OBSERVABLES[k],
-                "unit": UNITS[KIND_OF[k]],
+                "unit": UNIT_OF_LOAD[OBSERVABLES[k]],
                 "campaign": base[:, k],
                 "value": other[:, k],
                 "error": error[:, k],

@@ -16,7 +16,8 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, weighted
-from tolstat.analysis.accuracy import KIND_OF, KINDS, OBSERVABLES, size
+from tolstat.analysis.accuracy import size
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Status
 from tolstat.display import style
 from tolstat.questions.exceedance import accuracy
@@ -69,7 +70,7 @@ def _budget(
         and ``numerical_upper``, the estimates with loads shifted down and up; ``total_lower`` and ``total_upper``,
         their ends ``outer_lower`` and ``outer_upper``: cover numerical error, sampling and unresolved joints.
     """
-    kind = KINDS[KIND_OF[OBSERVABLES.index(name)]]
+    kind = LOADS[name].kind
     error = numerical.get(kind, np.nan)
     values = load(campaign.results, name)[0]
     shift = error * size(campaign.results, name)

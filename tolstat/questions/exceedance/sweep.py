@@ -14,10 +14,10 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
+from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.display import style
 from tolstat.store.view import Axis, Campaign, load, swept_axes
-from tolstat.study.selection import LIMIT_UNITS
 
 Mask = NDArray[np.bool_]
 MAX_LEGEND = 6
@@ -52,7 +52,7 @@ def table(campaign: Campaign) -> pd.DataFrame:
 def worst(campaign: Campaign) -> pd.DataFrame:
     """Short form of `table`: largest force and torque of the cross bushings and of the fork bushings."""
     full = table(campaign)
-    loads = [c for c in full.columns if str(c).partition(" ")[0] in LIMIT_UNITS] if campaign.drawn else []
+    loads = [c for c in full.columns if str(c).partition(" ")[0] in UNIT_OF_LOAD] if campaign.drawn else []
     short = full[[c for c in full.columns if c not in loads]].copy()
     for group in ("cross", "fork"):
         for unit in ("N", "N*m"):

@@ -18,6 +18,7 @@ from tolstat.campaign.extend import grow
 from tolstat.campaign.plan import simulate_timed
 from tolstat.campaign.progress import note
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean, validate
 from tolstat.common.tables import VALID
 from tolstat.joint import perturb
@@ -27,7 +28,6 @@ from tolstat.store.recorded import perturbed
 from tolstat.store.view import Campaign
 from tolstat.study import Study
 from tolstat.study.model import Solver
-from tolstat.study.selection import LIMIT_UNITS
 
 SHARES = (0.5, 0.9, 0.99)
 TIMED = 64
@@ -124,7 +124,7 @@ def run(
         As `campaign.run`; the same call resumes.
     """
     solvers = _solvers(study, low, high)
-    asked = study.asked or list(view.LOADS)
+    asked = study.asked or list(BUSHING_LOADS)
     by = asked[0] if by is None else by
     if study.sampling.method != "random":
         found = f"is {study.sampling.method!r}: only independent samples have such intervals"
@@ -206,7 +206,7 @@ def _read(paths: tuple[Path, Path]) -> tuple[Campaign, Campaign]:
     found = []
     for path in paths:
         with ResultStore.open(path) as store:
-            found.append(view.read(store, view.LOAD_FIELDS, ()))
+            found.append(view.read(store, LOAD_FIELDS, ()))
     if len(found[0].results) > len(found[1].results):
         raise StoreError(str(Fault(str(paths[1]), f"has fewer joints than {paths[0]}", "make both anew")))
     return found[0], found[1]
@@ -230,6 +230,6 @@ def _table(
         found += [("quantile", share, multifidelity.quantile(pairs, share)) for share in SHARES]
         if name in limits:
             found.append(("share above", limits[name], multifidelity.share_above(pairs, limits[name])))
-        unit = LIMIT_UNITS[name]
+        unit = UNIT_OF_LOAD[name]
         rows += [{"load": name, "unit": unit, "statistic": s, "at": at} | e._asdict() for s, at, e in found]
     return pd.DataFrame(rows)

@@ -9,8 +9,8 @@ from operator import mul
 import pandas as pd
 
 from tolstat.analysis.subset import Estimate, Level
+from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.display.text import UNITS
-from tolstat.study.selection import LIMIT_UNITS
 
 
 def table(levels: list[Level], load: str) -> pd.DataFrame:
@@ -32,14 +32,14 @@ def table(levels: list[Level], load: str) -> pd.DataFrame:
     frame = pd.DataFrame([level._asdict() for level in levels])
     frame.insert(0, "level", range(len(levels)))
     frame.insert(1, "load", load)
-    frame.insert(2, "unit", LIMIT_UNITS[load])
+    frame.insert(2, "unit", UNIT_OF_LOAD[load])
     frame.insert(4, "probability", list(accumulate([1.0, *frame["share"][:-1]], mul)))
     return frame
 
 
 def sentence(estimate: Estimate, load: str, above: float) -> str:
     """The probability with its interval, or its upper bound if the levels did not reach the limit."""
-    unit = LIMIT_UNITS[load]
+    unit = UNIT_OF_LOAD[load]
     head = f"P({load} > {above:g} {UNITS.get(unit, unit)}".strip() + ")"
     if math.isnan(estimate.probability):
         return f"{head} < {estimate.upper:.2g}: the limit was not reached"

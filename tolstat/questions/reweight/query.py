@@ -15,6 +15,7 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
 from tolstat.campaign.recall import recall
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS
 from tolstat.common.tables import VALID, Status
 from tolstat.store import ResultStore, view
 from tolstat.study import Study
@@ -100,7 +101,7 @@ def of_store(
     if faults:
         raise InputError(faults)
     columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
-    campaign = view.read(store, view.LOAD_FIELDS, (), weighted=True)
+    campaign = view.read(store, LOAD_FIELDS, (), weighted=True)
     blocks = view.error_blocks(store, columns)  # the errors of a million joints would be half a gigabyte
     logs = np.concatenate([_log_ratios(study, new, names, errors) for errors in blocks])
     logs, campaign = logs[campaign.results["status"] != Status.PENDING], campaign.done()
@@ -165,7 +166,7 @@ def _row(campaign: view.Campaign, weights: Weights, name: str, level: float, con
 
 def _quantiles(campaign: view.Campaign, weights: Weights, confidence: float) -> pd.DataFrame:
     rows = []
-    for name in view.LOADS:
+    for name in BUSHING_LOADS:
         values, unit = view.load(campaign.results, name)
         valid = np.isin(campaign.results["status"], VALID) & np.isfinite(values)
         part = _part(weights, valid)

@@ -154,8 +154,7 @@ def columns(study: Study) -> list[str]:
 def dimensions() -> dict[str, int]:
     """Sobol' dimension of each error: its position in the table ERROR, whichever errors scatter in a study.
 
-    New errors must be appended to the table. SciPy's scrambling gives all dimensions other values when their number
-    changes.
+    A new error changes the Sobol' draws of all others: SciPy's scrambling depends on the number of dimensions.
     """
     return {field.name: number for number, field in enumerate(ERROR_FIELDS)}
 

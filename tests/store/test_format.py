@@ -1,4 +1,4 @@
-"""Result files of every released schema are read, by xarray and MATLAB, too; damaged and hostile ones are refused."""
+"""Files of the current schema are read, by xarray and MATLAB, too; older, damaged and hostile ones are refused."""
 
 from __future__ import annotations
 

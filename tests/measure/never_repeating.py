@@ -46,7 +46,7 @@ def rattling(n: int) -> NDArray[np.void]:
 
 
 def watch(params: NDArray[np.void], revolutions: int) -> tuple[NDArray[np.void], NDArray[np.void]]:
-    """Results and statistics of all revolutions, with steps that follow the error."""
+    """Results and statistics of all revolutions, with error-controlled steps."""
     options = Options(method=int(Method.TR_BDF2), rtol=refinement.TOLERANCE, max_revs=revolutions)
     results = np.zeros(len(params), RESULT).view(np.recarray)
     blocks = np.zeros((len(params), revolutions), RESULT).view(np.recarray)

@@ -1,7 +1,7 @@
 """Registry of the loads of a joint that can have a limit: name, where its values are, unit, kind.
 
-Limits, reports, checks of the numerical error, selection of results and export read it. A new load is one entry of
-`LOADS` and the code that computes its field.
+Limits, reports, checks of the numerical error, selection of results and export read it. Each element of the field of a
+kind is one load.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ STATUS_TEXT = {
     "still change; results are those of the last revolutions",
     Status.NOT_PERIODIC: "not the same in each revolution: quasi-periodic or chaotic, see motion, and not stationary; "
     "results are those of the last revolutions",
-    Status.NOT_RESOLVED: "settled, but its largest loads still change with finer steps (refinement_change); results "
+    Status.NOT_RESOLVED: "largest loads not confirmed by finer steps (refinement_change, NaN if these failed); results "
     "are those of the finest steps taken",
     Status.STATIONARY: "never the same in each revolution, but its largest loads are as large in the first half of the "
     "revolutions watched as in the second: results are the largest of solver.duration revolutions, estimated, with an "

@@ -1,4 +1,4 @@
-"""Steps that follow the error, on a mesh over the revolution that is kept from one revolution to the next.
+"""Error-controlled steps, on a mesh over the revolution that is kept from one revolution to the next.
 
 A revolution has about `CELLS` cells, a whole number of them per step of the output grid. TR-BDF2 takes a cell in
 2^level equal parts. Where the estimated error of a part is above the tolerance, the cell is repeated with twice as many

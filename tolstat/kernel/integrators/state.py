@@ -9,7 +9,7 @@ H_OLD, CV_FACTORISED, AHEAD, STAGED_STEP, LAST_ITERATION_BELOW, TOLERANCE, FORCE
 MEMORY = 8
 """Indices into ``State.memory``: last accepted step, s; cv of the tangent in use (0: none); whether `ahead` is used
 (1); length of the last step if its first stage is kept (else 0); weighted residual up to which one more iteration needs
-no check; for steps that follow the error: tolerance, and the force (N) and torque (N m) that errors are relative to."""
+no check; for error-controlled steps: tolerance, and the force (N) and torque (N m) that errors are relative to."""
 
 
 class State(NamedTuple):

@@ -83,7 +83,7 @@ def press(pin, par, work):
         damping = par.c_d * par.station_weight[j]
         ramp = smooth_step(delta / par.delta_d)
         ramp_slope = smooth_step_slope(delta / par.delta_d) / par.delta_d
-        elastic = (par.station_k1[j] * delta + par.station_k2[j]) * delta
+        elastic = (par.station_k1[j] * delta + par.station_k2[j]) * delta  # eq. (5)
         slope = 2 * par.station_k1[j] * delta + par.station_k2[j]
         total = elastic + damping * ramp * station[V_NORMAL]
         pressed = touching & (total > 0)

@@ -1,6 +1,6 @@
 """``python studies/cirelli2021/reproduce.py``: run the paper's cases and write the page beside its printed values.
 
-In the current folder: ``cirelli2021.h5`` (190 MB), ``cirelli2021_paper.html`` with its pictures inside, and Tables
+In the current folder: ``cirelli2021.h5`` (209 MB), ``cirelli2021_paper.html`` with its pictures inside, and Tables
 4 to 7 as ``cirelli2021_tables.csv``. A file that is there is completed; one that is whole is shown again.
 """
 

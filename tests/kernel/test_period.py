@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tolstat.common.tables import RESULT, Method, Motion, Options, Status
-from tolstat.kernel.revolution.trail import closure_trend, combine, lag_closure, make_trail, note_closure
+from tolstat.kernel.revolution.trail import Trail, closure_trend, combine, lag_closure, make_trails, note_closure
 from tolstat.solver.simulation import simulate_rows
 
 RPM = np.pi / 30
@@ -14,6 +14,12 @@ RATTLE = {"alpha": np.radians(30), "speed": 1000 * RPM, "torque": 5.0}
 CLEARANCE_20_UM = {f"pin{i}__diameter": 1.6e-4 for i in (1, 2, 3, 4)}
 UNDAMPED = ("c_cross", "c_fork", "c_d", "c_t")
 NO_LOSS = {"method": int(Method.GENERALIZED_ALPHA), "rho_inf": 1.0}
+
+
+def make_trail(steps_per_rev: int, kept: int) -> Trail:
+    """Trail of one joint."""
+    modulus, revolution, notes = make_trails(1, steps_per_rev, kept)
+    return Trail(modulus[0], revolution[0], notes[0])
 
 
 def one(par, **options):

@@ -28,7 +28,7 @@ class Load(NamedTuple):
     unit : str
         SI unit.
     element : int
-        Index along the field of the kind; -1 for a scalar field.
+        Position among the loads of the kind, the columns of `of_kind`.
     columns : tuple of str
         Columns of the result file that the load is computed from.
     """
@@ -41,8 +41,7 @@ class Load(NamedTuple):
 
     def of(self, results: NDArray[np.void]) -> FloatArray:
         """Values of the joints in a table RESULT, (n,), SI."""
-        values = of_kind(results, self.kind)
-        return values[:, max(0, self.element)]
+        return of_kind(results, self.kind)[:, self.element]
 
 
 def of_kind(results: NDArray[np.void], kind: str) -> FloatArray:
@@ -62,15 +61,13 @@ def _entries() -> list[Load]:
     for index, pin in enumerate(PINS):
         columns = tuple(f"{pin}.contact_{part}_max" for part in CONTACTS)
         found.append(Load(f"{pin}.contact", "contact", "N", index, columns))
-    return [*found, Load("psi", "psi", "1", -1, ("psi_max",))]
+    return [*found, Load("psi", "psi", "1", 0, ("psi_max",))]
 
 
 LOADS = {load.name: load for load in _entries()}
 """Every load that can have a limit, by name."""
 KINDS = tuple(LARGEST)
 """Kinds of loads, in the order of reports."""
-UNIT_OF_KIND = {load.kind: load.unit for load in LOADS.values()}
-"""SI unit of each kind."""
 UNIT_OF_LOAD = {load.name: load.unit for load in LOADS.values()}
 """SI unit of each load."""
 BUSHING_LOADS = tuple(load.name for load in LOADS.values() if load.kind in ("F", "T"))

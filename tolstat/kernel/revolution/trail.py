@@ -38,12 +38,6 @@ def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray,
     return modulus, np.zeros((joints, kept), RESULT).view(np.recarray), make_notes(joints)
 
 
-def make_trail(steps_per_rev: int, kept: int) -> Trail:
-    """Allocate for one joint."""
-    modulus, revolution, notes = make_trails(1, steps_per_rev, kept)
-    return Trail(modulus[0], revolution[0], notes[0])
-
-
 def make_notes(joints: int) -> np.recarray:
     """Allocate, shape (joints,)."""
     return np.zeros(joints, NOTES).view(np.recarray)

@@ -154,6 +154,7 @@ def light(monkeypatch):
     monkeypatch.setattr(startup, "measure", lambda *args: starts)
 
 
+@pytest.mark.slow
 def test_the_command_prints_tables_or_json(light, these, monkeypatch):
     found = iteration.measure(these, 1)
     monkeypatch.setattr(iteration, "measure", lambda these, rounds: found)

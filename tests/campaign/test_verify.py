@@ -276,6 +276,7 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
     assert settings[1] == settings[0]._replace(method=int(Method.GENERALIZED_ALPHA), steps_per_rev=48)
 
 
+@pytest.mark.slow
 def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
         "500 rpm", "2000 rpm"

@@ -174,6 +174,7 @@ class Page(HTMLParser):
         self.text += data
 
 
+@pytest.mark.slow
 def test_page_is_whole_and_stands_alone(result, tmp_path):
     assert "Table 4" in reproduce.build(result, tmp_path / "small")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["small_paper.html", "small_tables.csv"]
@@ -211,6 +212,7 @@ def test_other_cases_get_a_plain_table(result, tmp_path):
     assert "bent" in built.table
 
 
+@pytest.mark.slow
 def test_another_joint_is_shown_beside_printed_constants(result, tmp_path):
     """The first variant's joint counts, a third misalignment does no harm, and without a search there is no section."""
     whole = result.with_suffix(".toml").read_text(encoding="utf-8")

@@ -28,6 +28,7 @@ from tolstat.common import tables
 from tolstat.common.errors import InputError, StoreError
 from tolstat.solver import simulation
 from tolstat.store import Counts, ResultStore
+from tolstat.store.recall import differing_keys
 
 
 def datasets(path: Path) -> dict[str, bytes]:
@@ -267,7 +268,7 @@ def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_differing_keys_names_missing_ones() -> None:
-    lines = campaign.differing_keys({"a": 1, "b": [1, 2], "c": 3}, {"b": [1, 2], "c": 4, "d": None})
+    lines = differing_keys({"a": 1, "b": [1, 2], "c": 3}, {"b": [1, 2], "c": 4, "d": None})
     assert lines == [
         "a: 1 in the file, nothing in the study",
         "c: 3 in the file, 4 in the study",

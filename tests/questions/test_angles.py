@@ -8,11 +8,11 @@ from typer.testing import CliRunner
 from tests.support import synthetic
 from tolstat import study
 from tolstat.campaign import run as campaign
-from tolstat.campaign.recall import recall
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions.causes import angles
 from tolstat.store import ResultStore, revolutions
+from tolstat.store.recall import recall
 from tolstat.store.revolutions import Revolutions
 
 TEXT = synthetic.STUDY.replace("n = 60", "n = 900").replace("offset_t", "offset_[tz]")

@@ -14,12 +14,12 @@ from tolstat import joint, sampling, study
 from tolstat.analysis import multifidelity as analysis
 from tolstat.analysis.multifidelity import Pairs
 from tolstat.campaign import run as campaign
-from tolstat.campaign.recall import recall
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import RESULT, Fidelity, Simulation, Status
 from tolstat.questions.multifidelity import query as multifidelity
 from tolstat.store import ResultStore
+from tolstat.store.recall import recall
 
 SEEDS, M, N = 500, 120, 1500
 SIGMA = math.hypot(2.2, 0.5)

@@ -19,12 +19,12 @@ from tolstat import sampling, study
 from tolstat.analysis import subset
 from tolstat.analysis.subset import Settings, Walk
 from tolstat.campaign import run as campaign
-from tolstat.campaign.recall import recall
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
 from tolstat.questions.rare import query as rare
 from tolstat.store import ResultStore
+from tolstat.store.recall import recall
 
 SEEDS = 500
 RHO = 0.6

@@ -135,6 +135,12 @@ def numerical(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) ->
     return found
 
 
+def usual(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> dict[str, float]:
+    """Numerical error that the share `USUAL` of the joints stays below, by kind of load; NaN if unknown."""
+    values = by_kind(numerical(base, checks))
+    return {kind: spread(values[:, k]).usual for k, kind in enumerate(KINDS)}
+
+
 def by_kind(errors: FloatArray) -> FloatArray:
     """Largest error of each kind in each joint, (m, 21) -> (m, 4); NaN as in `_largest`."""
     return _largest(np.abs(errors))

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import exceedance, quantile
-from tolstat.analysis.exceedance import Exceedance, FloatArray
-from tolstat.common.tables import Status
+from tolstat.analysis.exceedance import Ends, Exceedance, FloatArray, Sample
 
 REFERENCE = 0.9986501019683699
 """Share of a normal distribution below mean + 3 sigma."""
@@ -71,7 +70,7 @@ def at(
     limit: float,
     confidence: float = 0.95,
     iid: bool = True,
-    ends: tuple[ArrayLike, ArrayLike] | None = None,
+    ends: Ends | None = None,
 ) -> Capability:
     """Capability of one load.
 
@@ -86,7 +85,7 @@ def at(
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not.
     ends : tuple of array_like, shape (n,), optional
-        Interval of each load, see `exceedance.curve`.
+        Interval of each load, see `exceedance.sort_out`.
 
     Returns
     -------
@@ -179,9 +178,8 @@ def _normality(valid: FloatArray) -> float:
 
 def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
     """Quantile index; interval from those of both quantiles, half the error probability each (Bonferroni)."""
-    fine = np.full(valid.size, Status.OK)
-    each = 0.5 * (1.0 + confidence)
-    middle, high = (quantile.at(valid, fine, share, each, iid) for share in (0.5, REFERENCE))
+    sample, each = Sample(valid, valid, valid, 0, 0), 0.5 * (1.0 + confidence)
+    middle, high = (quantile.of_sample(sample, share, each, iid) for share in (0.5, REFERENCE))
     index = float(_index(limit, middle.estimate, high.estimate))
     if not iid:
         return index, np.nan, np.nan

@@ -18,6 +18,7 @@ from tolstat.common.tables import UNSETTLED, VALID, Status
 
 FloatArray = NDArray[np.float64]
 Table = NDArray[np.void]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -65,9 +66,21 @@ CURVE = np.dtype([(f.name, "i8" if f.type == "int" else "f8") for f in fields(Ex
 
 
 class Sample(NamedTuple):
-    """Valid values of one load, ascending, and numbers of the joints without one; see `sort_out`."""
+    """One load of the simulated joints, sorted once for all shares and quantiles; see `sort_out`.
+
+    Attributes
+    ----------
+    valid : ndarray, shape (m,)
+        Loads of the valid joints, ascending.
+    lower, upper : ndarray, shape (m,)
+        Lower and upper ends of the intervals of these loads, each ascending; equal to `valid` where loads are exact.
+    n_failed, n_unsettled : int
+        Joints without a valid load.
+    """
 
     valid: FloatArray
+    lower: FloatArray
+    upper: FloatArray
     n_failed: int
     n_unsettled: int
 
@@ -82,7 +95,11 @@ class Sample(NamedTuple):
         return self.n_failed + self.n_unsettled
 
 
-def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
+Ends = tuple[ArrayLike, ArrayLike]
+"""Lower and upper end of the interval of each joint's load."""
+
+
+def sort_out(values: ArrayLike, status: ArrayLike, ends: Ends | None = None) -> Sample:
     """Split the simulated joints into valid (sorted ascending), failed and unsettled.
 
     Parameters
@@ -93,6 +110,8 @@ def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
         `tables.Status` of each joint. Pending joints are left out. Rows are simulated in order, so pending joints are
         the last rows and those being simulated, among which slow joints are over-represented. A value that is not
         finite counts as failed even if its status is valid.
+    ends : tuple of array_like, shape (n,), optional
+        Interval of each load; without it, and where an end is not finite, the load is exact.
 
     Returns
     -------
@@ -107,10 +126,19 @@ def sort_out(values: ArrayLike, status: ArrayLike) -> Sample:
     load, state = np.asarray(values, dtype=float), np.asarray(status)
     if load.ndim != 1 or load.shape != state.shape:
         raise ValueError(f"values {load.shape} and status {state.shape} must be of one length")
-    unsettled = np.isin(state, UNSETTLED)
-    valid = np.isin(state, VALID) & np.isfinite(load)
-    failed = ~valid & ~unsettled & (state != Status.PENDING)
-    return Sample(np.sort(load[valid]), int(failed.sum()), int(unsettled.sum()))
+    valid, failed, unsettled = split(load, state)
+    exact = np.sort(load[valid])
+    lower, upper = exact, exact
+    if ends is not None:
+        lower, upper = (np.sort(np.where(np.isfinite(end), end, load)[valid]) for end in ends)
+    return Sample(exact, lower, upper, int(failed.sum()), int(unsettled.sum()))
+
+
+def split(load: FloatArray, status: NDArray[np.integer]) -> tuple[Mask, Mask, Mask]:
+    """Which joints are valid, failed and unsettled, each (n,); pending joints are none of these."""
+    unsettled = np.isin(status, UNSETTLED)
+    valid = np.isin(status, VALID) & np.isfinite(load)
+    return valid, ~valid & ~unsettled & (status != Status.PENDING), unsettled
 
 
 def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
@@ -234,7 +262,7 @@ def at(
     level: float,
     confidence: float = 0.95,
     iid: bool = True,
-    ends: tuple[ArrayLike, ArrayLike] | None = None,
+    ends: Ends | None = None,
 ) -> Exceedance:
     """Share of the joints whose load is above one level.
 
@@ -276,7 +304,7 @@ def curve(
     levels: ArrayLike | None = None,
     confidence: float = 0.95,
     iid: bool = True,
-    ends: tuple[ArrayLike, ArrayLike] | None = None,
+    ends: Ends | None = None,
 ) -> NDArray[np.void]:
     """Share of the joints above each of many levels: the table of P(load > x).
 
@@ -287,8 +315,8 @@ def curve(
     levels : array_like, shape (m,), optional
         Levels in the unit of the values. By default every value that a valid joint has, ascending; between
         two of them the share does not change, so that the table is the whole step curve.
-    ends : tuple of array_like, shape (n,), optional
-        Interval of each load, lower and upper end; by default every load is exact.
+    ends
+        As in `sort_out`.
 
     Returns
     -------
@@ -301,13 +329,20 @@ def curve(
     ValueError
         As `sort_out` and `clopper_pearson`, or when a level is NaN.
     """
-    sample = sort_out(values, status)
+    return curve_of(sort_out(values, status, ends), levels, confidence, iid)
+
+
+def curve_of(
+    sample: Sample, levels: ArrayLike | None = None, confidence: float = 0.95, iid: bool = True
+) -> NDArray[np.void]:
+    """Share of the joints above each of many levels, from loads that are sorted already; see `curve`."""
     x = np.unique(sample.valid) if levels is None else np.atleast_1d(np.asarray(levels, dtype=float))
     if np.isnan(x).any():
         raise ValueError("a level is NaN")
     n_valid = sample.valid.size
-    count = n_valid - np.searchsorted(sample.valid, x, side="right")
-    least, most = (_count_above(end, values, status, x) for end in ends or (values, values))
+    count, least, most = (
+        n_valid - np.searchsorted(loads, x, side="right") for loads in (sample.valid, sample.lower, sample.upper)
+    )
     table = np.zeros(x.shape, CURVE)
     table["level"], table["count"] = x, count
     table["n"], table["n_failed"], table["n_unsettled"] = sample.n, sample.n_failed, sample.n_unsettled
@@ -321,10 +356,3 @@ def curve(
         table["outer_lower"] = clopper_pearson(least, sample.n, confidence)[0]
         table["outer_upper"] = clopper_pearson(most + sample.n_unresolved, sample.n, confidence)[1]
     return table
-
-
-def _count_above(ends: ArrayLike, values: ArrayLike, status: ArrayLike, levels: FloatArray) -> NDArray[np.intp]:
-    """Number of valid joints with an interval end above each level; the load itself where the end is not finite."""
-    own = np.where(np.isfinite(ends), ends, values)
-    valid = sort_out(np.where(np.isfinite(values), own, np.nan), status).valid
-    return valid.size - np.searchsorted(valid, levels, side="right")

@@ -175,10 +175,16 @@ def fit(
     TooThinError
         When fewer than `MIN_EXCESSES` joints are above the threshold.
     """
+    return of_sample(exceedance.sort_out(values, status), share, confidence, iid)
+
+
+def of_sample(
+    sample: exceedance.Sample, share: float | None = None, confidence: float = 0.95, iid: bool = True
+) -> Tail:
+    """Fit a tail to loads that are sorted already; other parameters and errors raised as in `fit`."""
     from scipy.special import xlog1py, xlogy
     from scipy.stats import chi2
 
-    sample = exceedance.sort_out(values, status)
     valid = sample.valid
     share = min(0.1, 3.0 / np.sqrt(max(valid.size, 1))) if share is None else share
     count = int(share * valid.size * (1 + 1e-12))
@@ -219,10 +225,11 @@ def stability(
     TooThinError
         When a share has fewer than `MIN_EXCESSES` joints.
     """
-    n = exceedance.sort_out(values, status).valid.size
+    sample = exceedance.sort_out(values, status)
+    n = sample.valid.size
     least = min(0.3, (MIN_EXCESSES + 1) / max(n, 1))
     asked = np.geomspace(0.3, least, 8) if shares is None else np.sort(np.atleast_1d(shares))[::-1]
-    return [fit(values, status, float(share), confidence, iid) for share in asked]
+    return [of_sample(sample, float(share), confidence, iid) for share in asked]
 
 
 def _likelihood(excesses: FloatArray, reach: float) -> tuple[FloatArray, FloatArray, FloatArray]:

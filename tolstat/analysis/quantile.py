@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis.exceedance import FloatArray, sort_out
+from tolstat.analysis.exceedance import FloatArray, Sample, sort_out
 
 
 class Quantile(NamedTuple):
@@ -73,9 +73,13 @@ def at(values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0
     >>> found.estimate, found.lower, found.upper
     (90.0, 84.0, 96.0)
     """
+    return of_sample(sort_out(values, status), share, confidence, iid)
+
+
+def of_sample(sample: Sample, share: float, confidence: float = 0.95, iid: bool = True) -> Quantile:
+    """Quantile of a load from loads that are sorted already; other parameters and errors raised as in `at`."""
     if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
         raise ValueError(f"share {share} and confidence {confidence} must lie between 0 and 1")
-    sample = sort_out(values, status)
     x, missing = sample.valid, sample.n_unresolved
     low, high = _interval_ranks(x.size, share, confidence) if iid else (0, 0)
     return Quantile(

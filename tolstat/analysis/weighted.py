@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaincinv
 
-from tolstat.analysis.exceedance import CURVE, Exceedance, FloatArray, Table, clopper_pearson
+from tolstat.analysis.exceedance import CURVE, Ends, Exceedance, FloatArray, Table, clopper_pearson, split
 from tolstat.analysis.quantile import Quantile
 from tolstat.analysis.reweight import smooth
-from tolstat.common.tables import UNSETTLED, VALID, Status
 
 LEAST_EFFECTIVE = 20.0
 """Minimum effective number of joints above a level for a trusted share."""
@@ -90,11 +89,23 @@ class _Sums(NamedTuple):
         return lower, upper
 
 
-class _Sample(NamedTuple):
-    """Loads of the valid joints, ascending, and their weights; weights of the unresolved joints."""
+class Sample(NamedTuple):
+    """One load of the simulated joints with their weights, sorted once; see `sort_out`.
+
+    Attributes
+    ----------
+    loads, weights : ndarray, shape (m,)
+        Loads of the valid joints, ascending, and their weights.
+    lower, upper : tuple of ndarray, shape (m,)
+        Ends of the intervals of these loads, ascending, and the weights in the same order.
+    failed, unsettled : ndarray
+        Weights of the joints without a valid load.
+    """
 
     loads: FloatArray
     weights: FloatArray
+    lower: tuple[FloatArray, FloatArray]
+    upper: tuple[FloatArray, FloatArray]
     failed: FloatArray
     unsettled: FloatArray
 
@@ -105,7 +116,7 @@ def curve(
     weights: ArrayLike,
     levels: ArrayLike | None = None,
     confidence: float = 0.95,
-    ends: tuple[ArrayLike, ArrayLike] | None = None,
+    ends: Ends | None = None,
 ) -> Table:
     """Share of the joints above each of many levels, see `exceedance.curve`.
 
@@ -126,7 +137,11 @@ def curve(
     ValueError
         When the shapes differ, a weight is negative or not finite, or a level is NaN.
     """
-    sample = _sort_out(values, status, weights)
+    return curve_of(sort_out(values, status, weights, ends), levels, confidence)
+
+
+def curve_of(sample: Sample, levels: ArrayLike | None = None, confidence: float = 0.95) -> Table:
+    """Share of the joints above each of many levels, from loads that are sorted already; see `curve`."""
     x = np.unique(sample.loads) if levels is None else np.atleast_1d(np.asarray(levels, dtype=float))
     if np.isnan(x).any():
         raise ValueError("a level is NaN")
@@ -136,11 +151,11 @@ def curve(
     table["level"], table["count"] = x, w.size - first
     table["n"], table["n_failed"], table["n_unsettled"] = w.size + lost.size, sample.failed.size, sample.unsettled.size
     valid, least, most = (
-        _Sums.at(*above, *rest)
-        for above, rest in (
-            ((first, w), (none, none)),
-            (_above(ends[0] if ends else values, values, status, weights, x), (lost, none)),
-            (_above(ends[1] if ends else values, values, status, weights, x), (none, lost)),
+        _Sums.at(np.searchsorted(loads, x, side="right"), own, *rest)
+        for (loads, own), rest in (
+            ((sample.loads, w), (none, none)),
+            (sample.lower, (lost, none)),
+            (sample.upper, (none, lost)),
         )
     )
     table["estimate"], (table["lower"], table["upper"]) = valid.share, valid.interval(confidence)
@@ -173,7 +188,11 @@ def at(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, c
 
 def trust(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float) -> Trust:
     """Diagnose whether the share above a level can be trusted; parameters as in `at`."""
-    sample = _sort_out(values, status, weights)
+    return trust_of(sort_out(values, status, weights), level)
+
+
+def trust_of(sample: Sample, level: float) -> Trust:
+    """Diagnose whether the share above a level can be trusted, from loads that are sorted already."""
     w = sample.weights[sample.loads > level]
     w = w[w > 0]
     effective = float(w.sum() ** 2 / (w**2).sum()) if w.size else 0.0
@@ -198,7 +217,11 @@ def quantile(
     Quantile
         As from `quantile.at`, which is for equal weights.
     """
-    sample = _sort_out(values, status, weights)
+    return quantile_of(sort_out(values, status, weights), share, confidence)
+
+
+def quantile_of(sample: Sample, share: float, confidence: float = 0.95) -> Quantile:
+    """Load that a share of the joints stays at or below, from loads that are sorted already; see `quantile`."""
     loads, below = sample.loads, np.cumsum(sample.weights)
     n_failed, n_unsettled = sample.failed.size, sample.unsettled.size
     lost = sample.failed.sum() + sample.unsettled.sum()
@@ -224,23 +247,26 @@ def quantile(
     return Quantile(*numbers, estimate, *ends, *bounds)
 
 
-def _above(
-    ends: ArrayLike, values: ArrayLike, status: ArrayLike, weights: ArrayLike, levels: FloatArray
-) -> tuple[NDArray[np.intp], FloatArray]:
-    """Sort the valid joints by an interval end of their loads: first index above each level, and sorted weights."""
-    own = np.where(np.isfinite(values), np.where(np.isfinite(ends), ends, values), np.nan)
-    sample = _sort_out(own, status, weights)
-    return np.searchsorted(sample.loads, levels, side="right"), sample.weights
+def sort_out(values: ArrayLike, status: ArrayLike, weights: ArrayLike, ends: Ends | None = None) -> Sample:
+    """Split the simulated joints into valid (sorted ascending), failed and unsettled, see `exceedance.sort_out`.
 
-
-def _sort_out(values: ArrayLike, status: ArrayLike, weights: ArrayLike) -> _Sample:
+    Raises
+    ------
+    ValueError
+        When the shapes differ, or a weight is negative or not finite.
+    """
     load, state, w = np.asarray(values, dtype=float), np.asarray(status), np.asarray(weights, dtype=float)
     if load.ndim != 1 or not load.shape == state.shape == w.shape:
         raise ValueError(f"values {load.shape}, status {state.shape} and weights {w.shape} must be of one length")
     if not (np.isfinite(w) & (w >= 0)).all():
         raise ValueError("a weight is negative or no number")
-    unsettled = np.isin(state, UNSETTLED)
-    valid = np.isin(state, VALID) & np.isfinite(load)
-    failed = ~valid & ~unsettled & (state != Status.PENDING)
-    order = np.argsort(load[valid], kind="stable")
-    return _Sample(load[valid][order], w[valid][order], w[failed], w[unsettled])
+    valid, failed, unsettled = split(load, state)
+    exact, lower, upper = (
+        _ascending(np.where(np.isfinite(end), end, load)[valid], w[valid]) for end in (load, *(ends or (load, load)))
+    )
+    return Sample(*exact, lower, upper, w[failed], w[unsettled])
+
+
+def _ascending(loads: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    order = np.argsort(loads, kind="stable")
+    return loads[order], weights[order]

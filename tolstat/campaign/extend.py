@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.campaign.recall import recall
-from tolstat.campaign.run import differing_keys
 from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Counts, ResultStore
 from tolstat.store.assembly import Differing, assemble, check_free
-from tolstat.store.reader import BLOCK
+from tolstat.store.recall import differing_keys, recall
+from tolstat.store.result_file import BLOCK
 
 if TYPE_CHECKING:
     from tolstat.study import Study

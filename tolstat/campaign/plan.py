@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import exceedance, quantile
 from tolstat.campaign.executors import available_workers
 from tolstat.campaign.run import choose_fidelity
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation
 from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, origin_blocks
@@ -21,7 +22,6 @@ from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store.histories import attach_scales, create_dataset
 from tolstat.store.recorded import perturbed, settings, variants
 from tolstat.store.result_file import attributes, fill
-from tolstat.store.view import ends, load
 from tolstat.study.selection import columns_of
 
 if TYPE_CHECKING:
@@ -222,7 +222,9 @@ def _width(share: float, n: int) -> float:
 def _limits(study: Study, results: NDArray[np.void]) -> list[LimitPlan]:
     plans = []
     for name, level in study.limits.items():
-        found = exceedance.at(load(results, name)[0], results["status"], level, CONFIDENCE, ends=ends(results, name))
+        found = exceedance.at(
+            LOADS[name].of(results), results["status"], level, CONFIDENCE, ends=LOADS[name].ends(results)
+        )
         valid = found.n - found.n_failed - found.n_unsettled
         nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))

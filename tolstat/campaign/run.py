@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from tolstat.common.tables import Status
 from tolstat.solver import fidelity, rainflow
 from tolstat.store import Counts, ResultStore
 from tolstat.store.provenance import versions
+from tolstat.store.recall import differing_keys
 from tolstat.store.recorded import perturbed, settings
 
 if TYPE_CHECKING:
@@ -150,22 +151,6 @@ def run(
         if next(pending(store, last), None) is not None:
             raise Interrupted(path, counts, stop.number)
         return counts
-
-
-def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
-    """Compare two identities of studies.
-
-    Returns
-    -------
-    list of str
-        ``"solver.steps_per_rev: 90 in the file, 180 in the study"`` for every key that differs.
-    """
-    lines = []
-    for key in sorted(held.keys() | wanted.keys()):
-        if key not in wanted or key not in held or held[key] != wanted[key]:
-            sides = (f"{side[key]!r}" if key in side else "nothing" for side in (held, wanted))
-            lines.append("{}: {} in the file, {} in the study".format(key, *sides))
-    return lines
 
 
 def _own_stages() -> Stages:

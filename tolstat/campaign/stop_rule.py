@@ -20,8 +20,7 @@ from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import LOADS
 from tolstat.store import ResultStore
-from tolstat.store.reader import BLOCK
-from tolstat.store.view import load
+from tolstat.store.result_file import BLOCK
 from tolstat.study import rule as rules
 
 if TYPE_CHECKING:
@@ -191,7 +190,7 @@ def _look(store: ResultStore, rule: Rule, rows: range, n_looks: int) -> Look:
     count = unresolved = 0
     for begin in range(rows.start, rows.stop, BLOCK):
         results = store.results(slice(begin, min(begin + BLOCK, rows.stop)))
-        part = exceedance.at(load(results, rule.load)[0], results["status"], rule.level, iid=False)
+        part = exceedance.at(LOADS[rule.load].of(results), results["status"], rule.level, iid=False)
         count += part.count
         unresolved += part.n_failed + part.n_unsettled
     return Look(len(rows), unresolved, count, *interval(count, unresolved, len(rows), n_looks))

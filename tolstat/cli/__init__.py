@@ -1,39 +1,17 @@
 """The command line: a file a command; what commands share is in `_app`. Help lists them in the order given here."""
 
-from tolstat.cli import (
-    allocate,
-    bench,
-    capability,
-    causes,
-    compare,
-    export,
-    extend,
-    fatigue,
-    merge,
-    multifidelity,
-    plan,
-    rare,
-    replay,
-    report,
-    reweight,
-    run,
-    simulate,
-    status,
-    time_above,
-    verify,
-    work_precision,
-    worst,
-)
+from importlib import import_module
+
+from tolstat import questions
 from tolstat.cli._app import app, main
 
-__all__ = ["app", "main"]
+__all__ = ["COMMANDS", "app", "main"]
 
 COMMANDS = (
-    *(simulate.simulate, plan.plan, run.run, extend.extend, merge.merge, status.status, verify.verify),
-    *(worst.worst, replay.replay, export.export, fatigue.fatigue, time_above.time_above, report.report),
-    *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate),
-    *(rare.rare, multifidelity.multifidelity),
-    *(work_precision.work_precision, bench.bench),
+    *("simulate", "plan", "run", "extend", "merge", "status", "verify", "replay", "export", "report"),
+    *questions.COMMANDS,
+    *("work_precision", "bench"),
 )
+"""Files of this package, each with a function of the same name; on the command line ``-`` stands for ``_``."""
 for command in COMMANDS:
-    app.command()(command)
+    app.command()(getattr(import_module(f"tolstat.cli.{command}"), command))

@@ -103,11 +103,11 @@ def _run_design(path: Path, points: int, groups: Groups, out: Path | None, worke
 
 
 def _against_angle(file: Path, by: str, n: int, log: bool, out: Path, joints: int, study_file: Path | None) -> None:
-    from tolstat.campaign.recall import recall
     from tolstat.common.files import check_target
     from tolstat.questions.causes import angles
     from tolstat.questions.causes import angles_figure as report
     from tolstat.store import ResultStore, revolutions
+    from tolstat.store.recall import recall
 
     picture = out.with_suffix(".png")
     for path in (out, picture):

@@ -102,9 +102,9 @@ def _plan(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
 
 
 def _recalled(source: Path, study_file: Path | None, given: list[Any]) -> Study:
-    from tolstat.campaign.recall import recall
     from tolstat.common.errors import StoreError
     from tolstat.store import ResultStore
+    from tolstat.store.recall import recall
 
     with ResultStore.open(source) as store:
         if store.sampling["method"] != "subset":

@@ -42,7 +42,7 @@ def _summary(store: ResultStore) -> dict[str, Any]:
 
     from tolstat.common.tables import Status
     from tolstat.store import view
-    from tolstat.store.reader import BLOCK
+    from tolstat.store.result_file import BLOCK
 
     states = np.full(store.n, Status.PENDING, np.uint8)
     loads, units, damaged = {name: np.zeros(store.n) for name in store.limits}, {}, 0

@@ -43,6 +43,11 @@ class Load(NamedTuple):
         """Values of the joints in a table RESULT, (n,), SI."""
         return of_kind(results, self.kind)[:, self.element]
 
+    def ends(self, results: NDArray[np.void]) -> tuple[FloatArray, FloatArray]:
+        """Interval of the load in each joint, (n,) each, SI: the load itself unless the joint is stationary."""
+        values = self.of(results)
+        return values * results[f"{self.kind}_lower"], values * results[f"{self.kind}_upper"]
+
 
 def of_kind(results: NDArray[np.void], kind: str) -> FloatArray:
     """All loads of a kind, (n, m), SI: of a pin's contact forces the largest."""

@@ -1,1 +1,109 @@
-"""Questions to a result file, one folder per question."""
+"""Registry of the questions that a result file answers: a folder each, whose query takes a `store.view.View`.
+
+Commands, public names, sections of the page and keys of the JSON summary come from here, in this order. What it names
+is imported when it is first used. A folder has `query.py` (computes), `rendering.py` (text, tables, figures) and, where
+the page shows the question, `section.py` with ``sections(view, asked)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from tolstat.display.asked import Asked
+    from tolstat.display.blocks import Section
+    from tolstat.questions.allocate.query import allocated as allocated
+    from tolstat.questions.causes.angles import against_angle as against_angle
+    from tolstat.questions.causes.query import causes_of as causes_of
+    from tolstat.questions.causes.tail import worst_joints as worst_joints
+    from tolstat.questions.compare.query import compared as compared
+    from tolstat.questions.fatigue.pylife import pylife_series as pylife_series
+    from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
+    from tolstat.questions.fatigue.query import load_cycles as load_cycles
+    from tolstat.questions.multifidelity.query import two_fidelities as two_fidelities
+    from tolstat.questions.rare.query import rare_event as rare_event
+    from tolstat.questions.reweight.query import reweighted as reweighted
+    from tolstat.questions.time_above.query import time_above as time_above
+    from tolstat.store.view import View
+
+
+class Question(NamedTuple):
+    """One folder of this package.
+
+    Attributes
+    ----------
+    name : str
+        The folder.
+    commands : tuple of str
+        Files of the package `cli` that ask it, each with a function of the same name.
+    public : tuple of str
+        ``module.function`` in the folder that `tolstat` offers under the function's name.
+    section : bool
+        Whether the page shows it: ``section.sections(view, asked)``.
+    summary : bool
+        Whether the JSON of all statistics has it: ``query.summary(view, confidence)``.
+    """
+
+    name: str
+    commands: tuple[str, ...] = ()
+    public: tuple[str, ...] = ()
+    section: bool = False
+    summary: bool = False
+
+
+QUESTIONS = (
+    Question("exceedance", section=True, summary=True),
+    Question("capability", ("capability",), section=True, summary=True),
+    Question(
+        "causes",
+        ("worst", "causes"),
+        ("query.causes_of", "angles.against_angle", "tail.worst_joints"),
+        section=True,
+    ),
+    Question(
+        "fatigue",
+        ("fatigue",),
+        ("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"),
+        section=True,
+    ),
+    Question("accuracy", section=True, summary=True),
+    Question("joints", section=True),
+    Question("time_above", ("time_above",), ("query.time_above",)),
+    Question("reweight", ("reweight",), ("query.reweighted",)),
+    Question("allocate", ("allocate",), ("query.allocated",)),
+    Question("compare", ("compare",), ("query.compared",)),
+    Question("rare", ("rare",), ("query.rare_event",)),
+    Question("multifidelity", ("multifidelity",), ("query.two_fidelities",)),
+)
+
+COMMANDS = tuple(command for question in QUESTIONS for command in question.commands)
+"""Files of the package `cli`."""
+PUBLIC = {
+    place.rpartition(".")[2]: f"tolstat.questions.{question.name}.{place.rpartition('.')[0]}"
+    for question in QUESTIONS
+    for place in question.public
+}
+"""Public names, and the modules that they come from."""
+
+
+def sections(view: View, asked: Asked) -> list[Section]:
+    """Sections of the page, in the order of `QUESTIONS`; questions that the file cannot answer have none."""
+    parts = (made(view, asked) for made in _found("section", "sections"))
+    return [section for part in parts for section in part]
+
+
+def summary(view: View, confidence: float) -> dict[str, Any]:
+    """JSON values of all questions that have a summary, by key."""
+    found: dict[str, Any] = {}
+    for made in _found("summary", "summary", "query"):
+        found |= made(view, confidence)
+    return found
+
+
+def _found(having: str, function: str, module: str = "") -> Iterator[Callable[..., Any]]:
+    for question in QUESTIONS:
+        if getattr(question, having):
+            home = import_module(f"tolstat.questions.{question.name}.{module or having}")
+            yield getattr(home, function)

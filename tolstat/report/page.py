@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import exceedance, overrepresentation
-from tolstat.campaign.recall import recall
 from tolstat.campaign.remedy import remedy
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, StoreError, TolstatError
@@ -35,6 +34,7 @@ from tolstat.solver import fidelity
 from tolstat.store import ResultStore, revolutions, view
 from tolstat.store.integrity import DIGEST
 from tolstat.store.reader import BLOCK
+from tolstat.store.recall import recall
 from tolstat.store.view import Campaign, load
 from tolstat.study import Study
 from tolstat.study.tolerances.distributions import score

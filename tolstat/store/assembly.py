@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from tolstat.common.files import atomic_write
 from tolstat.common.tables import Status
 from tolstat.store.histories import HISTORY_BYTES, HistoryParts, attach_scales, create_dataset, rows_per_chunk
-from tolstat.store.reader import BLOCK, Reader, parts_folder
-from tolstat.store.result_file import campaign_digest, fault, fill
+from tolstat.store.reader import Reader, parts_folder
+from tolstat.store.result_file import BLOCK, campaign_digest, fault, fill
 
 
 class Differing(Exception):

@@ -20,14 +20,11 @@ from tolstat.store import checks, integrity
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
 from tolstat.store.histories import HistoryParts
-from tolstat.store.result_file import campaign_digest, descriptions, fault, is_locked, open_hdf5, text
+from tolstat.store.result_file import BLOCK, campaign_digest, descriptions, fault, is_locked, open_hdf5, text
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
-
-BLOCK = 1 << 16
-"""Rows read at a time, so that a large campaign can be resumed without loading whole tables."""
 
 
 class Session(NamedTuple):
@@ -81,6 +78,11 @@ class Reader:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+    @property
+    def first_sample(self) -> int:
+        """File slot of the first random joint: 1 if slot 0 holds the nominal joint, else 0."""
+        return int(bool(self.sampling["nominal_first"]) and self.rows.start == 0)
 
     @property
     def complete(self) -> bool:

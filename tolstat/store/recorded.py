@@ -13,15 +13,15 @@ from tolstat.common.strict import validate
 from tolstat.common.tables import PARAM, Options
 from tolstat.joint import Joint, perturb, varied
 from tolstat.solver import fidelity
-from tolstat.store import ResultStore
 from tolstat.study.design import nested
 from tolstat.study.model import Solver
 
 if TYPE_CHECKING:
+    from tolstat.store.reader import Reader
     from tolstat.study import Study
 
 
-def joint_of(store: ResultStore, row: int) -> Joint:
+def joint_of(store: Reader, row: int) -> Joint:
     """Nominal joint of file slot `row`: the study's, or that of the slot's variant.
 
     Raises
@@ -33,7 +33,7 @@ def joint_of(store: ResultStore, row: int) -> Joint:
     return varied(nominal, _values(store, row))
 
 
-def options_of(store: ResultStore, row: int) -> Options:
+def options_of(store: Reader, row: int) -> Options:
     """Solver options of file slot `row`: the study's, its variant's, or those of its last retry.
 
     Raises
@@ -63,7 +63,7 @@ def settings(solver: Solver, choice: dict[str, Any]) -> Options:
     return fidelity.apply(options, choice) if solver.fidelity == "auto" else options
 
 
-def parameters(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[np.void]:
+def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
     """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
     params = np.empty(len(rows), PARAM)
     for i, row in enumerate(rows.tolist()):
@@ -88,6 +88,6 @@ def variants(study: Study, rows: NDArray[np.intp]) -> NDArray[np.integer]:
     return study.design["variant"][rows] if len(study.joints) > 1 else np.zeros(len(rows), np.intp)
 
 
-def _values(store: ResultStore, row: int) -> dict[str, Any]:
+def _values(store: Reader, row: int) -> dict[str, Any]:
     """Values that define the variant of file slot `row`; empty if the study lists no variants."""
     return store.variants[store.design()["variant"][row]].values if store.case_names else {}

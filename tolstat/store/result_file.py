@@ -35,7 +35,7 @@ LONGEST_FIXED = 32_000
 OVERHEAD = 800
 """Bytes that HDF5 needs per column beside its values."""
 BLOCK = 1 << 16
-"""Rows of the dimension scale ``row`` written at a time."""
+"""Rows read or written at a time, so that no table of a large campaign need be in memory."""
 
 
 def campaign_digest(file: h5py.File) -> str:

@@ -42,6 +42,7 @@ from tolstat.store.result_file import (
     size_of_new,
     text,
 )
+from tolstat.store.view import View
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -84,6 +85,16 @@ class ResultStore(Reader):
     history_specs : dict of str to HistorySpec
         Histories that the campaign keeps; empty if none.
     """
+
+    def view(self, study_path: Path | None = None) -> View:
+        """View of the file that questions read, while the file is open.
+
+        Parameters
+        ----------
+        study_path : Path, optional
+            Study file to read if the text in the result file can no longer be read.
+        """
+        return View(self, study_path)
 
     @classmethod
     def create(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from tolstat.common.errors import Fault, StoreError
 from tolstat.joint import perturb
 from tolstat.solver.simulation import restore, simulate_rows, warm_up
-from tolstat.store import ResultStore
 from tolstat.store.recorded import joint_of, options_of
+
+if TYPE_CHECKING:
+    from tolstat.store.reader import Reader
 
 AGAIN = "simulated again"
 ANGLES = 60
@@ -52,7 +54,7 @@ class Revolutions(NamedTuple):
     apart: float
 
 
-def held(store: ResultStore) -> str:
+def held(store: Reader) -> str:
     """Kind of histories that a file holds, ``"stored"`` or ``"harmonics"``; empty if it holds no loads."""
     return (
         "stored"
@@ -63,7 +65,7 @@ def held(store: ResultStore) -> str:
     )
 
 
-def read(store: ResultStore, rows: NDArray[np.intp], most_angles: int = ANGLES) -> Revolutions:
+def read(store: Reader, rows: NDArray[np.intp], most_angles: int = ANGLES) -> Revolutions:
     """Return the loads of joints over the input angle.
 
     Parameters
@@ -105,7 +107,7 @@ def read(store: ResultStore, rows: NDArray[np.intp], most_angles: int = ANGLES) 
     return Revolutions(rows, angles, moduli[0], moduli[1], origin, apart)
 
 
-def loads(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[Any]:
+def loads(store: Reader, rows: NDArray[np.intp]) -> NDArray[Any]:
     """Bushing loads of joints over a revolution.
 
     Parameters
@@ -134,7 +136,7 @@ def loads(store: ResultStore, rows: NDArray[np.intp]) -> NDArray[Any]:
     return np.moveaxis(restore(real, imag, int(store.options["steps_per_rev"])), 0, 1)
 
 
-def _again(store: ResultStore, rows: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
+def _again(store: Reader, rows: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
     """Simulate joints again: their loads, (m, samples, 8, 6), and `Revolutions.apart`."""
     params = perturb(joint_of(store, int(rows[0])), _pick(store.errors, rows))
     attempts = _pick(store.attempt, rows)

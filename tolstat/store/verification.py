@@ -14,6 +14,7 @@ from tolstat.common.columns import Column
 from tolstat.store.result_file import create_table, put_attributes, text
 
 if TYPE_CHECKING:
+    from tolstat.store.reader import Reader
     from tolstat.store.result_store import ResultStore
 
 GROUP = "verify"
@@ -58,7 +59,7 @@ class Verification(NamedTuple):
     checks: dict[str, Check]
 
 
-def read(store: ResultStore) -> Verification | None:
+def read(store: Reader) -> Verification | None:
     """Read the verification from a result file; None if it holds none."""
     file = store._file
     if GROUP not in file:
@@ -73,7 +74,7 @@ def read(store: ResultStore) -> Verification | None:
             c.of(table)[:] = group[name][c.name][:]
         attrs = group[name].attrs
         checks[name] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
-    base = np.concatenate([store.results(slice(row, row + 1)) for row in rows.tolist()])
+    base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in rows.tolist()])
     return Verification(int(group.attrs["seed"]), rows, base, checks)
 
 

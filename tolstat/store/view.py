@@ -1,33 +1,33 @@
-"""View of a result file for reports: joints of the statistics, nominal joint, limits, swept errors."""
+"""View of a result file for questions: study, errors, loads by name, weights, limits; each part is read once."""
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import exceedance, quantile, weighted
-from tolstat.analysis.exceedance import Exceedance
-from tolstat.analysis.quantile import Quantile
+from tolstat.analysis import accuracy
 from tolstat.common import selected_results
-from tolstat.common.columns import RESULT_COLUMNS, Column
 from tolstat.common.draw_records import check_equal_weights
-from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import BUSHING_LOADS, LOADS
-from tolstat.common.tables import ERROR_FIELDS, VALID, Status
-from tolstat.store import Counts, verification
-from tolstat.store.reader import BLOCK
+from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS
+from tolstat.common.strict import did_you_mean
+from tolstat.common.tables import ERROR, FAILED, RESULT, UNSETTLED, VALID, Status
+from tolstat.store import verification
+from tolstat.store.counts import Counts
+from tolstat.store.recall import recall
+from tolstat.store.result_file import BLOCK
+from tolstat.store.sample_load import FloatArray, SampleLoad
 from tolstat.store.verification import Verification
 
 if TYPE_CHECKING:
-    from tolstat.store import ResultStore
+    from tolstat.store.reader import Reader
+    from tolstat.study import Study
 
-FloatArray = NDArray[np.float64]
 METHODS = {
     "random": "random sampling",
     "sobol": "Sobol' points",
@@ -36,298 +36,299 @@ METHODS = {
     "importance": "importance sampling",
     "pick_freeze": "pick-freeze design",
 }
-_ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}
-_DISPLAY = {
-    "m": ("mm", 1e3),
-    "rad": ("deg", 180.0 / np.pi),
-    "rad/s": ("rpm", 30.0 / np.pi),
-    "N*m": ("N m", 1.0),
-    "1": ("", 1.0),
-}
+DRAWN = ("random", "sobol", "lhs")
+"""Sampling methods that draw every joint from the tolerances, all with the same weight."""
+KEPT_ROWS = 12
+"""Number of joints without a valid load whose complete results are kept."""
 
 
-class Axis(NamedTuple):
-    """One independently swept quantity.
+class _Tables(NamedTuple):
+    """What one pass over the results keeps.
 
     Attributes
     ----------
-    label : str
-        The study's pattern, such as ``pin*.diameter``, or the error's name.
-    unit : str
-        Display unit, such as ``mm``.
-    values : ndarray, shape (n,)
-        Value at each joint, in `unit`.
-    """
-
-    label: str
-    unit: str
-    values: FloatArray
-
-
-Ends = tuple[FloatArray, FloatArray]
-"""Lower and upper end of the interval of each joint's largest load."""
-
-
-@dataclass(frozen=True)
-class Campaign:
-    """A campaign for reports; row i of `errors` and row i of `results` are the same joint.
-
-    Attributes
-    ----------
-    name : str
-        Name of the study.
-    method : str
-        Sampling method, a key of `METHODS`.
-    limits : mapping of str to float
-        Allowed load in SI units by name (``"cross1.F"``).
-    errors, results : ndarray of ERROR and RESULT, shape (n,)
-        All joints in the file except the nominal joint.
+    results : ndarray, shape (n,)
+        Fields `LOAD_FIELDS` of the samples.
     nominal : ndarray of RESULT, shape (1,) or (0,)
         The nominal joint, if the file has one and its results are valid.
-    patterns : tuple of str
-        Key paths of what the study sweeps; empty without a sweep.
-    verification : Verification, optional
-        The verification that the file holds, if any.
-    columns : tuple of Column
-        Columns of the results that the study keeps; the others are NaN.
-    weights : ndarray, shape (n,), optional
-        Weight of each joint, if joints were not drawn from the tolerances alone.
+    without_load : ndarray of RESULT, shape (m,)
+        The first `KEPT_ROWS` joints that failed or did not settle.
+    mode_share : ndarray, shape (4, 4)
+        Weighted mean over the valid joints; NaN if none is valid or the study does not keep it.
     """
 
-    name: str
-    method: str
-    limits: Mapping[str, float]
-    errors: NDArray[np.void]
     results: NDArray[np.void]
     nominal: NDArray[np.void]
-    patterns: tuple[str, ...] = ()
-    verification: Verification | None = None
-    columns: tuple[Column, ...] = RESULT_COLUMNS
-    weights: FloatArray | None = None
+    without_load: NDArray[np.void]
+    mode_share: FloatArray
 
-    def curve(
-        self, values: FloatArray, levels: ArrayLike | None, confidence: float, ends: Ends | None = None
-    ) -> NDArray[np.void]:
-        """Share of the joints above each level, see `exceedance.curve`; weighted by `weights` if any."""
-        status = self.results["status"]
-        if self.weights is None:
-            return exceedance.curve(values, status, levels, confidence, self.iid, ends)
-        return weighted.curve(values, status, self.weights, levels, confidence, ends)
 
-    def above(self, values: FloatArray, level: float, confidence: float, ends: Ends | None = None) -> Exceedance:
-        """Share of the joints above one level; see `curve`."""
-        return Exceedance(*self.curve(values, [level], confidence, ends)[0].tolist())
+class View:
+    """A result file as questions read it. Sample i is row i of every table; the nominal joint is apart.
 
-    def quantile(self, values: FloatArray, share: float, confidence: float) -> Quantile:
-        """Load that a share of the joints stays at or below, see `quantile.at`; weighted by `weights` if any."""
-        status = self.results["status"]
-        if self.weights is None:
-            return quantile.at(values, status, share, confidence, self.iid)
-        return weighted.quantile(values, status, self.weights, share, confidence)
+    Each part is read and checked when it is first used, and kept. Tables of errors are kept for the first `BLOCK`
+    samples; those of larger campaigns are read in blocks.
 
-    def done(self) -> Campaign:
-        """Return the campaign without its pending joints."""
-        here = self.results["status"] != Status.PENDING
-        if here.all():
-            return self  # avoids a copy of large tables
-        weights = None if self.weights is None else self.weights[here]
-        return replace(self, errors=self.errors[here], results=self.results[here], weights=weights)
+    Attributes
+    ----------
+    store : Reader
+        The open file.
+    name, method : str
+        Name of the study, and its sampling method.
+    limits : dict of str to float
+        Allowed load in SI units by name (``"cross1.F"``).
+    columns : tuple of Column
+        Columns of the results that the study keeps; the others are NaN.
+    n : int
+        Number of samples.
+    """
+
+    def __init__(self, store: Reader, study_path: Path | None = None) -> None:
+        self.store = store
+        self.path = store.path
+        self.name = store.study_name
+        self.method = str(store.sampling["method"])
+        self.limits = store.limits
+        self.columns = store.columns
+        self.n = store.n - store.first_sample
+        self._study_path = study_path
+        self._loads: dict[str, SampleLoad] = {}
+
+    @cached_property
+    def study(self) -> Study:
+        """The study that the file was made from, with its distributions; see `recall` for exceptions."""
+        return recall(self.store, path=self._study_path)
+
+    @cached_property
+    def verification(self) -> Verification | None:
+        """The verification that the file holds, if any."""
+        return verification.read(self.store)
+
+    @cached_property
+    def numerical_error(self) -> dict[str, float]:
+        """Numerical error that 95 % of the joints stay below, by kind of load; empty without a verification."""
+        if self.verification is None:
+            return {}
+        checks = {name: check.results for name, check in self.verification.checks.items()}
+        return accuracy.usual(self.verification.base, checks)
+
+    @cached_property
+    def weights(self) -> FloatArray | None:
+        """Weight of each joint, (n,), if joints were not drawn from the tolerances alone."""
+        if self.method != "importance":
+            return None
+        return np.asarray(self.store.origin()["weight"][self.store.first_sample :])
 
     @property
-    def drawn(self) -> tuple[str, ...]:
+    def results(self) -> NDArray[np.void]:
+        """Fields `LOAD_FIELDS` of the results, (n,)."""
+        return self._tables.results
+
+    @property
+    def status(self) -> NDArray[np.uint8]:
+        """Status of the joints, (n,)."""
+        return np.asarray(self.results["status"])
+
+    @property
+    def nominal(self) -> NDArray[np.void]:
+        """The nominal joint, RESULT (1,); (0,) if the file has none or its results are not valid."""
+        return self._tables.nominal
+
+    @property
+    def without_load(self) -> NDArray[np.void]:
+        """Complete results of the first `KEPT_ROWS` joints that failed or did not settle, RESULT (m,)."""
+        return self._tables.without_load
+
+    @property
+    def mode_share(self) -> FloatArray:
+        """Mean share of the revolution by pin and contact mode, (4, 4), over the valid joints; NaN if not kept."""
+        return self._tables.mode_share
+
+    @cached_property
+    def _tables(self) -> _Tables:
+        check_equal_weights(self.store.sampling, self.path, weighted=True)
+        skip, store = self.store.first_sample, self.store
+        nominal = np.empty(0, RESULT)
+        results = np.empty(self.n, [(name, RESULT[name]) for name in LOAD_FIELDS])
+        kept, total, shares = [np.empty(0, RESULT)], 0.0, np.zeros((4, 4))
+        for first in range(0, store.n, BLOCK):
+            block = store.results(slice(first, first + BLOCK))
+            if first == 0 and skip:
+                nominal, block = block[:1][np.isin(block["status"][:1], VALID)].copy(), block[1:]
+            begin = max(0, first - skip)
+            for name in LOAD_FIELDS:
+                results[name][begin : begin + len(block)] = block[name]
+            if sum(map(len, kept)) < KEPT_ROWS:
+                kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:KEPT_ROWS])
+            valid = np.isin(block["status"], VALID)
+            weight = np.ones(len(block)) if self.weights is None else self.weights[begin : begin + len(block)]
+            shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
+            total += float(weight[valid].sum())
+        mean = shares / total if total else np.full((4, 4), np.nan)
+        return _Tables(results, nominal, np.concatenate(kept)[:KEPT_ROWS], mean)
+
+    def load(self, name: str) -> SampleLoad:
+        """Largest load over the revolution of every joint, by its name.
+
+        Raises
+        ------
+        InputError
+            When there is no such load, or the study does not keep it.
+        """
+        if name not in self._loads:
+            if name not in LOADS:
+                raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
+            if not selected_results.holds(self.columns, name):
+                found = f"is not kept in {self.path}, see [output] results of its study"
+                raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
+            load, table = LOADS[name], self.results
+            nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
+            values = load.of(table)
+            self._loads[name] = SampleLoad(
+                name, load.unit, self.limits.get(name), nominal, values, load.ends(table), self.status, self.weights,
+                self.iid,
+            )  # fmt: skip
+        return self._loads[name]
+
+    def loads(self, names: Sequence[str]) -> list[SampleLoad]:
+        """Several loads; see `load`."""
+        return [self.load(name) for name in names]
+
+    @property
+    def kept_loads(self) -> tuple[str, ...]:
+        """Loads that the study keeps."""
+        return tuple(name for name in LOADS if selected_results.holds(self.columns, name))
+
+    @property
+    def bushing_loads(self) -> tuple[str, ...]:
         """Loads of `loads.BUSHING_LOADS` that the study keeps."""
-        return tuple(name for name in BUSHING_LOADS if selected_results.holds(self.columns, name))
+        return tuple(name for name in BUSHING_LOADS if name in self.kept_loads)
 
     @property
-    def listed(self) -> tuple[str, ...]:
-        """Loads that tables show: those of `drawn` or, if there are none, all others that the study keeps."""
-        return self.drawn or tuple(name for name in LOADS if selected_results.holds(self.columns, name))
+    def shown_loads(self) -> tuple[str, ...]:
+        """Loads that tables show: the bushing loads or, if the study keeps none, all others that it keeps."""
+        return self.bushing_loads or self.kept_loads
+
+    @cached_property
+    def leading(self) -> tuple[str, ...]:
+        """Leading load of each kind (force, torque, ...).
+
+        Candidates are the loads with limits or, without limits, all bushing loads kept. The leading load is the one
+        whose limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the limit
+        (without limits by the 99 % quantile).
+        """
+        found: dict[str, tuple[tuple[float, float], str]] = {}
+        for load in self.loads(list(self.limits) or self.bushing_loads):
+            if load.valid.size:
+                limit = 1.0 if load.limit is None else load.limit
+                share = 0.0 if load.limit is None else load.above(limit).estimate
+                rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
+                kind = load.name.rpartition(".")[2]
+                found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
+        return tuple(name for _, name in found.values())
 
     @property
     def iid(self) -> bool:
         """Whether the joints are independent samples."""
         return self.method in ("random", "importance")
 
+    @property
+    def sampled(self) -> bool:
+        """Whether the joints are a sample of a production, not a grid or a design."""
+        return self.method in (*DRAWN, "importance")
+
+    @property
+    def weighted(self) -> bool:
+        """Whether joints have different weights."""
+        return self.method == "importance"
+
+    def check_sample(self, weighted: bool = True) -> None:
+        """Refuse a file whose joints are no sample of a production, or (unless `weighted`) differ in weight.
+
+        Raises
+        ------
+        StoreError
+            The hint names what can be used.
+        """
+        check_equal_weights(self.store.sampling, self.path, weighted)
+        if self.method in ("cases", "sweep"):
+            remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+            raise StoreError(str(Fault(str(self.path), "holds joints that are no sample of a production", remedy)))
+
+    def check_drawn(self) -> None:
+        """Refuse a file whose joints were not drawn from tolerances.
+
+        Raises
+        ------
+        StoreError
+            The hint names what can be used.
+        """
+        if not self.study.tolerances:
+            remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+            raise StoreError(str(Fault(str(self.path), "holds joints that are not drawn from tolerances", remedy)))
+
+    def rows(self, samples: ArrayLike) -> NDArray[np.intp]:
+        """Rows of the campaign of samples."""
+        return self.store.rows.start + self.slots(samples)
+
+    def slots(self, samples: ArrayLike) -> NDArray[np.intp]:
+        """File slots of samples."""
+        return np.asarray(samples, dtype=np.intp) + self.store.first_sample
+
+    def errors(self, samples: NDArray[np.intp], columns: Sequence[str] | None = None) -> NDArray[np.void]:
+        """Errors of samples, given in ascending order, (m,) table ERROR.
+
+        Parameters
+        ----------
+        samples : ndarray of int, shape (m,)
+            Samples.
+        columns : sequence of str, optional
+            Columns to read of samples beyond the first `BLOCK`; all without it. The result has at least these.
+        """
+        if not samples.size or samples[-1] < len(self._first_errors):
+            return self._first_errors[samples]
+        names = ERROR.names if columns is None else columns
+        found = np.empty(len(samples), [(name, ERROR[name]) for name in names])
+        for first in range(0, self.n, BLOCK):
+            here = np.flatnonzero((samples >= first) & (samples < first + BLOCK))
+            if here.size:
+                # a few joints are read one by one, many with their block
+                begin, end = int(samples[here[0]]), int(samples[here[-1]]) + 1
+                block = self._errors(begin, end, names)
+                for name in names:
+                    found[name][here] = block[name][samples[here] - begin]
+        return found
+
+    def error_blocks(self, columns: Sequence[str]) -> Iterator[NDArray[np.void]]:
+        """Yield the errors of all samples in consecutive blocks, with at least these columns."""
+        yield self._first_errors
+        for first in range(len(self._first_errors), self.n, BLOCK):
+            yield self._errors(first, min(first + BLOCK, self.n), columns)
+
+    @cached_property
+    def _first_errors(self) -> NDArray[np.void]:
+        return self._errors(0, min(BLOCK, self.n), None)
+
+    def _errors(self, first: int, last: int, columns: Sequence[str] | None) -> NDArray[np.void]:
+        skip = self.store.first_sample
+        return self.store.errors(slice(first + skip, last + skip), columns)
+
+    @cached_property
+    def counts(self) -> Counts:
+        """Numbers of samples by status."""
+        return Counts.of(self.status)
+
     def count(self, *states: Status) -> int:
-        """Number of joints in any of the given states."""
-        return int(np.isin(self.results["status"], [int(state) for state in states]).sum())
+        """Number of samples in any of the given states."""
+        return int(np.isin(self.status, [int(state) for state in states]).sum())
 
     def head(self) -> str:
         """Sentence with the number of joints and of those without a valid result."""
-        counts = Counts.of(self.results["status"])
-        pending = counts.total - counts.done
-        text = f"{counts.done} joints ({METHODS.get(self.method, self.method)}), {counts.shortfall}"
+        pending = self.counts.total - self.counts.done
+        text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)}), {self.counts.shortfall}"
         return text + (f", {pending} still pending" if pending else "")
 
     def missing(self) -> str:
         """Sentence that names the bushing loads that the study does not keep; empty if it keeps all."""
-        names = [name for name in BUSHING_LOADS if name not in self.drawn]
+        names = [name for name in BUSHING_LOADS if name not in self.bushing_loads]
         return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
-
-
-def read(
-    store: ResultStore,
-    fields: Sequence[str] | None = None,
-    errors_of: Sequence[str] | None = None,
-    weighted: bool = False,
-) -> Campaign:
-    """Read what a report needs from a result file; row 0 is separated if it is the nominal joint.
-
-    Parameters
-    ----------
-    store : ResultStore
-        The file.
-    fields : sequence of str, optional
-        Fields of the results to load, including ``status``, such as `loads.LOAD_FIELDS`; all without it. The complete
-        tables of a million joints take 1.2 GB.
-    errors_of : sequence of str, optional
-        Columns of the errors to load; all without it.
-    weighted : bool
-        Whether the caller uses `Campaign.weights`; unweighted statistics would be wrong for joints that were not
-        drawn from the tolerances alone.
-
-    Returns
-    -------
-    Campaign
-        With tables of these fields.
-
-    Raises
-    ------
-    StoreError
-        When the joints have weights that the caller does not use, or belong to a subset simulation.
-    """
-    check_equal_weights(store.sampling, store.path, weighted)
-    errors, results = store.errors(fields=errors_of), store.results(fields=fields)
-    nominal, weights = results[:0], store.origin()["weight"] if store.sampling["method"] == "importance" else None
-    if store.sampling["nominal_first"] and store.rows.start == 0:
-        nominal = results[:1][np.isin(results["status"][:1], VALID)]
-        errors, results = errors[1:], results[1:]
-        weights = None if weights is None else weights[1:]
-    method = str(store.sampling["method"])
-    return Campaign(
-        store.study_name,
-        method,
-        store.limits,
-        errors,
-        results,
-        nominal,
-        patterns(store.study_text),
-        verification.read(store),
-        store.columns,
-        weights,
-    )
-
-
-def patterns(text: str) -> tuple[str, ...]:
-    """Key paths of what a study, given as TOML, sweeps; empty without a sweep."""
-    return tuple(_patterns(tomllib.loads(text).get("sweep", {})))
-
-
-def error_blocks(store: ResultStore, columns: Sequence[str]) -> Iterator[NDArray[np.void]]:
-    """Yield the errors of the joints that `read` returns, without the nominal joint, in consecutive blocks.
-
-    Parameters
-    ----------
-    store : ResultStore
-        The file.
-    columns : sequence of str
-        Columns of the errors to load.
-    """
-    begin = int(store.sampling["nominal_first"] and store.rows.start == 0)
-    for first in range(begin, store.n, BLOCK):
-        yield store.errors(slice(first, first + BLOCK), columns)
-
-
-def errors_at(store: ResultStore, columns: Sequence[str], samples: NDArray[np.intp]) -> NDArray[np.void]:
-    """Errors of selected joints, by their ascending indices among the joints of `read`; see `error_blocks`."""
-    parts, first = [], 0
-    for block in error_blocks(store, columns):
-        parts.append(block[samples[(samples >= first) & (samples < first + len(block))] - first])
-        first += len(block)
-    return np.concatenate(parts)
-
-
-def _patterns(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
-    """Key paths of the entries of ``[sweep]``, whether quoted or dotted."""
-    for key, value in table.items():
-        if isinstance(value, Mapping) and "from" not in value:
-            yield from _patterns(value, f"{before}{key}.")
-        else:
-            yield f"{before}{key}"
-
-
-def load(results: NDArray[np.void], name: str) -> tuple[FloatArray, str]:
-    """Largest load over the last revolution, by its name.
-
-    Parameters
-    ----------
-    results : ndarray of RESULT, shape (n,)
-        Results of the joints.
-    name : str
-        ``cross1.F``, ``fork3.T``, ``pin1.contact`` or ``psi``.
-
-    Returns
-    -------
-    values : ndarray, shape (n,)
-        The load of each joint, SI.
-    unit : str
-        ``N``, ``N*m`` or ``1``.
-
-    Raises
-    ------
-    InputError
-        When there is no such load.
-    """
-    if name not in LOADS:
-        raise InputError([Fault(f"limits.{name}", "is not a load", "name cross1.F .. fork4.T, pin1.contact or psi")])
-    return LOADS[name].of(results), LOADS[name].unit
-
-
-def ends(results: NDArray[np.void], name: str) -> Ends:
-    """Interval of the largest load of each joint; both ends are the load itself unless the joint is stationary.
-
-    Returns
-    -------
-    lower, upper : ndarray, shape (n,)
-        SI; NaN for joints without results.
-    """
-    values, _ = load(results, name)
-    kind = LOADS[name].kind
-    return values * results[f"{kind}_lower"], values * results[f"{kind}_upper"]
-
-
-def swept_axes(campaign: Campaign) -> list[Axis]:
-    """Quantities that a sweep varies, in the study's order.
-
-    Errors with equal values in every joint are swept together and form one axis.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        A campaign with the sampling method ``sweep``.
-
-    Returns
-    -------
-    list of Axis
-        Empty when nothing varies.
-    """
-    groups: dict[bytes, list[str]] = {}
-    for field in ERROR_FIELDS:
-        column = np.ascontiguousarray(campaign.errors[field.name])
-        if column.size and np.ptp(column) > 0:
-            groups.setdefault(column.tobytes(), []).append(field.name)
-    axes = []
-    for names in groups.values():
-        unit, factor = _DISPLAY[_ERROR_UNITS[names[0]]]
-        values = campaign.errors[names[0]] * factor
-        values[np.abs(values) < 1e-12 * np.abs(values).max()] = 0.0  # rounding error of a sweep through zero
-        axes.append(Axis(_label(names, campaign.patterns), unit, values))
-    rank = {pattern: i for i, pattern in enumerate(campaign.patterns)}
-    return sorted(axes, key=lambda axis: rank.get(axis.label, len(rank)))
-
-
-def _label(names: list[str], patterns: tuple[str, ...]) -> str:
-    for pattern in patterns:
-        if all(fnmatchcase(name, pattern) for name in names):
-            return pattern
-    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"

@@ -134,9 +134,14 @@ class Study(Case):
         return self.sampling.n or math.prod(axis.points for axis in self.sweep)
 
     @property
+    def first_sample(self) -> int:
+        """Row of the first random joint: 1 if row 0 is the nominal joint, else 0."""
+        return int(self.sampling.nominal_first)
+
+    @property
     def rows(self) -> int:
         """Number of rows of every table of this study."""
-        return self.samples + self.sampling.nominal_first
+        return self.first_sample + self.samples
 
     @property
     def asked(self) -> list[str]:

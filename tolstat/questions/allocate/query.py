@@ -17,12 +17,12 @@ from tolstat import sampling
 from tolstat.analysis import allocation, exceedance, reweight
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
-from tolstat.campaign.recall import recall
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.loads import LOAD_FIELDS
 from tolstat.common.tables import VALID, Status
 from tolstat.store import ResultStore, view
+from tolstat.store.recall import recall
 from tolstat.study import Study, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement

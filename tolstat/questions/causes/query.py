@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import exceedance, overrepresentation, pick_freeze, quantile, regression, sensitivity
-from tolstat.campaign.recall import recall
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOAD_FIELDS, UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import VALID
 from tolstat.store import ResultStore, view
+from tolstat.store.recall import recall
 from tolstat.study import Study
 from tolstat.study.selection import columns_of
 from tolstat.study.tolerances.distributions import score

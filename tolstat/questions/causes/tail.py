@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.campaign.recall import recall
 from tolstat.common import selected_results
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, InputError
@@ -17,6 +16,7 @@ from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.store import ResultStore
+from tolstat.store.recall import recall
 from tolstat.store.view import load
 from tolstat.study import Study
 from tolstat.study.tolerances.distributions import score

@@ -13,11 +13,11 @@ from tolstat import sampling
 from tolstat.analysis import reweight
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
-from tolstat.campaign.recall import recall
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS
 from tolstat.common.tables import VALID, Status
 from tolstat.store import ResultStore, view
+from tolstat.store.recall import recall
 from tolstat.study import Study
 from tolstat.study.change import changed
 from tolstat.study.selection import columns_of

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from tolstat.campaign.run import differing_keys
 from tolstat.common.errors import Fault, StoreError
-from tolstat.store import ResultStore
 from tolstat.study import Study, load, subset_of
 from tolstat.study.model import Solver
 
+if TYPE_CHECKING:
+    from tolstat.store.reader import Reader
 
-def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -> Study:
+
+def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Study:
     """Read the study that a result file was made from.
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         The file, which holds the text of its study. Relative paths in the text, of a joint file or of measured data,
         are resolved from the result file's folder.
     n : int, optional
@@ -54,7 +57,23 @@ def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -
     return replace(load(source, n=n, text=text), solver=study.solver)
 
 
-def _solver(store: ResultStore, study: Study) -> Solver:
+def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """Compare two identities of studies.
+
+    Returns
+    -------
+    list of str
+        ``"solver.steps_per_rev: 90 in the file, 180 in the study"`` for every key that differs.
+    """
+    lines = []
+    for key in sorted(held.keys() | wanted.keys()):
+        if key not in wanted or key not in held or held[key] != wanted[key]:
+            sides = (f"{side[key]!r}" if key in side else "nothing" for side in (held, wanted))
+            lines.append("{}: {} in the file, {} in the study".format(key, *sides))
+    return lines
+
+
+def _solver(store: Reader, study: Study) -> Solver:
     """Solver settings of the file; they differ from those in the study's text in campaigns at two fidelities."""
     held = {key.removeprefix("solver."): value for key, value in store.identity.items() if key.startswith("solver.")}
     own = study.solver.model_dump()

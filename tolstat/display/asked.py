@@ -1,0 +1,43 @@
+"""What the reader of a page asks for, and the remarks that its sections add."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from tolstat.common.errors import TolstatError
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Settings of a page that its sections follow.
+
+    Attributes
+    ----------
+    accepted : float
+        Accepted share: share of the joints that may be above a limit; NaN if none is given.
+    replay : int
+        Number of joints whose load histories are evaluated; without stored histories they are simulated again. With 0
+        the page shows no histories.
+    notes : list of str
+        Remarks that concern the whole page; sections append to it.
+    """
+
+    accepted: float = math.nan
+    replay: int = 0
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def judges(self) -> bool:
+        """Whether an accepted share is given."""
+        return math.isfinite(self.accepted)
+
+    @contextmanager
+    def noting(self, what: str) -> Iterator[None]:
+        """Turn a `TolstatError` into a note that begins with `what`, so that the rest of the page is still made."""
+        try:
+            yield
+        except TolstatError as error:
+            self.notes.append(f"{what}: {str(error).splitlines()[0]}")

@@ -1,0 +1,112 @@
+"""One load of the joints of a campaign, with the estimates that depend on their weights and independence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.analysis import exceedance, quantile, weighted
+from tolstat.analysis.exceedance import Exceedance, FloatArray, Mask
+from tolstat.analysis.quantile import Quantile
+
+CONFIDENCE = 0.95
+LONG_TAIL = 3.0
+"""Ratio of the largest load to the median above which a load has a long tail."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampleLoad:
+    """Largest load over the revolution of n joints.
+
+    Attributes
+    ----------
+    name, unit : str
+        ``cross1.F``, and its SI unit.
+    limit : float, optional
+        Limit of the study, SI.
+    nominal : float
+        Load of the nominal joint, SI; NaN if there is none.
+    values : ndarray, shape (n,)
+        Load of each joint, SI; NaN without a result.
+    ends : tuple of ndarray, shape (n,)
+        Interval of each load; the load itself unless the joint is stationary.
+    status : ndarray, shape (n,)
+        `tables.Status` of each joint.
+    weights : ndarray, shape (n,), optional
+        Weight of each joint; without it all joints count equally.
+    iid : bool
+        Whether the joints are independent samples.
+    """
+
+    name: str
+    unit: str
+    limit: float | None
+    nominal: float
+    values: FloatArray
+    ends: tuple[FloatArray, FloatArray]
+    status: NDArray[np.uint8]
+    weights: FloatArray | None
+    iid: bool
+
+    @cached_property
+    def sample(self) -> exceedance.Sample:
+        """Loads of the valid joints, ascending, and numbers of the others."""
+        return exceedance.sort_out(self.values, self.status, self.ends)
+
+    @cached_property
+    def _weighted(self) -> weighted.Sample:
+        assert self.weights is not None
+        return weighted.sort_out(self.values, self.status, self.weights, self.ends)
+
+    @property
+    def valid(self) -> FloatArray:
+        """Loads of the valid joints, ascending."""
+        return self.sample.valid
+
+    @cached_property
+    def is_valid(self) -> Mask:
+        """Which joints are valid, (n,)."""
+        return exceedance.split(self.values, self.status)[0]
+
+    @property
+    def long_tailed(self) -> bool:
+        """Whether all valid loads are positive and the largest exceeds `LONG_TAIL` times the median."""
+        valid = self.valid
+        return bool(valid.size and valid[0] > 0 and valid[-1] > LONG_TAIL * valid[valid.size // 2])
+
+    def curve(self, levels: ArrayLike | None = None, confidence: float = CONFIDENCE) -> NDArray[np.void]:
+        """Share of the joints above each level, (m,) table `exceedance.CURVE`; see `exceedance.curve`."""
+        if self.weights is None:
+            return exceedance.curve_of(self.sample, levels, confidence, self.iid)
+        return weighted.curve_of(self._weighted, levels, confidence)
+
+    def above(self, level: float, confidence: float = CONFIDENCE) -> Exceedance:
+        """Share of the joints above one level; see `curve`."""
+        return Exceedance(*self.curve([level], confidence)[0].tolist())
+
+    def quantile(self, share: float, confidence: float = CONFIDENCE) -> Quantile:
+        """Load that a share of the joints stays at or below; see `quantile.at`."""
+        if self.weights is None:
+            return quantile.of_sample(self.sample, share, confidence, self.iid)
+        return weighted.quantile_of(self._weighted, share, confidence)
+
+    def trust(self, level: float) -> weighted.Trust:
+        """Diagnostics of the weights above a level; see `weighted.trust`."""
+        return weighted.trust_of(self._weighted, level)
+
+    def shifted(self, by: FloatArray) -> SampleLoad:
+        """Return the load of the same joints with `by`, (n,), added to values and ends."""
+        return replace(self, values=self.values + by, ends=(self.ends[0] + by, self.ends[1] + by))
+
+    def only(self, samples: NDArray[np.intp] | Mask) -> SampleLoad:
+        """Return the load of some of the joints."""
+        return replace(
+            self,
+            values=self.values[samples],
+            ends=(self.ends[0][samples], self.ends[1][samples]),
+            status=self.status[samples],
+            weights=None if self.weights is None else self.weights[samples],
+        )

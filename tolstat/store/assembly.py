@@ -92,7 +92,7 @@ def _copy_results(file: h5py.File, source: Reader) -> None:
     """Copy finished rows, and compare the results of rows that are already finished in the file."""
     for first in range(0, source.n, BLOCK):
         own = slice(first, min(first + BLOCK, source.n))
-        there = slice(own.start + source.rows.start, own.stop + source.rows.start)
+        there = slice(source.row(own.start), source.row(own.stop))
         done = source.status(own) != Status.PENDING
         held = file["results/status"][there] != Status.PENDING
         both, new = done & held, done & ~held
@@ -131,9 +131,9 @@ def _histories_inside(file: h5py.File, n: int, sources: Sequence[Reader]) -> Non
     for name, spec in specs.items():
         attach_scales(create_dataset(group, name, n, spec), file["row"], spec)
     for source in sources:
-        for name, rows in _history_blocks(source):
-            begin = source.rows.start + rows[0]
-            group[name][begin : begin + len(rows)] = source.histories(name, rows)
+        for name, slots in _history_blocks(source):
+            begin = source.row(int(slots[0]))
+            group[name][begin : begin + len(slots)] = source.histories(name, slots)
 
 
 def _histories_beside(path: Path, file: h5py.File, n: int, sources: Sequence[Reader]) -> None:
@@ -145,8 +145,8 @@ def _histories_beside(path: Path, file: h5py.File, n: int, sources: Sequence[Rea
     for source in sources:
         size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in specs.values()))
         for first in range(0, source.n, size):
-            rows = np.arange(first, min(first + size, source.n))
-            parts.add(source.rows.start + rows, {name: source.histories(name, rows) for name in specs})
+            slots = np.arange(first, min(first + size, source.n))
+            parts.add(source.row(slots), {name: source.histories(name, slots) for name in specs})
 
 
 def check_free(path: Path) -> None:

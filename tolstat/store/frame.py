@@ -36,7 +36,7 @@ def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
     if store.retries:
         data["attempt", "1"] = store.attempt()
     data["status", "1"] = LABELS[results["status"]]
-    index = pd.RangeIndex(store.rows.start, store.rows.stop, name="row")
+    index = pd.RangeIndex(store.rows, name="row")
     if units:
         return pd.DataFrame(data, index=index)
     return pd.DataFrame({name: values for (name, _), values in data.items()}, index=index)

@@ -20,6 +20,7 @@ from tolstat.store import checks, integrity
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
 from tolstat.store.histories import HistoryParts
+from tolstat.store.numbering import Numbering
 from tolstat.store.result_file import BLOCK, campaign_digest, descriptions, fault, is_locked, open_hdf5, text
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class Session(NamedTuple):
     done: int
 
 
-class Reader:
+class Reader(Numbering):
     """Read access to an open result file; see `ResultStore`."""
 
     def __init__(self, path: Path, file: h5py.File) -> None:
@@ -78,11 +79,6 @@ class Reader:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    @property
-    def first_sample(self) -> int:
-        """File slot of the first random joint: 1 if slot 0 holds the nominal joint, else 0."""
-        return int(bool(self.sampling["nominal_first"]) and self.rows.start == 0)
 
     @property
     def complete(self) -> bool:
@@ -325,7 +321,7 @@ class Reader:
         return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
 
     def _check_errors(self, rows: slice, errors: NDArray[np.void]) -> None:
-        first = self.rows.start + rows.indices(self.n)[0]
+        first = self.row(rows.indices(self.n)[0])
         described = [(c, self._read(name, c, dtype, rows)) for name, (c, dtype) in descriptions(self._file).items()]
         right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", rows)
         if not right.all():
@@ -335,7 +331,7 @@ class Reader:
 
     def _check_history(self, name: str, rows: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
         held = self.column("ledger", f"{name}_check", slice(None))[rows[done]]
-        wrong = integrity.history_checks(values[done], rows[done] + self.rows.start) != held
+        wrong = integrity.history_checks(values[done], self.row(rows[done])) != held
         if wrong.any():
             found = f"is damaged: the history {name} of row {self.rows[rows[done][np.argmax(wrong)]]} is not as written"
             raise fault(self.path, found, "take a copy of it, or run the campaign again with another --out")

@@ -349,7 +349,7 @@ class ResultStore(Reader):
     def _put_checks(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
         ledger = self._file["ledger"]
         for name in self.history_specs:
-            checks = history_checks(simulation.histories[name], rows + self.rows.start)
+            checks = history_checks(simulation.histories[name], self.row(rows))
             put(ledger[f"{name}_check"], rows, checks)
         errors, attempt = (get(ledger[name], rows) for name in ("errors_check", "attempt"))
         put(ledger["results_check"], rows, results_hash(errors, attempt, simulation.results, self.columns))

@@ -269,11 +269,16 @@ class View:
 
     def rows(self, samples: ArrayLike) -> NDArray[np.intp]:
         """Rows of the campaign of samples."""
-        return self.store.rows.start + self.slots(samples)
+        return self.store.row(self.slots(samples))
 
     def slots(self, samples: ArrayLike) -> NDArray[np.intp]:
         """File slots of samples."""
         return np.asarray(samples, dtype=np.intp) + self.store.first_sample
+
+    @property
+    def campaign_samples(self) -> range:
+        """Number of each sample among the random joints of the campaign, (n,): the sample itself but for a slice."""
+        return self.store.samples
 
     def errors(self, samples: NDArray[np.intp], columns: Sequence[str] | None = None) -> NDArray[np.void]:
         """Errors of samples, given in ascending order, (m,) table ERROR.

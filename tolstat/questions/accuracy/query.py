@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.accuracy import FIDELITY, KIND_OF, OBSERVABLES, REFERENCE
+from tolstat.analysis.accuracy import KIND_OF, OBSERVABLES
 from tolstat.common.loads import KINDS, UNIT_OF_LOAD
 from tolstat.common.tables import Status
 from tolstat.store.verification import Verification
+from tolstat.store.view import View
 
 TOTAL = "numerical error"
-FORMAT = "{:.1e}"
 
 
 def _results(verification: Verification) -> dict[str, np.ndarray[tuple[int], np.dtype[np.void]]]:
@@ -91,45 +93,6 @@ def joints(verification: Verification) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def usual(verification: Verification) -> dict[str, float]:
-    """Numerical error that 95 % of the joints stay below, by kind of load; NaN if unknown."""
-    values = accuracy.by_kind(errors(verification)[TOTAL])
-    return {kind: accuracy.spread(values[:, k]).usual for k, kind in enumerate(KINDS)}
-
-
-def basis(verification: Verification) -> str:
-    """Words on how the numerical error was determined."""
-    m = len(verification.rows)
-    results = _results(verification)
-    if REFERENCE in results:
-        settled = int((results[REFERENCE]["status"] == Status.OK).sum())
-        return f"measured on {settled} of {m} joints against a tight reference"
-    noun = "joint" if m == 1 else "joints"
-    return f"estimated on {m} {noun} from half the step, tighter Newton and longer settling"
-
-
-def note(verification: Verification) -> str:
-    """Sentence on the numerical error of the largest loads."""
-    table = distribution(verification)
-    total = table[table["error"] == TOTAL]
-    shown = total["load"].isin(["F", "T"])
-    total = total[shown] if shown.any() else total
-    words = [
-        f"{kind} {FORMAT.format(median)}, at worst {FORMAT.format(worst)}"
-        for kind, median, worst in zip(total["load"], total["median"], total["worst"], strict=True)
-        if not np.isnan(worst)
-    ]
-    noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
-    text = f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}"
-    lost = lost_joints(verification)
-    return f"{text}; {lost}" if lost else text
-
-
-def lost_joints(verification: Verification) -> str:
-    """Words on joints that failed or did not settle in the campaign or in a check; empty if there are none."""
-    base = verification.base["status"] == Status.OK
-    words = [f"{int((~base).sum())} not settled"] if not base.all() else []
-    for name, results in _results(verification).items():
-        bad = int((base & (results["status"] != Status.OK)).sum())
-        words += [f"{bad} not settled in {name}"] if bad else []
-    return ", ".join(words)
+def summary(view: View, confidence: float) -> dict[str, Any]:
+    """JSON value: ``numerical_error`` that 95 % of the joints stay below, by kind of load."""
+    return {"numerical_error": view.numerical_error}

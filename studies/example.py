@@ -84,7 +84,7 @@ with tolstat.open(first) as a, tolstat.open(second) as b:
     difference = tolstat.compared(a, b, ["cross1.F"])
 print(difference.shares[["load", "level", "a", "b", "estimate", "lower", "upper"]].head(1).round(4))
 print(f"{len(difference.changes)} changes in the study")
-print(f"{len(difference.switched)} times a joint changed the side of a limit")
+print(f"{len(difference.switched)} times only one joint of a pair is above a limit")
 
 # %% [markdown]
 # All statistics for other programs, and the pictures.

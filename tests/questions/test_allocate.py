@@ -14,6 +14,7 @@ from tolstat.analysis import allocation
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.questions.allocate import query as allocate
+from tolstat.questions.allocate.ratios import DensityRatios
 from tolstat.store import ResultStore
 from tolstat.study import costs, scaling
 
@@ -37,7 +38,7 @@ def share_of(factor):
 
 def test_a_proposal_keeps_its_limit_in_a_fresh_campaign(path, tmp_path):
     with ResultStore.open(path) as store:
-        found = allocate.of_store(store, [LIMIT])
+        found = allocate.allocated(store.view(), [LIMIT])
     assert found.aim == "interval"
     row, table = found.limits.iloc[0], found.tolerances.set_index("tolerance")
     factor = table.loc["pin[12].offset_t", "factor"]
@@ -59,7 +60,7 @@ def test_a_proposal_keeps_its_limit_in_a_fresh_campaign(path, tmp_path):
 
 def test_where_a_limit_leaves_room_tolerances_become_wider(path):
     with ResultStore.open(path) as store:
-        found = allocate.of_store(store, ["P(cross1.F > 700 N) < 0.25"])
+        found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 0.25"])
     table = found.tolerances.set_index("tolerance")
     assert table.loc["pin[12].offset_t", "factor"] > 1.1
     assert found.tolerances["cost"].sum() < found.tolerances["cost_before"].sum()
@@ -68,7 +69,7 @@ def test_where_a_limit_leaves_room_tolerances_become_wider(path):
 
 def test_what_the_joints_cannot_show_needs_new_runs(path):
     with ResultStore.open(path) as store:
-        found = allocate.of_store(store, ["P(cross1.F > 700 N) < 1e-6"])
+        found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 1e-6"])
     assert not found.holds
     assert found.verdict.startswith("needs new runs")
     assert found.aim == "step"
@@ -84,7 +85,7 @@ def test_costs_decide_between_two_tolerances_with_the_same_effect(path, tmp_path
     table = tmp_path / "costs.csv"
     table.write_text("tolerance,cost,fixed,power,most\npin1.offset_t,10,2,1,\npin2.offset_t,1,,2,0.1 mm\n")
     with ResultStore.open(file) as store:
-        found = allocate.of_store(store, [LIMIT], table)
+        found = allocate.allocated(store.view(), [LIMIT], table)
     rows = found.tolerances.set_index("tolerance")
     assert list(rows.index) == ["pin1.offset_t", "pin2.offset_t"]  # the tilt has no cost, and is kept
     assert rows.loc["pin2.offset_t", "factor"] < rows.loc["pin1.offset_t", "factor"]
@@ -113,6 +114,16 @@ def test_search_finds_the_optimum_of_a_problem_with_a_known_one():
     f2 = radius / np.sqrt(1 + 2 ** (2 / 3))
     assert found.aim == "estimate"
     assert found.factors == pytest.approx([2 ** (1 / 3) * f2, f2], rel=0.03)
+
+
+def test_mean_square_is_of_the_scaled_distribution_where_the_mean_is_not_in_the_middle(tmp_path):
+    mean = '"pin*.offset_t" = { lower = "-0.1 mm", upper = "0.2 mm", mean = "0.02 mm", distribution = "normal" }\n#'
+    plan = load(tmp_path, synthetic.STUDY.replace('"pin*.offset_t" =', mean))
+    ratios = DensityRatios(scaling.tolerances(plan), sampling.draw(plan))
+    # the band from -0.115 to 0.215 mm has its nearer end 0.135 mm from the mean in place of 0.12 mm
+    ratio = 0.135 / 0.12
+    found = ratios.log_mean_square(np.array([1.1]))
+    assert found == pytest.approx(-4 * np.log(ratio * np.sqrt(2 - ratio**2)))
 
 
 def test_entries_are_scaled_about_the_middle_and_texts_keep_their_comments(tmp_path):
@@ -147,7 +158,7 @@ def test_faults_of_limits_costs_and_names_are_told_together(path, tmp_path):
     table.write_text('"pin[12].offset_t" = { cost = 1, fixed = 2 }\n"pin4.tilt_t" = { least = "1 mm" }\npin9.x = {}\n')
     bad = ["P(cros1.F > 7 N) < 0.1", "P(cross1.F > 700 mm) < 2", "often"]
     with ResultStore.open(path) as store, pytest.raises(InputError) as found:
-        allocate.of_store(store, bad, table, ["pin7.*"])
+        allocate.allocated(store.view(), bad, table, ["pin7.*"])
     for words in (
         "did you mean 'cross1.F'",
         "'700 mm' cannot be",
@@ -160,7 +171,7 @@ def test_faults_of_limits_costs_and_names_are_told_together(path, tmp_path):
         assert words in str(found.value)
     assert "selects no error" in str(found.value)
     with ResultStore.open(path) as store, pytest.raises(InputError, match="no tolerance that may change"):
-        allocate.of_store(store, [LIMIT], keep=["pin*.offset_t", "pin*.tilt_t"])
+        allocate.allocated(store.view(), [LIMIT], keep=["pin*.offset_t", "pin*.tilt_t"])
 
 
 def test_cost_model_is_a_reciprocal_power(tmp_path):
@@ -178,7 +189,7 @@ def test_command_writes_a_study(path, tmp_path):
     done = CliRunner().invoke(app, ["allocate", str(path), "--limit", LIMIT, "--out", str(out)])
     assert done.exit_code == 0
     assert '"pin[12].offset_t" = { plus_minus' in done.stdout
-    assert "joints judged" in done.stderr
+    assert "joints in the check" in done.stderr
     assert study.load(out).tolerances["pin1.offset_t"].sigma < 1e-4 / 3
     found = json.loads(CliRunner().invoke(app, ["allocate", str(path), "--limit", LIMIT, "--json"]).stdout)
     assert found["tolerances"][1]["cost"] > found["tolerances"][1]["cost_before"]

@@ -110,7 +110,7 @@ def test_joints_of_one_seed_are_paired_by_sample_and_changes_are_put_together(tm
     wide = synthetic.STUDY.replace("0.1 mm", "0.12 mm").replace("n = 60", "n = 60\nnominal_first = false")
     a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", wide, n=300)
     with ResultStore.open(a) as one, ResultStore.open(b) as other:
-        found = compare.of_stores(one, other, ["cross1.F"])
+        found = compare.compared(one.view(), other.view(), ["cross1.F"])
         loads = [source_of(store)[k : k + 299] for store, k in ((one, 1), (other, 0))]
     assert found.sides.paired
     assert found.sides.rows[[0, -1]].tolist() == [1, 300]
@@ -137,7 +137,7 @@ def test_other_seeds_are_not_paired(tmp_path):
         campaign(tmp_path, "b", synthetic.STUDY.replace("seed = 2021", "seed = 5"), factor=1.2),
     )
     with ResultStore.open(a) as one, ResultStore.open(b) as other:
-        found = compare.of_stores(one, other)
+        found = compare.compared(one.view(), other.view())
     assert not found.sides.paired
     assert found.switched.empty
     row = found.shares.set_index("load").loc["cross1.F"]
@@ -172,13 +172,13 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
     assert done.exit_code == 2
     assert "hint: name another folder" in done.stderr
     with ResultStore.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:
-        compare.of_stores(one, one, ["cros1.F", "nothing"])
+        compare.compared(one.view(), one.view(), ["cros1.F", "nothing"])
     assert len(refused.value.faults) == 2
 
 
 def test_pending_joints_are_not_compared(tmp_path):
     a, b = campaign(tmp_path, "a", n=60), synthetic.store(tmp_path, simulated=31, name="b")
     with ResultStore.open(a) as one, ResultStore.open(b) as other:
-        found = compare.of_stores(one, other)
+        found = compare.compared(one.view(), other.view())
     assert len(found.sides.rows) == 30
-    assert (found.sides.b.results["status"] == Status.OK).all()
+    assert (found.sides.b.load("cross1.F").status == Status.OK).all()

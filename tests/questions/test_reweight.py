@@ -161,7 +161,7 @@ def test_reweighted_campaign_agrees_with_a_fresh_one(tmp_path):
     path = campaign(tmp_path)
     settings = ["pin[12].offset_t.plus_minus=0.08 mm"]
     with ResultStore.open(path) as store:
-        found = campaigns.of_store(store, settings)
+        found = campaigns.reweighted(store.view(), settings)
     plan = load(tmp_path, CORRELATED.replace("n = 4000", "n = 40000").replace("seed = 2021", "seed = 5"))
     fresh = load_of(sampling.draw(replace(plan, tolerances=changed(plan, settings)))[1:])
     row = found.table.set_index("load").loc["cross1.F"]
@@ -176,9 +176,9 @@ def test_errors_where_no_joint_was_drawn_need_new_runs(tmp_path):
     path = campaign(tmp_path, synthetic.STUDY.replace('"normal", cpk = 1.0', '"uniform"'), "band")
     with ResultStore.open(path) as store:
         with pytest.raises(InputError, match=r"0\.17 of the new errors lie where the study draws none") as found:
-            campaigns.of_store(store, ["pin*.offset_t.plus_minus=0.12 mm"])
+            campaigns.reweighted(store.view(), ["pin*.offset_t.plus_minus=0.12 mm"])
         assert len(found.value.faults) == 4
-        campaigns.of_store(store, ["pin*.offset_t.plus_minus=0.08 mm"])
+        campaigns.reweighted(store.view(), ["pin*.offset_t.plus_minus=0.08 mm"])
 
 
 def test_command_prints_a_table_and_json(tmp_path):
@@ -199,7 +199,7 @@ def test_command_prints_a_table_and_json(tmp_path):
 def test_a_study_without_limits_has_quantiles(tmp_path):
     path = campaign(tmp_path, CORRELATED.replace("[limits]", "[errors]").replace(LIMITS, ""), "free")
     with ResultStore.open(path) as store:
-        found = campaigns.of_store(store, ["pin1.offset_t.plus_minus=0.08 mm"])
+        found = campaigns.reweighted(store.view(), ["pin1.offset_t.plus_minus=0.08 mm"])
     row = found.table.query("load == 'cross1.F' and share == 0.9").iloc[0]
     assert row["lower"] <= row["estimate"] <= row["upper"] < row["before"] + 20.0
     assert row["estimate"] < row["before"]

@@ -18,7 +18,6 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Simulation, Status
 from tolstat.questions.reweight import query as reweighting
 from tolstat.store import ResultStore
-from tolstat.store import view as source
 from tolstat.study.proposal import Proposal, component, weights
 
 SEEDS = 500
@@ -153,10 +152,10 @@ def stored(tmp_path_factory):
 
 def test_the_file_keeps_weights_and_reports_go_by_them(stored):
     with ResultStore.open(stored) as store:
-        view = source.read(store, weighted=True)
-        found = view.above(source.load(view.results, "cross1.F")[0], 700.0, 0.95)
+        view = store.view()
+        found = view.load("cross1.F").above(700.0)
         frame = store.to_pandas()
-        shares = reweighting.of_store(store, ["pin4.offset_t.plus_minus=0.09 mm"]).table.iloc[0]
+        shares = reweighting.reweighted(view, ["pin4.offset_t.plus_minus=0.09 mm"]).table.iloc[0]
     assert found.lower < norm.sf(3.0) < found.upper
     assert found.upper < 2.0 * norm.sf(3.0)
     assert frame["weight"].iloc[1:].mean() == pytest.approx(1.0, abs=0.05)

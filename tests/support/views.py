@@ -4,13 +4,12 @@ import numpy as np
 
 from tests.support import synthetic
 from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.store.numbering import Numbering
 from tolstat.store.view import View
 
 
-class FakeStore:
+class FakeStore(Numbering):
     """What a view reads of a result file, in memory; slot 0 is the nominal joint."""
-
-    first_sample = 1
 
     def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS):
         self.path, self.study_name, self.study_text = "made_up.h5", "made up", study_text

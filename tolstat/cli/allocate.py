@@ -39,14 +39,14 @@ def allocate(
     """
     from tolstat.common.files import check_target
     from tolstat.display import text
-    from tolstat.questions.allocate import query as source
+    from tolstat.questions.allocate.query import allocated
     from tolstat.store import ResultStore
     from tolstat.study.scaling import line
 
     if out is not None:
         check_target(out, file)
     with ResultStore.open(file) as store:
-        found = source.of_store(store, limit, costs, keep or (), study_file)
+        found = allocated(store.view(study_file), limit, costs, keep or ())
     if out is not None:
         content = found.text
         with writing(out) as temporary:

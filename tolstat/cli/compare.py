@@ -30,12 +30,12 @@ def compare(
     CSV, and the joints that changed the side of a limit.
     """
     from tolstat.display import text
-    from tolstat.questions.compare import query as source
-    from tolstat.questions.compare import rendering as report
+    from tolstat.questions.compare import rendering
+    from tolstat.questions.compare.query import compared
     from tolstat.store import ResultStore
 
     with ResultStore.open(a) as one, ResultStore.open(b) as other:
-        found = source.of_stores(one, other, by or ())
+        found = compared(one.view(), other.view(), by or ())
     if as_json:
         tables = {key: text.records(getattr(found, key)) for key in ("shares", "loads", "switched")}
         differing = [change._asdict() for change in found.changes]
@@ -43,10 +43,10 @@ def compare(
         return
     if out is not None:
         make_folder(out)
-    typer.echo(report.text(found, loads=bool(by)))
-    say(report.note(found, str(a), str(b)))
+    typer.echo(rendering.text(found, loads=bool(by)))
+    say(rendering.note(found, str(a), str(b)))
     folder = b.parent if out is None else out
     with filling(folder):
-        files = report.write(found, folder / f"{a.stem}_{b.stem}", (a.stem, b.stem))
+        files = rendering.write(found, folder / f"{a.stem}_{b.stem}", (a.stem, b.stem))
     for path in files:
         say(f"wrote {path}")

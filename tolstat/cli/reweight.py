@@ -25,11 +25,11 @@ def reweight(
     the verdict is "needs new runs", and the table is not to be trusted.
     """
     from tolstat.display import text
-    from tolstat.questions.reweight import query as source
+    from tolstat.questions.reweight.query import reweighted
     from tolstat.store import ResultStore
 
     with ResultStore.open(file) as store:
-        found = source.of_store(store, settings, study_file)
+        found = reweighted(store.view(study_file), settings)
     if as_json:
         w = found.weights
         head = {"usable": w.usable, "ess": w.ess, "pareto_k": w.k if abs(w.k) < 1e300 else None, "allowed_k": w.allowed}

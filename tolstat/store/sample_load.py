@@ -72,6 +72,11 @@ class SampleLoad:
         return exceedance.split(self.values, self.status)[0]
 
     @property
+    def valid_or_nan(self) -> FloatArray:
+        """Load of each joint, NaN where it is not valid, (n,)."""
+        return np.where(self.is_valid, self.values, np.nan)
+
+    @property
     def long_tailed(self) -> bool:
         """Whether all valid loads are positive and the largest exceeds `LONG_TAIL` times the median."""
         valid = self.valid

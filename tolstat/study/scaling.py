@@ -11,7 +11,7 @@ from tolstat.common import units
 from tolstat.common.errors import Fault, InputError
 from tolstat.study import rewriting, selection
 from tolstat.study.study import Study
-from tolstat.study.tolerances import distributions
+from tolstat.study.tolerances.density_ratio import unbounded
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.kinds import KINDS, RADIAL_KINDS, distribution
@@ -86,12 +86,6 @@ class Tolerance(NamedTuple):
     def widens(self) -> bool:
         """Whether joints drawn with this tolerance can be reweighted to a wider one: not if it is bounded."""
         return unbounded(self.distribution(self.entry))
-
-
-def unbounded(found: Distribution) -> bool:
-    """Whether a distribution is unbounded, so that a wider one of its kind has the same support."""
-    radius = isinstance(found, distributions.Rayleigh) and found.upper is None
-    return isinstance(found, distributions.Normal) or radius
 
 
 def tolerances(study: Study) -> list[Tolerance]:

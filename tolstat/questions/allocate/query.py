@@ -2,40 +2,35 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat import sampling
-from tolstat.analysis import allocation, exceedance, reweight
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis import allocation, reweight
 from tolstat.analysis.reweight import Weights
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
-from tolstat.common.loads import LOAD_FIELDS
-from tolstat.common.tables import VALID, Status
-from tolstat.store import ResultStore, view
-from tolstat.store.recall import recall
+from tolstat.common.tables import Status
+from tolstat.questions.allocate.ratios import DensityRatios, Entries
+from tolstat.store.view import View
 from tolstat.study import Study, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
-from tolstat.study.tolerances.distributions import Distribution, Normal, Rayleigh
 
 EXAMPLE = 'write --limit "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3
 """Significant digits of the tolerances proposed."""
-CHOOSING = 0.999
+SEARCH_CONFIDENCE = 0.999
 """Confidence level of the search: higher than the 0.95 of the final check, so that the check mostly confirms it."""
-MOST = 50_000
+MAX_SEARCHED = 50_000
 """Maximum number of joints used in the search; all others are used in the final check."""
+MIN_CHANGE = 5e-3
+"""Smallest relative change of a tolerance that is proposed."""
 
 
 class Allocation(NamedTuple):
@@ -57,17 +52,17 @@ class Allocation(NamedTuple):
         Weights of the joints of the final check.
     aim : str
         See `analysis.allocation.Choice`.
-    more : float
-        Factor on ``weights.ess``: joints made to the proposal that would show that it holds; inf if not expected to.
+    joints_needed : float
+        Number of joints of the proposed study that would show that it holds; inf if it is not expected to hold.
     """
 
     study: Study
     tolerances: pd.DataFrame
     limits: pd.DataFrame
-    entries: dict[str, dict[str, Any]]
+    entries: Entries
     weights: Weights
     aim: str
-    more: float
+    joints_needed: float
 
     @property
     def holds(self) -> bool:
@@ -79,16 +74,16 @@ class Allocation(NamedTuple):
         """Sentence on whether the proposal holds, or why it needs new runs."""
         w = self.weights
         figures = (
-            f"{len(w.values)} joints judged, they count as {w.ess:.0f}; Pareto k {w.k:.2f}, {w.allowed:.2f} allowed"
+            f"{len(w.values)} joints in the check count as {w.ess:.0f}; Pareto k {w.k:.2f}, {w.allowed:.2f} allowed"
         )
         if self.holds:
-            return f"holds: the upper ends are below the limits ({figures})"
+            return f"holds: the upper ends of the intervals are below the targets ({figures})"
         if not w.usable:
-            return f"needs new runs: these joints do not tell ({figures})"
+            return f"needs new runs: the weights of the joints are unreliable ({figures})"
         if (self.limits["estimate"] < self.limits["target"]).all():
-            n = self.more * self.weights.ess
-            return f"needs new runs: expected to hold, some {n:.0f} joints made to it would show it ({figures})"
-        return f"needs new runs: a step, as far as these joints can tell; run it and allocate again ({figures})"
+            joints = f"about {self.joints_needed:.0f} joints of the proposed study would show it"
+            return f"needs new runs: expected to hold, {joints} ({figures})"
+        return f"needs new runs: a step towards the targets; run the proposed study and allocate again ({figures})"
 
     @property
     def text(self) -> str:
@@ -96,20 +91,39 @@ class Allocation(NamedTuple):
         return scaling.rewritten(self.study, self.entries, self.study.sampling.seed + 1)
 
 
-def of_store(
-    store: ResultStore,
+class _Request(NamedTuple):
+    """What is asked for: statements to be kept; tolerances that may change, and their costs."""
+
+    statements: list[Statement]
+    tolerances: list[Tolerance]
+    costs: list[Cost]
+
+    @property
+    def targets(self) -> NDArray[np.float64]:
+        return np.array([statement.bound for statement in self.statements])
+
+    @property
+    def columns(self) -> list[str]:
+        """Columns of the errors that the tolerances are for."""
+        return [column for t in self.tolerances for name in t.names for column in selection.columns_of(name)]
+
+    def cost(self, factors: NDArray[np.float64]) -> float:
+        return sum(cost.at(float(f)) for cost, f in zip(self.costs, factors, strict=True))
+
+
+def allocated(
+    view: View,
     limits: Sequence[str],
     cost_file: Path | None = None,
     keep: Sequence[str] = (),
-    study_path: Path | None = None,
     confidence: float = 0.95,
 ) -> Allocation:
     """Propose the cheapest tolerances that keep the limits.
 
     Parameters
     ----------
-    store : ResultStore
-        The result file, of joints drawn from tolerances.
+    view : View
+        A campaign of joints drawn from tolerances.
     limits : sequence of str
         ``"P(cross*.F > 700 N) < 0.001"``: share of the joints with any of these loads above the level. Joints without a
         valid load count as above.
@@ -117,8 +131,6 @@ def of_store(
         See `study.costs.of`.
     keep : sequence of str
         Names or patterns of errors whose tolerances stay as they are.
-    study_path : Path, optional
-        Study file to read if the text in the result file can no longer be read.
     confidence : float
         Confidence level of the intervals.
 
@@ -138,125 +150,70 @@ def of_store(
     Examples
     --------
     >>> with tolstat.open(path) as store:
-    ...     found = tolstat.allocated(store, ["P(cross1.F > 700 N) < 0.08"])
+    ...     found = tolstat.allocated(store.view(), ["P(cross1.F > 700 N) < 0.08"])
     >>> found.tolerances.set_index("tolerance")["factor"].round(1).to_dict()
     {'pin4.tilt_t': 1.0, 'pin[12].offset_t': 0.8}
     """
-    study = recall(store, path=study_path)
-    if not study.tolerances:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
-    if study.groups:
-        remedy = 'give the file of a study with sampling.method = "random"'
-        found = "holds joints that share their errors with others: no half of them can judge the other"
-        raise StoreError(str(Fault(str(store.path), found, remedy)))
-    statements, free, prices = _asked(store, study, limits, cost_file, keep)
-    names = [name for t in free for name in t.names]
-    columns = [column for name in names for column in selection.columns_of(name)]
-    campaign = view.read(store, LOAD_FIELDS, ())
-    done = np.flatnonzero(campaign.results["status"] != Status.PENDING)
-    above = np.column_stack([_above(campaign.results, s) for s in statements])[done]
-    chosen, judges = allocation.halves(len(above), MOST)
-    if len(judges) < 4 * reweight.LEAST_ESS:
-        found = f"has {len(above)} joints simulated"
-        raise StoreError(str(Fault(str(store.path), found, f"run {8 * reweight.LEAST_ESS} joints or more")))
-    price = np.array([cost.reach for cost in prices])
-    ratios = _Ratios(free, view.errors_at(store, columns, done[chosen]))
-    problem = allocation.Problem(
-        ratios.at,
-        ratios.log_spread,
-        above[chosen],
-        np.array([s.bound for s in statements]),
-        lambda factors: sum(cost.at(float(f)) for cost, f in zip(prices, factors, strict=True)),
-        price[:, 0],
-        np.where([t.widens for t in free], price[:, 1], 1.0),
-        campaign.iid,
-        CHOOSING,
-    )
-    choice = allocation.search(problem)
+    _check_joints(view)
+    request = _read_request(view, limits, cost_file, keep)
+    done = np.flatnonzero(view.status != Status.PENDING)
+    above = np.column_stack([_above(view, statement) for statement in request.statements])[done]
+    searched, checked = allocation.halves(len(done), MAX_SEARCHED)
+    if len(checked) < 4 * reweight.LEAST_ESS:
+        found = f"has {len(done)} joints simulated"
+        raise StoreError(str(Fault(str(view.path), found, f"run {8 * reweight.LEAST_ESS} joints or more")))
+    choice = _search(view, request, above[searched], done[searched])
     entries = {
-        t.pattern: t.scaled(float(f), DIGITS) for t, f in zip(free, choice.factors, strict=True) if abs(f - 1) > 5e-3
+        t.pattern: t.scaled(float(f), DIGITS)
+        for t, f in zip(request.tolerances, choice.factors, strict=True)
+        if abs(f - 1) > MIN_CHANGE
     }
-    logs = np.concatenate([_Ratios(free, errors).of(entries) for errors in view.error_blocks(store, columns)])
-    weights = reweight.smooth(logs[done[judges]])
-    table = _judged(statements, above, above[judges], weights, campaign.iid, confidence)
-    more = [
+    blocks = view.error_blocks(request.columns)
+    logs = np.concatenate([DensityRatios(request.tolerances, errors).of_entries(entries) for errors in blocks])
+    weights = reweight.smooth(logs[done[checked]])
+    table = _limits(request.statements, above, above[checked], weights, view.iid, confidence)
+    growth = [
         allocation.joints_needed(share, ess, target, confidence)
         for share, ess, target in table[["estimate", "ess", "target"]].to_numpy(float)
     ]
-    return Allocation(study, _tolerances(free, prices, entries), table, entries, weights, choice.aim, max(more))
+    needed = max(growth) * weights.ess
+    return Allocation(view.study, _tolerances(request, entries), table, entries, weights, choice.aim, needed)
 
 
-class _Ratios:
-    """Log likelihood ratios (new over old density) of joints as a function of factors on tolerances; with a cache."""
-
-    def __init__(self, free: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
-        self._free = free
-        self._values = [[sampling.values(errors, name) for name in t.names] for t in free]
-        self._old = [t.distribution(t.entry) for t in free]
-        self._before = [self._density(i, t.entry) for i, t in enumerate(free)]
-        self._one = lru_cache(maxsize=4 * len(free))(self._scaled)
-
-    def at(self, factors: FloatArray) -> FloatArray:
-        """Log ratios for tolerances scaled by factors, (n,)."""
-        return np.asarray(sum(self._one(i, float(f)) for i, f in enumerate(factors)))
-
-    def log_spread(self, factors: FloatArray) -> float:
-        """See `analysis.allocation.Problem`; inf if the ratio has no finite mean square."""
-        return float(sum(len(t.names) * self._spread(i, float(factors[i])) for i, t in enumerate(self._free)))
-
-    def of(self, entries: dict[str, dict[str, Any]]) -> FloatArray:
-        """Log ratios for other entries, by pattern, (n,)."""
-        parts = [self._density(i, entries.get(t.pattern, t.entry)) for i, t in enumerate(self._free)]
-        return np.asarray(sum(parts) - sum(self._before))
-
-    def _scaled(self, i: int, factor: float) -> FloatArray:
-        old, t = self._old[i], self._free[i]
-        if isinstance(old, (Normal, Rayleigh)) and scaling.unbounded(old) and "mean" not in t.entry:
-            # same as the scaled entry, but without parsing it; the final check uses the entry
-            return self._logpdf(i, replace(old, sigma=factor * old.sigma)) - self._before[i]
-        return self._density(i, t.scaled(factor)) - self._before[i]
-
-    def _density(self, i: int, entry: dict[str, Any]) -> FloatArray:
-        return self._logpdf(i, self._free[i].distribution(entry))
-
-    def _logpdf(self, i: int, found: Distribution) -> FloatArray:
-        return np.asarray(sum(found.logpdf(values) for values in self._values[i]))
-
-    def _spread(self, i: int, factor: float) -> float:
-        """Logarithm of the mean square of new over old density of one error."""
-        old = self._old[i]
-        if scaling.unbounded(old):  # 1 / (r sqrt(2 - r^2)) for r times the deviation, squared for a radius
-            square = 2.0 - factor**2
-            coordinates = 2 if isinstance(old, Rayleigh) else 1
-            return -coordinates * math.log(factor * math.sqrt(square)) if square > 0 else math.inf
-        new = self._free[i].distribution(self._free[i].scaled(factor))
-        x = new.ppf((np.arange(1000) + 0.5) / 1000)
-        return float(np.log(np.mean(np.exp(new.logpdf(x) - old.logpdf(x)))))
+def _check_joints(view: View) -> None:
+    """Refuse joints that are not drawn from tolerances, all with the same weight and independently of each other."""
+    view.check_drawn()
+    view.check_sample(weighted=False)
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method = "random"'
+        found = "holds joints that share errors with others, so that one half of them is no check of the other"
+        raise StoreError(str(Fault(str(view.path), found, remedy)))
 
 
-def _asked(
-    store: ResultStore, study: Study, limits: Sequence[str], cost_file: Path | None, keep: Sequence[str]
-) -> tuple[list[Statement], list[Tolerance], list[Cost]]:
-    """Parsed limits, tolerances that may change, and the costs of these."""
+def _read_request(view: View, limits: Sequence[str], cost_file: Path | None, keep: Sequence[str]) -> _Request:
+    """Read limits, costs and names, and report their faults together."""
+    study = view.study
     faults: list[Fault] = []
     statements: list[Statement] = []
     for text in limits:
         with gather(faults):
             statements.append(rule.parse(text, "", "--limit", EXAMPLE))
-            lacking = [name for name in statements[-1].loads if not selected_results.holds(store.columns, name)]
+            lacking = [name for name in statements[-1].loads if not selected_results.holds(view.columns, name)]
             if lacking:
-                faults.append(Fault("--limit", f"the file does not keep {', '.join(lacking)}", "ask for what it keeps"))
-    every = scaling.tolerances(study)
+                kept = f"give one of: {', '.join(view.kept_loads)}"
+                faults.append(Fault("--limit", f"the file does not keep {', '.join(lacking)}", kept))
+    kept_names: set[str] = set()
     for pattern in keep:
-        if not selection.select(pattern, study.tolerances):
+        names = selection.select(pattern, study.tolerances)
+        if not names:
             faults.append(Fault("--keep", f"{pattern!r} selects no error that the study scatters", "see [tolerances]"))
+        kept_names |= set(names)
+    every = scaling.tolerances(study)
     prices: list[Cost] = []
     with gather(faults):
         prices = costs.of(every, cost_file)
     if faults:
         raise InputError(faults)
-    kept_names = {name for pattern in keep for name in selection.select(pattern, study.tolerances)}
     free = [
         (t, cost)
         for t, cost in zip(every, prices, strict=True)
@@ -265,35 +222,55 @@ def _asked(
     if not free:
         remedy = "name some in --costs, or leave --keep out; measured, lognormal and correlated errors stay as they are"
         raise InputError([Fault("--costs", "leaves no tolerance that may change", remedy)])
-    return statements, [t for t, _ in free], [cost for _, cost in free]
+    return _Request(statements, [t for t, _ in free], [cost for _, cost in free])
 
 
-def _above(results: NDArray[np.void], said: Statement) -> NDArray[np.bool_]:
-    """Which joints are above a limit in any load, or have no valid load."""
-    largest = np.max([view.load(results, name)[0] for name in said.loads], axis=0)
-    valid = np.isin(results["status"], VALID) & np.isfinite(largest)
-    return np.asarray(~valid | (largest > said.level))
+def _above(view: View, statement: Statement) -> NDArray[np.bool_]:
+    """Which joints are above the level in any load of a statement, or have no valid load, (n,)."""
+    loads = view.loads(statement.loads)
+    valid = np.all([load.is_valid for load in loads], axis=0)
+    return np.asarray(~valid | (np.max([load.values for load in loads], axis=0) > statement.level))
 
 
-def _judged(
+def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: NDArray[np.intp]) -> allocation.Choice:
+    """Choose the factors by some of the samples; `above` tells which of these are above each limit."""
+    ratios = DensityRatios(request.tolerances, view.errors(samples, request.columns))
+    reach = np.array([cost.reach for cost in request.costs])
+    problem = allocation.Problem(
+        log_ratios=ratios.log_ratios,
+        log_spread=ratios.log_mean_square,
+        above=above,
+        targets=request.targets,
+        cost=request.cost,
+        lower=reach[:, 0],
+        upper=np.where([t.widens for t in request.tolerances], reach[:, 1], 1.0),
+        iid=view.iid,
+        confidence=SEARCH_CONFIDENCE,
+    )
+    return allocation.search(problem)
+
+
+def _limits(
     statements: Sequence[Statement],
     above: NDArray[np.bool_],
-    judges: NDArray[np.bool_],
+    above_checked: NDArray[np.bool_],
     weights: Weights,
     iid: bool,
     confidence: float,
 ) -> pd.DataFrame:
+    """Table `Allocation.limits`, from which joints are above each limit: all, and those of the check."""
     rows = []
-    for i, said in enumerate(statements):
-        found = reweight.share_above(judges[:, i], weights, 0.5, confidence, iid)
-        before = exceedance.at(above[:, i], np.ones(len(above), int), 0.5).estimate
-        rows.append({"limit": said.text, "target": said.bound, "before": before, **found._asdict()})
+    for i, statement in enumerate(statements):
+        found = reweight.share_above(above_checked[:, i], weights, 0.5, confidence, iid)
+        before = float(above[:, i].mean())
+        rows.append({"limit": statement.text, "target": statement.bound, "before": before, **found._asdict()})
     return pd.DataFrame(rows)
 
 
-def _tolerances(free: Sequence[Tolerance], prices: Sequence[Cost], entries: dict[str, dict[str, Any]]) -> pd.DataFrame:
+def _tolerances(request: _Request, entries: Entries) -> pd.DataFrame:
+    """Table `Allocation.tolerances`."""
     rows = []
-    for t, cost in zip(free, prices, strict=True):
+    for t, cost in zip(request.tolerances, request.costs, strict=True):
         width = scaling.width(entries.get(t.pattern, t.entry), t.site)
         factor = width / t.width
         row = {

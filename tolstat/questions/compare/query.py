@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from tolstat.analysis import difference
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import LOAD_FIELDS, UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import VALID, Status
-from tolstat.store import ResultStore, view
+from tolstat.common.tables import Status
+from tolstat.store.counts import Counts
+from tolstat.store.sample_load import SampleLoad
+from tolstat.store.view import DRAWN, View
 
 SHARES = (0.5, 0.9, 0.99)
 """Quantiles that are compared."""
-DRAWN = ("random", "sobol", "lhs")
 
 
 class Change(NamedTuple):
@@ -40,33 +39,61 @@ class Change(NamedTuple):
     b: Any
 
 
-class Sides(NamedTuple):
-    """The joints of two campaigns A and B; if paired, both have the same length and order.
+class Side(NamedTuple):
+    """The joints of one campaign that are compared.
 
     Attributes
     ----------
-    a, b : Campaign
-        The campaigns, cut to the joints that are compared.
-    rows : ndarray of int, shape (n,)
-        Row of each joint of A in its campaign.
+    view : View
+        The campaign.
+    samples : ndarray of int, shape (n,)
+        Samples of it, ascending.
+    """
+
+    view: View
+    samples: NDArray[np.intp]
+
+    @property
+    def unresolved(self) -> int:
+        """Number of these joints that failed or did not settle."""
+        counts = Counts.of(self.view.status[self.samples])
+        return counts.failed + counts.not_settled + counts.not_resolved
+
+    def load(self, name: str) -> SampleLoad:
+        """Load of these joints."""
+        load = self.view.load(name)
+        return load if len(self.samples) == self.view.n else load.only(self.samples)  # a million joints are not copied
+
+
+class Sides(NamedTuple):
+    """The joints of two campaigns A and B.
+
+    Attributes
+    ----------
+    a, b : Side
+        The joints that are compared; if paired, both sides have as many.
     paired : bool
         Whether joint i of both was drawn with the same random numbers.
     """
 
-    a: view.Campaign
-    b: view.Campaign
-    rows: np.ndarray[tuple[int], np.dtype[np.intp]]
+    a: Side
+    b: Side
     paired: bool
 
     @property
     def iid(self) -> bool:
         """Whether the joints of both are independent samples."""
-        return self.a.iid and self.b.iid
+        return self.a.view.iid and self.b.view.iid
+
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        """Row of each joint of A in its campaign, (n,)."""
+        return self.a.view.rows(self.a.samples)
 
     def load(self, name: str) -> tuple[FloatArray, FloatArray, str]:
         """Load of each joint of A and of B, NaN if not valid, and its unit."""
-        (a, unit), (b, _) = (_valid(side, name) for side in (self.a, self.b))
-        return a, b, unit
+        a, b = self.a.load(name), self.b.load(name)
+        return a.valid_or_nan, b.valid_or_nan, a.unit
 
 
 class Comparison(NamedTuple):
@@ -95,13 +122,13 @@ class Comparison(NamedTuple):
     switched: pd.DataFrame
 
 
-def of_stores(a: ResultStore, b: ResultStore, by: Sequence[str] = (), confidence: float = 0.95) -> Comparison:
+def compared(a: View, b: View, by: Sequence[str] = (), confidence: float = 0.95) -> Comparison:
     """Compare two campaigns.
 
     Parameters
     ----------
-    a, b : ResultStore
-        Result files. Joints are paired if both studies draw them by the same method from the same seed: an error then
+    a, b : View
+        Campaigns. Joints are paired if both studies draw them by the same method from the same seed: an error then
         has the same random number in both, whatever its tolerance. Joints without a partner are then left out.
     by : sequence of str
         Loads whose quantiles and means are compared; by default those with a limit or, without limits, all kept.
@@ -123,24 +150,24 @@ def of_stores(a: ResultStore, b: ResultStore, by: Sequence[str] = (), confidence
     Examples
     --------
     >>> with tolstat.open(path) as a, tolstat.open(other) as b:
-    ...     found = tolstat.compared(a, b, ["cross1.F"])
+    ...     found = tolstat.compared(a.view(), b.view(), ["cross1.F"])
     >>> found.sides.paired, [change.keys[0] for change in found.changes]
     (True, ['sampling.n'])
     >>> int(found.shares["only_a"].iloc[0]), int(found.shares["only_b"].iloc[0])
     (0, 0)
     """
-    for store in (a, b):
-        if store.sampling["method"] not in DRAWN:
+    for view in (a, b):
+        if view.method not in DRAWN:
             remedy = 'compare files of studies with sampling.method "random", "sobol" or "lhs"'
-            raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
+            raise StoreError(str(Fault(str(view.path), "holds joints that are not drawn from tolerances", remedy)))
+    limits = [*a.limits.items(), *(limit for limit in b.limits.items() if limit not in a.limits.items())]
+    names = _names(a, b, by, [name for name, _ in limits])
     sides = _sides(a, b)
-    limits = [*sides.a.limits.items(), *(item for item in sides.b.limits.items() if item not in sides.a.limits.items())]
-    names = _names(sides, by, [name for name, _ in limits])
     try:
         shares = [_share(sides, name, level, confidence) for name, level in limits]
         loads = [row for name in names for row in _load(sides, name, confidence)]
     except ValueError as error:
-        raise StoreError(str(Fault(f"{a.path}, {b.path}", str(error), "run both campaigns on"))) from error
+        raise StoreError(str(Fault(f"{a.path}, {b.path}", str(error), "resume both campaigns"))) from error
     switched = [_switched(sides, name, level) for name, level in limits] if sides.paired else []
     empty = pd.DataFrame(columns=["row", "load", "unit", "level", "a", "b"])
     return Comparison(
@@ -152,9 +179,9 @@ def of_stores(a: ResultStore, b: ResultStore, by: Sequence[str] = (), confidence
     )
 
 
-def changes(a: ResultStore, b: ResultStore) -> list[Change]:
+def changes(a: View, b: View) -> list[Change]:
     """List what differs between the studies of two files, limits and code included; equal changes are grouped."""
-    one, other = (_identity(store) for store in (a, b))
+    one, other = (_identity(view) for view in (a, b))
     found: dict[str, Change] = {}
     for key in sorted(one.keys() | other.keys()):
         pair = (one.get(key), other.get(key))
@@ -163,55 +190,41 @@ def changes(a: ResultStore, b: ResultStore) -> list[Change]:
     return list(found.values())
 
 
-def _identity(store: ResultStore) -> dict[str, Any]:
-    limits = {f"limits.{name}": level for name, level in store.limits.items()}
-    return store.identity | limits | {key: store.versions.get(key) for key in ("tolstat", "sources")}
+def _identity(view: View) -> dict[str, Any]:
+    limits = {f"limits.{name}": level for name, level in view.limits.items()}
+    return view.store.identity | limits | {key: view.store.versions.get(key) for key in ("tolstat", "sources")}
 
 
-def _sides(a: ResultStore, b: ResultStore) -> Sides:
-    one, other = (view.read(store, LOAD_FIELDS, ()) for store in (a, b))
-    same = [a.sampling[key] == b.sampling[key] for key in ("method", "seed")]
-    same.append(a.sampling["method"] != "sobol" or a.sampling["dimensions"] == b.sampling["dimensions"])
-    same.append(a.sampling["method"] != "lhs" or a.sampling["n"] == b.sampling["n"])
-    first = [max(0, store.rows.start - int(store.sampling["nominal_first"])) for store in (a, b)]
-    begin = max(first)
-    end = min(at + len(side.results) for at, side in zip(first, (one, other), strict=True))
-    rows = first[0] + int(a.sampling["nominal_first"]) + np.arange(len(one.results))
-    paired = all(same) and begin < end
-    here = [
-        np.arange(begin - at, end - at) if paired else np.arange(len(side.results))
-        for at, side in zip(first, (one, other), strict=True)
+def _sides(a: View, b: View) -> Sides:
+    """Simulated joints of both campaigns; those with the same random numbers if there are any."""
+    done_a, done_b = (view.status != Status.PENDING for view in (a, b))
+    first = max(a.campaign_samples.start, b.campaign_samples.start)
+    common = range(first, min(a.campaign_samples.stop, b.campaign_samples.stop))
+    if not (common and _same_random_numbers(a, b)):
+        return Sides(Side(a, np.flatnonzero(done_a)), Side(b, np.flatnonzero(done_b)), paired=False)
+    samples_a, samples_b = (np.arange(len(common)) + view.campaign_samples.index(first) for view in (a, b))
+    both = done_a[samples_a] & done_b[samples_b]
+    return Sides(Side(a, samples_a[both]), Side(b, samples_b[both]), paired=True)
+
+
+def _same_random_numbers(a: View, b: View) -> bool:
+    """Whether samples of one number in both campaigns are drawn with the same random numbers."""
+    keys = {"sobol": ("dimensions",), "lhs": ("n",)}.get(a.method, ())
+    return all(a.store.sampling[key] == b.store.sampling[key] for key in ("method", "seed", *keys))
+
+
+def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[str]:
+    """Loads whose quantiles and means are compared; checks that both files keep them and the loads with limits."""
+    kept = [name for name in a.kept_loads if name in b.kept_loads]
+    places = {**dict.fromkeys(by, "--by"), **{name: f"limits.{name}" for name in limited}}
+    faults = [
+        Fault(place, f"{name!r} is not a load that both files keep", did_you_mean(name, kept))
+        for name, place in places.items()
+        if name not in kept
     ]
-    done = [side.results["status"][i] != Status.PENDING for side, i in zip((one, other), here, strict=True)]
-    if paired:
-        done = [done[0] & done[1]] * 2
-    here = [i[simulated] for i, simulated in zip(here, done, strict=True)]
-    return Sides(_cut(one, here[0]), _cut(other, here[1]), rows[here[0]], paired)
-
-
-def _cut(side: view.Campaign, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> view.Campaign:
-    if len(rows) == len(side.results):
-        return side  # tables of a million joints are not copied
-    return replace(side, errors=side.errors[rows], results=side.results[rows])
-
-
-def _valid(side: view.Campaign, name: str) -> tuple[FloatArray, str]:
-    values, unit = view.load(side.results, name)
-    return np.where(np.isin(side.results["status"], VALID), values, np.nan), unit
-
-
-def _names(sides: Sides, by: Sequence[str], limited: Sequence[str]) -> list[str]:
-    held = [
-        name for name in UNIT_OF_LOAD if all(selected_results.holds(side.columns, name) for side in (sides.a, sides.b))
-    ]
-    asked = {**dict.fromkeys(by, "--by"), **{name: f"limits.{name}" for name in limited}}
-    lacking = {name: place for name, place in asked.items() if name not in held}
-    if lacking:
-        found = "is not a load that both files keep"
-        raise InputError(
-            [Fault(place, f"{name!r} {found}", did_you_mean(name, held)) for name, place in lacking.items()]
-        )
-    return list(by) or list(dict.fromkeys(limited)) or [name for name in sides.a.listed if name in held]
+    if faults:
+        raise InputError(faults)
+    return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in kept]
 
 
 def _share(sides: Sides, name: str, level: float, confidence: float) -> dict[str, object]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,45 +16,42 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from tolstat.analysis import difference, exceedance
-from tolstat.common.tables import VALID
 from tolstat.display import style
-from tolstat.display.text import UNITS, align, csv
+from tolstat.display.table import Column, Row, as_text
+from tolstat.display.text import UNITS, csv, percent
 
 if TYPE_CHECKING:
     from tolstat.questions.compare.query import Change, Comparison, Sides
 
 LEVELS = 200
 """Approximate number of levels of a curve."""
-COLUMNS = 4
+MAX_LOADS = 4
 """Maximum number of loads in the picture."""
 
 
 def text(found: Comparison, loads: bool = False) -> str:
     """Tables of the differences: shares above limits; quantiles and means with `loads` or without limits."""
-    tables = []
-    if len(found.shares):
-        heads = ["P(load > limit)", "A", "B", "B - A", "95 % interval", "only A", "only B", "p"]
-        tables.append(align([heads, *(_share(row, found.sides.paired) for row in found.shares.to_dict("records"))]))
-    if len(found.shares) and not loads:
-        return tables[0]
-    heads = ["load", "statistic", "A", "B", "B - A", "95 % interval"]
-    tables.append(align([heads, *(_load(row) for row in found.loads.to_dict("records"))]))
+    tables = [as_text(_share_columns(found.sides.paired), found.shares)] if len(found.shares) else []
+    if loads or not tables:
+        tables.append(as_text(LOADS, found.loads))
     return "\n\n".join(tables)
 
 
 def note(found: Comparison, a: str, b: str) -> str:
-    """Notes: differences between the studies, number of joints compared, restrictions."""
+    """Notes: differences between the studies, numbers of joints, and what the intervals leave out."""
     sides = found.sides
     lines = [f"A: {a}", f"B: {b}"]
     lines += [f"  {_change(change)}" for change in found.changes] or ["  the studies are the same"]
     if sides.paired:
-        lines.append(f"{len(sides.rows)} pairs of joints with the same random numbers")
-        lines.append(f"{len(found.switched)} times a joint has changed the side of a limit")
+        lines.append(f"{len(sides.a.samples)} pairs of joints with the same random numbers")
+        lines.append(f"{len(found.switched)} times only one joint of a pair is above a limit")
     else:
-        lines.append(f"{len(sides.a.results)} and {len(sides.b.results)} joints with random numbers of their own")
-    lost = int(sum((~np.isin(side.results["status"], VALID)).sum() for side in (sides.a, sides.b)))
-    if lost:
-        lines.append(f"{lost} joints without a valid load: left out, and counted both ways in the bounds of the CSV")
+        lines.append(f"{len(sides.a.samples)} and {len(sides.b.samples)} joints with different random numbers")
+    unresolved = sides.a.unresolved + sides.b.unresolved
+    if unresolved:
+        lines.append(
+            f"{unresolved} joints without a valid load: left out; the bounds in the CSV count them below, then above"
+        )
     if not sides.iid:
         lines.append("no intervals: they hold for independent samples only")
     return "\n".join(lines)
@@ -86,7 +83,7 @@ def write(found: Comparison, stem: Path, names: tuple[str, str]) -> list[Path]:
 
 
 def figure(found: Comparison, names: tuple[str, str]) -> Figure:
-    """Draw both exceedance curves of at most `COLUMNS` of the loads compared, and below them the difference.
+    """Draw both exceedance curves of at most `MAX_LOADS` of the loads compared, and below them the difference.
 
     Parameters
     ----------
@@ -100,7 +97,7 @@ def figure(found: Comparison, names: tuple[str, str]) -> Figure:
     Figure
         Bands are pointwise 95 % intervals; those of the difference use the pairs if joints are paired.
     """
-    loads = list(dict.fromkeys(found.loads["load"]))[:COLUMNS]
+    loads = list(dict.fromkeys(found.loads["load"]))[:MAX_LOADS]
     with style.settings():
         page = Figure(figsize=(max(4.2 * len(loads), 6.5), 6.6))
         axes = page.subplots(2, len(loads), squeeze=False, sharex="col", height_ratios=(3, 2))
@@ -164,22 +161,45 @@ def _levels(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float6
     return np.unique(np.quantile(both, shares, method="inverted_cdf"))
 
 
-def _share(row: Mapping[Any, Any], paired: bool) -> list[str]:
-    limit = f"{row['load']} > {row['level']:g} {UNITS.get(row['unit'], row['unit'])}".rstrip()
-    values = [f"{100 * row[key]:.3g} %" for key in ("a", "b")] + [f"{100 * row['estimate']:+.3g} %"]
-    counts = [str(row["only_a"]), str(row["only_b"])] if paired else ["-", "-"]
-    return [limit, *values, _ends(row, 100.0, " %"), *counts, "-" if math.isnan(row["p"]) else f"{row['p']:.2g}"]
+def _share_columns(paired: bool) -> tuple[Column, ...]:
+    """Columns of the table `Comparison.shares`; joints above on one side only are counted for pairs."""
+
+    def limit(row: Row) -> str:
+        return f"{row['load']} > {row['level']:g} {UNITS.get(row['unit'], row['unit'])}".rstrip()
+
+    def only(side: str) -> Callable[[Row], str]:
+        return lambda row: str(row[f"only_{side}"]) if paired else "-"
+
+    return (
+        Column("P(load > limit)", limit),
+        Column("A", lambda row: percent(row["a"])),
+        Column("B", lambda row: percent(row["b"])),
+        Column("B - A", lambda row: f"{100 * row['estimate']:+.3g} %"),
+        Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
+        Column("only A", only("a")),
+        Column("only B", only("b")),
+        Column("p", lambda row: "-" if math.isnan(row["p"]) else f"{row['p']:.2g}"),
+    )
 
 
-def _load(row: Mapping[Any, Any]) -> list[str]:
-    unit = f" {UNITS.get(row['unit'], row['unit'])}".rstrip()
-    values = [f"{row[key]:.4g}{unit}" for key in ("a", "b")] + [f"{row['estimate']:+.3g}{unit}"]
-    return [row["load"], row["statistic"], *values, _ends(row, 1.0, unit)]
+def _unit(row: Row) -> str:
+    return f" {UNITS.get(row['unit'], row['unit'])}".rstrip()
 
 
-def _ends(row: Mapping[Any, Any], factor: float, unit: str) -> str:
+def _interval(row: Row, factor: float, unit: str) -> str:
     low, high = factor * row["lower"], factor * row["upper"]
     return "-" if math.isnan(low) else f"{low:+.3g} .. {high:+.3g}{unit}"
+
+
+LOADS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("statistic", lambda row: str(row["statistic"])),
+    Column("A", lambda row: f"{row['a']:.4g}{_unit(row)}"),
+    Column("B", lambda row: f"{row['b']:.4g}{_unit(row)}"),
+    Column("B - A", lambda row: f"{row['estimate']:+.3g}{_unit(row)}"),
+    Column("95 % interval", lambda row: _interval(row, 1.0, _unit(row))),
+)
+"""Columns of the table `Comparison.loads`."""
 
 
 def _change(change: Change) -> str:

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import reweight
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS
-from tolstat.common.tables import VALID, Status
-from tolstat.store import ResultStore, view
-from tolstat.store.recall import recall
+from tolstat.common.tables import Status
+from tolstat.store.sample_load import SampleLoad
+from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.change import changed
 from tolstat.study.selection import columns_of
 from tolstat.study.tolerances.distributions import Distribution, score
 
-OUTSIDE = 1e-4
+SHARES = (0.5, 0.9, 0.99)
+"""Quantiles of a study without limits."""
+MAX_OUTSIDE = 1e-4
 """Maximum probability of the new distribution outside the range of the old one; no estimate covers that part."""
 _ENDS = np.array([1e-12, 1 - 1e-12])
 
@@ -55,19 +56,15 @@ class Reweighted(NamedTuple):
         return figures if w.usable else f"needs new runs: {figures}, {reweight.LEAST_ESS} joints needed"
 
 
-def of_store(
-    store: ResultStore, settings: Sequence[str], study_path: Path | None = None, confidence: float = 0.95
-) -> Reweighted:
+def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) -> Reweighted:
     """Estimate a campaign's statistics for other tolerances.
 
     Parameters
     ----------
-    store : ResultStore
-        The result file.
+    view : View
+        A campaign of joints drawn from tolerances.
     settings : sequence of str
         See `study.change.changed`.
-    study_path : Path, optional
-        Study file to read if the text in the result file can no longer be read.
     confidence : float
         Confidence level of the intervals.
 
@@ -81,44 +78,44 @@ def of_store(
     InputError
         With the faults of the settings, and every error whose new distribution exceeds the range of the old one.
     StoreError
-        When the joints of the file are not drawn from tolerances.
+        When the joints of the file are not drawn from tolerances, or none of them is possible under the new ones.
 
     Examples
     --------
     >>> with tolstat.open(path) as store:
-    ...     found = tolstat.reweighted(store, ["pin1.offset_t.plus_minus=0.09 mm"])
+    ...     found = tolstat.reweighted(store.view(), ["pin1.offset_t.plus_minus=0.09 mm"])
     >>> row = found.table.iloc[0]
     >>> found.weights.usable, row["load"], bool(row["estimate"] < row["before"])
     (True, 'cross1.F', True)
     """
-    study = recall(store, path=study_path)
-    if not study.tolerances:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
-    new = changed(study, settings)
-    names = [name for name, d in new.items() if d.describe() != study.tolerances[name].describe()]
-    faults = [f for name in names for f in _unreachable(name, study.tolerances[name], new[name])]
+    view.check_drawn()
+    view.check_sample()
+    old = view.study.tolerances
+    new = changed(view.study, settings)
+    names = [name for name in new if new[name].describe() != old[name].describe()]
+    faults = [fault for name in names for fault in _check_range(name, old[name], new[name])]
     if faults:
         raise InputError(faults)
-    columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
-    campaign = view.read(store, LOAD_FIELDS, (), weighted=True)
-    blocks = view.error_blocks(store, columns)  # the errors of a million joints would be half a gigabyte
-    logs = np.concatenate([_log_ratios(study, new, names, errors) for errors in blocks])
-    logs, campaign = logs[campaign.results["status"] != Status.PENDING], campaign.done()
-    weights = reweight.smooth(logs if campaign.weights is None else logs + np.log(campaign.weights))
-    rows = [_row(campaign, weights, name, level, confidence) for name, level in campaign.limits.items()]
-    table = pd.DataFrame(rows) if rows else _quantiles(campaign, weights, confidence)
-    return Reweighted(weights, names, table)
+    done = np.flatnonzero(view.status != Status.PENDING)
+    try:
+        weights = reweight.smooth(_log_ratios(view, new, names)[done])
+    except ValueError as error:
+        raise StoreError(str(Fault(str(view.path), str(error), "run a study with these tolerances"))) from error
+    loads = [view.load(name).only(done) for name in view.limits or view.shown_loads]
+    if view.limits:
+        rows = [_share_above(load, weights, view.limits[load.name], confidence) for load in loads]
+    else:
+        rows = [_quantile(load, weights, share, confidence) for load in loads for share in SHARES]
+    return Reweighted(weights, names, pd.DataFrame(rows))
 
 
-def _unreachable(name: str, old: Distribution, new: Distribution) -> list[Fault]:
+def _check_range(name: str, old: Distribution, new: Distribution) -> list[Fault]:
     """Faults of a new distribution that has values where the old one has none."""
     place, remedy = f"tolerances.{name}", "run a study with these tolerances"
     if old.discrete or new.discrete:
         if not (old.discrete and new.discrete):
-            return [
-                Fault(place, "is measured in one of the two cases: the joints do not have the other's values", remedy)
-            ]
+            found = "is of measured parts before or after the change, not both: the joints lack the new values"
+            return [Fault(place, found, remedy)]
         middle = (np.arange(10_000) + 0.5) / 10_000
         outside = float(np.mean(np.isneginf(old.logpdf(new.ppf(middle)))))
     else:
@@ -126,57 +123,59 @@ def _unreachable(name: str, old: Distribution, new: Distribution) -> list[Fault]
         u = np.concatenate([np.geomspace(1e-12, 0.5, 2000), 1 - np.geomspace(1e-12, 0.5, 2000)[::-1]])
         x = new.ppf(u)
         outside = float(np.max(u[x < low], initial=0.0) + np.max(1 - u[x > high], initial=0.0))
-    if outside > OUTSIDE:
+    if outside > MAX_OUTSIDE:
         found = f"{outside:.2g} of the new errors lie where the study draws none"
         return [Fault(place, found, remedy)]
     return []
 
 
-def _log_ratios(
-    study: Study,
-    new: Mapping[str, Distribution],
-    names: Sequence[str],
-    errors: np.ndarray[tuple[int], np.dtype[np.void]],
+def _log_ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str]) -> FloatArray:
+    """Logarithm of new density over that which each joint was drawn from, (n,), up to a constant."""
+    study = view.study
+    columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
+    blocks = view.error_blocks(columns)  # the errors of a million joints would be half a gigabyte
+    logs = np.concatenate([_block_log_ratios(study, new, names, errors) for errors in blocks])
+    return logs if view.weights is None else logs + np.log(view.weights)
+
+
+def _block_log_ratios(
+    study: Study, new: Mapping[str, Distribution], names: Sequence[str], errors: NDArray[np.void]
 ) -> FloatArray:
-    """Log likelihood ratio (new over old density) of each joint, (n,)."""
+    """Logarithm of new over old density of the errors of some joints, (m,)."""
     logs = np.zeros(len(errors))
     for name in names:
         values = sampling.values(errors, name)
         logs += new[name].logpdf(values) - study.tolerances[name].logpdf(values)
-    linked = study.copula.names
-    if set(linked) & set(names):
+    correlated = study.copula.names
+    if set(correlated) & set(names):
         # density of the Gaussian copula: correlated over independent normal density
-        form = np.linalg.inv(study.copula.matrix) - np.eye(len(linked))
+        form = np.linalg.inv(study.copula.matrix) - np.eye(len(correlated))
         for sign, tolerances in ((-0.5, new), (0.5, study.tolerances)):
-            z = np.column_stack([score(tolerances[n], sampling.values(errors, n)) for n in linked])
+            z = np.column_stack([score(tolerances[n], sampling.values(errors, n)) for n in correlated])
             logs += sign * np.einsum("ni,ij,nj->n", z, form, z)
     return logs
 
 
-def _row(campaign: view.Campaign, weights: Weights, name: str, level: float, confidence: float) -> dict[str, object]:
-    values, unit = view.load(campaign.results, name)
-    valid = np.isin(campaign.results["status"], VALID) & np.isfinite(values)
-    found = reweight.share_above(values[valid], _part(weights, valid), level, confidence, campaign.iid)
-    counted = weights.values[valid & (values > level)].sum()
-    before = campaign.above(values, level, confidence).estimate
-    head = {"load": name, "unit": unit, "level": level, "before": before}
-    bounds = {"bound_lower": counted, "bound_upper": counted + weights.values[~valid].sum()}
+def _share_above(load: SampleLoad, weights: Weights, level: float, confidence: float) -> dict[str, object]:
+    """Row of the table for a limit; `weights` are those of the joints of `load`."""
+    valid = load.is_valid
+    found = reweight.share_above(load.values[valid], _restricted(weights, valid), level, confidence, load.iid)
+    above = weights.values[valid & (load.values > level)].sum()
+    head = {"load": load.name, "unit": load.unit, "level": level, "before": load.above(level, confidence).estimate}
+    bounds = {"bound_lower": above, "bound_upper": above + weights.values[~valid].sum()}
     return {**head, **found._asdict(), **bounds}
 
 
-def _quantiles(campaign: view.Campaign, weights: Weights, confidence: float) -> pd.DataFrame:
-    rows = []
-    for name in BUSHING_LOADS:
-        values, unit = view.load(campaign.results, name)
-        valid = np.isin(campaign.results["status"], VALID) & np.isfinite(values)
-        part = _part(weights, valid)
-        for share in (0.5, 0.9, 0.99):
-            found = reweight.quantile(values[valid], part, share, confidence, campaign.iid)
-            before = campaign.quantile(values, share, confidence).estimate
-            rows.append([name, unit, share, before, *found, part.ess])
-    return pd.DataFrame(rows, columns=["load", "unit", "share", "before", "estimate", "lower", "upper", "ess"])
+def _quantile(load: SampleLoad, weights: Weights, share: float, confidence: float) -> dict[str, object]:
+    """Row of the table for a quantile; `weights` are those of the joints of `load`."""
+    part = _restricted(weights, load.is_valid)
+    estimate, lower, upper = reweight.quantile(load.values[load.is_valid], part, share, confidence, load.iid)
+    before = load.quantile(share, confidence).estimate
+    head = {"load": load.name, "unit": load.unit, "share": share, "before": before}
+    return {**head, "estimate": estimate, "lower": lower, "upper": upper, "ess": part.ess}
 
 
-def _part(weights: Weights, rows: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Weights:
-    values = weights.values[rows] / weights.values[rows].sum()
+def _restricted(weights: Weights, joints: NDArray[np.bool_]) -> Weights:
+    """Weights of some of the joints, with the sum 1."""
+    values = weights.values[joints] / weights.values[joints].sum()
     return weights._replace(values=values, ess=float(1.0 / (values**2).sum()))

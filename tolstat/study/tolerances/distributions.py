@@ -34,7 +34,7 @@ class Distribution(ABC):
         Parameters
         ----------
         u : ndarray, (n,)
-            Probabilities in the open interval (0, 1).
+            Probabilities; at 0 and 1 the ends of the support, which may be infinite.
 
         Returns
         -------

@@ -1,0 +1,70 @@
+"""Density ratios of joints as a function of factors on their tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import sampling
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.study.scaling import Tolerance
+from tolstat.study.tolerances.density_ratio import log_mean_square, unbounded
+from tolstat.study.tolerances.distributions import Distribution, Normal, Rayleigh
+
+Entries = dict[str, dict[str, Any]]
+"""Keys of entries of ``[tolerances]`` by pattern."""
+
+
+class DensityRatios:
+    """Logarithms of new over old density of joints; terms of the factors used last are kept.
+
+    Parameters
+    ----------
+    tolerances : sequence of Tolerance
+        Tolerances that the factors scale.
+    errors : ndarray, shape (n,)
+        Errors of the joints, a table with the columns that the tolerances are for.
+    """
+
+    def __init__(self, tolerances: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
+        self._tolerances = tolerances
+        self._values = [[sampling.values(errors, name) for name in t.names] for t in tolerances]
+        self._old = [t.distribution(t.entry) for t in tolerances]
+        self._old_density = [self._log_density(i, old) for i, old in enumerate(self._old)]
+        keep = lru_cache(maxsize=4 * len(tolerances))
+        self._one, self._one_mean_square = keep(self._log_ratio), keep(self._log_mean_square)
+
+    def log_ratios(self, factors: FloatArray) -> FloatArray:
+        """Logarithms of the ratios for tolerances scaled by factors, (n,)."""
+        return np.asarray(sum(self._one(i, float(f)) for i, f in enumerate(factors)))
+
+    def log_mean_square(self, factors: FloatArray) -> float:
+        """Logarithm of the mean square of the ratio; see `analysis.allocation.Problem.log_spread`."""
+        return float(
+            sum(len(t.names) * self._one_mean_square(i, float(factors[i])) for i, t in enumerate(self._tolerances))
+        )
+
+    def of_entries(self, entries: Entries) -> FloatArray:
+        """Logarithms of the ratios for changed entries, (n,)."""
+        new = [t.distribution(entries.get(t.pattern, t.entry)) for t in self._tolerances]
+        return np.asarray(sum(self._log_density(i, own) for i, own in enumerate(new)) - sum(self._old_density))
+
+    def _log_ratio(self, i: int, factor: float) -> FloatArray:
+        return self._log_density(i, self._scaled(i, factor)) - self._old_density[i]
+
+    def _log_mean_square(self, i: int, factor: float) -> float:
+        return log_mean_square(self._scaled(i, factor), self._old[i])
+
+    def _scaled(self, i: int, factor: float) -> Distribution:
+        old, t = self._old[i], self._tolerances[i]
+        if isinstance(old, (Normal, Rayleigh)) and unbounded(old) and "mean" not in t.entry:
+            return replace(old, sigma=factor * old.sigma)  # as the scaled entry gives it, but without parsing
+        return t.distribution(t.scaled(factor))
+
+    def _log_density(self, i: int, found: Distribution) -> FloatArray:
+        return np.asarray(sum(found.logpdf(values) for values in self._values[i]))

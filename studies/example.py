@@ -58,7 +58,7 @@ print(causes.table[["error", "first", "first_lower", "first_upper", "size", "siz
 # %%
 tilts = ["*.tilt_*.plus_minus=0.42 deg"]
 with tolstat.open(first) as store:
-    other = tolstat.reweighted(store, tilts)
+    other = tolstat.reweighted(store.view(), tilts)
 print(other.table[["load", "level", "before", "estimate", "lower", "upper"]].head(4).round(4))
 print(other.verdict)
 
@@ -68,7 +68,7 @@ print(other.verdict)
 
 # %%
 with tolstat.open(first) as store:
-    found = tolstat.allocated(store, ["P(cross1.F > 1500 N) < 0.06"])
+    found = tolstat.allocated(store.view(), ["P(cross1.F > 1500 N) < 0.06"])
 print(found.tolerances[["tolerance", "errors", "factor", "cost_before", "cost"]].round(3))
 print(found.verdict)
 
@@ -81,7 +81,7 @@ again = tolstat.load(here / "iso2768_f.toml", n=600, text=found.text.replace("se
 second = folder / "example_next.h5"
 tolstat.run(again, second, workers=1)
 with tolstat.open(first) as a, tolstat.open(second) as b:
-    difference = tolstat.compared(a, b, ["cross1.F"])
+    difference = tolstat.compared(a.view(), b.view(), ["cross1.F"])
 print(difference.shares[["load", "level", "a", "b", "estimate", "lower", "upper"]].head(1).round(4))
 print(f"{len(difference.changes)} changes in the study")
 print(f"{len(difference.switched)} times only one joint of a pair is above a limit")
@@ -91,6 +91,6 @@ print(f"{len(difference.switched)} times only one joint of a pair is above a lim
 
 # %%
 with tolstat.open(second) as store:
-    print(sorted(tolstat.statistics(store)))
+    print(sorted(tolstat.statistics(store.view())))
 for path in tolstat.write_report(second, folder):
     print(path.name)

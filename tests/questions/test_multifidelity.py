@@ -123,7 +123,7 @@ def plan(tmp_path, monkeypatch):
     )
     monkeypatch.setattr(campaign, "run", partial(campaign.run, stages=stages))
     costs = {"dynamic": 5e-3, "quasistatic": 4e-4}
-    monkeypatch.setattr(multifidelity, "_cost", lambda plan, pilot: costs[plan.solver.fidelity])
+    monkeypatch.setattr(multifidelity, "_cost", lambda plan: costs[plan.study.solver.fidelity])
     path = tmp_path / "plan.toml"
     path.write_text(PLAN, encoding="utf-8")
     return path
@@ -156,12 +156,12 @@ def test_two_files_of_the_same_joints_stopped_and_gone_on_with(tmp_path, plan):
 def test_every_fault_is_told(tmp_path, plan):
     done = CliRunner().invoke(app, ["multifidelity", str(plan), "--low", "auto", "--high", "dynamic:x"])
     assert done.exit_code == 2
-    for part in ("low: 'auto' is no fidelity", "high: 'dynamic:x' is no fidelity"):
+    for part in ("low: 'auto' is not a fidelity", "high: 'dynamic:x' is not a fidelity"):
         assert part in done.stderr
     assert "--budget: '1' is no time" in CliRunner().invoke(app, ["multifidelity", str(plan), "--budget", "1"]).stderr
     same = CliRunner().invoke(app, ["multifidelity", str(plan), "--low", "dynamic"])
     assert "low: 'dynamic' is the same as 'dynamic'" in same.stderr
     solver = multifidelity.solver_of(study.load(plan), "quasistatic:36", "--low")
     assert (solver.fidelity, solver.steps_per_rev) == ("quasistatic", 36)
-    with pytest.raises(InputError, match=r"--by: 'fork1.F' is no load that the study asks for"):
-        multifidelity.run(study.load(plan), "quasistatic:36", "dynamic", tmp_path, 1.0, by="fork1.F")
+    with pytest.raises(InputError, match=r"--by: 'fork1.F' is not a load that the study asks for"):
+        multifidelity.two_fidelities(study.load(plan), "quasistatic:36", "dynamic", tmp_path, 1.0, by="fork1.F")

@@ -172,7 +172,7 @@ def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
 
 
 def test_the_example_of_the_function_is_right(tmp_path):
-    found = doctest.DocTestFinder().find(rare.of_study, "of_study", globs={"tolstat": tolstat})[0]
+    found = doctest.DocTestFinder().find(rare.rare_event, "rare_event", globs={"tolstat": tolstat})[0]
     found.globs |= {"study": load(tmp_path), "path": tmp_path / "example.h5"}
     assert doctest.DocTestRunner().run(found) == (0, 2)
 
@@ -258,7 +258,7 @@ def test_every_fault_of_a_question_is_told(tmp_path):
     path = load(tmp_path).path
     for options, text in (
         ([], "--limit: is missing"),
-        (["--limit", "cross1.F"], "'cross1.F' is no limit"),
+        (["--limit", "cross1.F"], "'cross1.F' is not a limit"),
         (["--limit", "cross9.F > 1 N"], "'cross9.F' is not a load"),
         (["--limit", "cross1.F > 1 mm"], "--limit: cross1.F"),
         (["--limit", "fork1.T > 1 N*m"], "leaves out fork1.T of --limit"),

@@ -41,7 +41,7 @@ def multifidelity(
     from tolstat.campaign import run as campaign
     from tolstat.cli.run import seconds_of
     from tolstat.display import text
-    from tolstat.questions.multifidelity import query as fidelities
+    from tolstat.questions.multifidelity.query import two_fidelities
 
     faults: list[Fault] = []
     with gather(faults):
@@ -53,7 +53,7 @@ def multifidelity(
     make_folder(out)
     announce_compilation()
     try:
-        found = fidelities.run(plan, low, high, out, seconds, pilot, by, workers, say)
+        found = two_fidelities(plan, low, high, out, seconds, pilot, by, workers, say)
     except campaign.Interrupted as stop:
         say(str(stop))
         raise typer.Exit(stop.exit_code) from stop

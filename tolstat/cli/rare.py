@@ -13,7 +13,7 @@ from tolstat.cli.extend import StudyFile
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
-    from tolstat.questions.rare.query import Found
+    from tolstat.questions.rare.query import RareEvent
     from tolstat.study import Study
 
 
@@ -86,25 +86,24 @@ def rare(
 
 def _plan(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
     from tolstat import study
-    from tolstat.questions.rare.query import asked, parse
+    from tolstat.questions.rare.query import parse_limit, subset_study
 
     faults: list[Fault] = []
     if limit is None:
         faults.append(Fault("--limit", "is missing", 'write --limit "cross1.F > 900 N"'))
     else:
         with gather(faults):
-            parse(limit)
+            parse_limit(limit)
     with gather(faults):
         plan = study.load(source)
     if faults or limit is None:
         raise InputError(faults)
-    return asked(plan, limit, **given)
+    return subset_study(plan, limit, **given)
 
 
 def _recalled(source: Path, study_file: Path | None, given: list[Any]) -> Study:
     from tolstat.common.errors import StoreError
     from tolstat.store import ResultStore
-    from tolstat.store.recall import recall
 
     with ResultStore.open(source) as store:
         if store.sampling["method"] != "subset":
@@ -112,10 +111,10 @@ def _recalled(source: Path, study_file: Path | None, given: list[Any]) -> Study:
             raise StoreError(str(Fault(str(source), found, "give the study, with --limit and --out")))
         if any(value is not None for value in given):
             raise InputError([Fault(str(source), "has its question in it", "give no option but --workers and --json")])
-        return recall(store, path=study_file)
+        return store.view(study_file).study
 
 
-def _summary(found: Found) -> dict[str, Any]:
+def _summary(found: RareEvent) -> dict[str, Any]:
     import math
 
     numbers = found.estimate._asdict() | {"as_sure_as": found.as_sure_as, "upper_if_above": found.upper_if_above}
@@ -124,7 +123,7 @@ def _summary(found: Found) -> dict[str, Any]:
     return head | plain | {"joints": found.joints, "unresolved": found.unresolved}
 
 
-def _talk(found: Found, path: Path) -> None:
+def _talk(found: RareEvent, path: Path) -> None:
     say(f"{path}: {found.joints} joints, {found.unresolved} of them failed or not settled")
     if found.reached:
         say(f"as sure as {found.as_sure_as:.2g} joints drawn at random")

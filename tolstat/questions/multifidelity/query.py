@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -18,23 +18,22 @@ from tolstat.campaign.extend import grow
 from tolstat.campaign.plan import simulate_timed
 from tolstat.campaign.progress import note
 from tolstat.common.errors import Fault, InputError, StoreError, gather
-from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, UNIT_OF_LOAD
+from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean, validate
-from tolstat.common.tables import VALID
 from tolstat.joint import perturb
 from tolstat.sampling import draw, draw_blocks
-from tolstat.store import ResultStore, view
+from tolstat.store import ResultStore
 from tolstat.store.recorded import perturbed
-from tolstat.store.view import Campaign
+from tolstat.store.sample_load import SampleLoad
 from tolstat.study import Study
 from tolstat.study.model import Solver
 
 SHARES = (0.5, 0.9, 0.99)
-TIMED = 64
+MAX_TIMED = 64
 """Maximum number of joints simulated to measure the cost of a fidelity."""
 
 
-class Found(NamedTuple):
+class TwoFidelities(NamedTuple):
     """Result of a campaign at two fidelities.
 
     Attributes
@@ -61,6 +60,25 @@ class Found(NamedTuple):
     files: tuple[Path, Path]
 
 
+class _Plan(NamedTuple):
+    """One of the two campaigns: its study, its file, and the number of joints of the pilot."""
+
+    study: Study
+    path: Path
+    pilot: int
+
+
+class _Loads(NamedTuple):
+    """Loads asked for by name, of the joints of both files; both draw the same joints, row by row."""
+
+    high: dict[str, SampleLoad]
+    low: dict[str, SampleLoad]
+    costs: tuple[float, float]
+
+    def pairs(self, name: str) -> Pairs:
+        return Pairs(self.high[name].valid_or_nan, self.low[name].valid_or_nan, *self.costs)
+
+
 def solver_of(study: Study, text: str, place: str) -> Solver:
     """Solver settings from a text such as ``"quasistatic:36"``: fidelity and, if given, steps per revolution.
 
@@ -72,11 +90,12 @@ def solver_of(study: Study, text: str, place: str) -> Solver:
     fidelity, colon, steps = text.partition(":")
     own = study.solver.model_dump(exclude_unset=True, exclude={"error_budget"}) | {"fidelity": fidelity}
     if fidelity == "auto" or (colon and not steps.isdecimal()):
-        raise InputError([Fault(place, f"{text!r} is no fidelity", "write dynamic, quasistatic:36 or so")])
+        remedy = 'write "dynamic" or, with steps per revolution, "quasistatic:36"'
+        raise InputError([Fault(place, f"{text!r} is not a fidelity", remedy)])
     return validate(Solver, own | ({"steps_per_rev": int(steps)} if colon else {}), place)
 
 
-def run(
+def two_fidelities(
     study: Study,
     low: str,
     high: str,
@@ -86,7 +105,7 @@ def run(
     by: str | None = None,
     workers: int | None = None,
     tell: Callable[[str], None] = note,
-) -> Found:
+) -> TwoFidelities:
     """Simulate a study at two fidelities and combine the results.
 
     Parameters
@@ -111,7 +130,7 @@ def run(
 
     Returns
     -------
-    Found
+    TwoFidelities
 
     Raises
     ------
@@ -123,109 +142,113 @@ def run(
     Interrupted, WorkerDied
         As `campaign.run`; the same call resumes.
     """
-    solvers = _solvers(study, low, high)
-    asked = study.asked or list(BUSHING_LOADS)
-    by = asked[0] if by is None else by
-    if study.sampling.method != "random":
-        found = f"is {study.sampling.method!r}: only independent samples have such intervals"
-        raise InputError([Fault(f"{study.path}: sampling.method", found, 'use "random"')])
-    if by not in asked:
-        raise InputError([Fault("--by", f"{by!r} is no load that the study asks for", did_you_mean(by, asked))])
-    output = study.output.model_copy(update={"histories": "none"})
-    plans = [replace(study, solver=solver, output=output) for solver in solvers]
-    paths = folder / f"{study.name}_high.h5", folder / f"{study.name}_low.h5"
-    held = [_simulate(plan, path, pilot, workers) for plan, path in zip(plans, paths, strict=True)]
-    costs = _cost(plans[0], pilot), _cost(plans[1], pilot)
-    pairs = _pairs(_read(paths), by, costs)
-    both = np.isfinite(pairs.high[:pilot]) & np.isfinite(pairs.low[:pilot])
-    allocation = multifidelity.allocate(pairs.high[:pilot][both], pairs.low[:pilot][both], *costs)
+    plans = _plans(study, low, high, folder, pilot)
+    names = study.asked or list(BUSHING_LOADS)
+    by = names[0] if by is None else by
+    if by not in names:
+        raise InputError([Fault("--by", f"{by!r} is not a load that the study asks for", did_you_mean(by, names))])
+    held = [_simulate(plan, workers) for plan in plans]
+    costs = _cost(plans[0]), _cost(plans[1])
+    allocation = _allocate(_read(plans, [by], costs).pairs(by), pilot)
     tell(_sentence(allocation, by, *costs))
     if allocation.gain > 1.0 and max(held) == pilot:
         # extend both files before simulating, so that an interrupted run resumes with the numbers of joints chosen
-        for plan, path, n in zip(plans, paths, allocation.joints(budget, *costs, pilot), strict=True):
-            _extend(plan, path, n)
-        for plan, path in zip(plans, paths, strict=True):
-            _simulate(plan, path, pilot, workers)
-    whole = _read(paths)
-    joints = len(whole[0].results), len(whole[1].results)
-    return Found(_table(whole, asked, study.limits, costs), allocation, *costs, *joints, paths)
+        for plan, n in zip(plans, allocation.joints(budget, *costs, pilot), strict=True):
+            _extend(plan, n)
+        for plan in plans:
+            _simulate(plan, workers)
+    loads = _read(plans, names, costs)
+    joints = len(loads.high[by].values), len(loads.low[by].values)
+    table = _table(loads, study.limits)
+    return TwoFidelities(table, allocation, *costs, *joints, (plans[0].path, plans[1].path))
 
 
-def _solvers(study: Study, low: str, high: str) -> tuple[Solver, Solver]:
-    """Settings of the high and of the low fidelity."""
+def _plans(study: Study, low: str, high: str, folder: Path, pilot: int) -> tuple[_Plan, _Plan]:
+    """Campaigns at the high and at the low fidelity."""
     faults: list[Fault] = []
-    found = []
+    solvers = []
     for place, text in (("high", high), ("low", low)):
         with gather(faults):
-            found.append(solver_of(study, text, place))
-    if len(found) == 2 and found[0] == found[1]:
+            solvers.append(solver_of(study, text, place))
+    if len(solvers) == 2 and solvers[0] == solvers[1]:
         faults.append(Fault("low", f"{low!r} is the same as {high!r}", "give a cheaper one"))
+    if study.sampling.method != "random":
+        found = f"is {study.sampling.method!r}: the intervals hold for independent samples only"
+        faults.append(Fault(f"{study.path}: sampling.method", found, 'use "random"'))
     if faults:
         raise InputError(faults)
-    return found[0], found[1]
+    output = study.output.model_copy(update={"histories": "none"})
+    plans = [
+        _Plan(replace(study, solver=solver, output=output), folder / f"{study.name}_{name}.h5", pilot)
+        for solver, name in zip(solvers, ("high", "low"), strict=True)
+    ]
+    return plans[0], plans[1]
 
 
-def _simulate(plan: Study, path: Path, n: int, workers: int | None) -> int:
-    """Simulate the pending joints of a file (`n` joints if it is new); return its number of joints."""
-    if path.exists():
-        with ResultStore.open(path) as store:
-            n = store.n - int(plan.sampling.nominal_first)
-    campaign.run(_sized(plan, n), path, execution=Execution(workers=workers), check=False)
+def _simulate(plan: _Plan, workers: int | None) -> int:
+    """Simulate the pending joints of a file, a new one with the joints of the pilot; return its number of joints."""
+    n = plan.pilot
+    if plan.path.exists():
+        with ResultStore.open(plan.path) as store:
+            n = store.n - store.first_sample
+    campaign.run(_sized(plan.study, n), plan.path, execution=Execution(workers=workers), check=False)
     return n
 
 
-def _extend(plan: Study, path: Path, n: int) -> None:
+def _extend(plan: _Plan, n: int) -> None:
     """Extend a file to `n` joints; the new ones are pending."""
-    with ResultStore.open(path, "r+") as store:
-        more = range(store.n, n + int(plan.sampling.nominal_first))
+    study = _sized(plan.study, n)
+    with ResultStore.open(plan.path, "r+") as store:
+        more = range(store.n, study.rows)
         if more:
-            grow(store, _sized(plan, n), draw_blocks(plan, more))
+            grow(store, study, draw_blocks(plan.study, more))
 
 
-def _sized(plan: Study, n: int) -> Study:
-    return replace(plan, sampling=plan.sampling.model_copy(update={"n": n}))
+def _sized(study: Study, n: int) -> Study:
+    return replace(study, sampling=study.sampling.model_copy(update={"n": n}))
 
 
-def _cost(plan: Study, pilot: int) -> float:
+def _cost(plan: _Plan) -> float:
     """Measured cost, seconds of one core per joint."""
-    first = int(plan.sampling.nominal_first)
-    rows = np.arange(first, first + min(pilot, TIMED))
-    params = perturbed(plan, rows, draw(plan, range(rows[0], rows[-1] + 1)), perturb)
-    return simulate_timed(plan, params, [plan.solver.options()] * len(rows))[1] / len(rows)
+    study, first = plan.study, plan.study.first_sample
+    rows = np.arange(first, first + min(plan.pilot, MAX_TIMED))
+    params = perturbed(study, rows, draw(study, range(rows[0], rows[-1] + 1)), perturb)
+    return simulate_timed(study, params, [study.solver.options()] * len(rows))[1] / len(rows)
+
+
+def _allocate(pairs: Pairs, pilot: int) -> Allocation:
+    """Split of the work from the pilot: the first joints of both files, those with both loads."""
+    high, low = pairs.high[:pilot], pairs.low[:pilot]
+    both = np.isfinite(high) & np.isfinite(low)
+    return multifidelity.allocate(high[both], low[both], pairs.cost_high, pairs.cost_low)
 
 
 def _sentence(allocation: Allocation, by: str, cost_high: float, cost_low: float) -> str:
-    costs = f"{1e3 * cost_high:.3g} and {1e3 * cost_low:.3g} ms a joint, correlation of {by} {allocation.rho:.4f}"
+    costs = f"{1e3 * cost_high:.3g} and {1e3 * cost_low:.3g} ms per joint, correlation of {by} {allocation.rho:.4f}"
     if not allocation.gain > 1.0:
         return f"no gain: {costs}; the high fidelity alone is as good or better"
-    return f"{costs}: {allocation.ratio:.3g} joints of the low fidelity for one of the high; gain {allocation.gain:.3g}"
+    ratio = f"{allocation.ratio:.3g} joints at low fidelity for each at high fidelity"
+    return f"{costs}: {ratio}; gain {allocation.gain:.3g}"
 
 
-def _read(paths: tuple[Path, Path]) -> tuple[Campaign, Campaign]:
-    """Loads of the joints of both files, the high fidelity first."""
+def _read(plans: tuple[_Plan, _Plan], names: Sequence[str], costs: tuple[float, float]) -> _Loads:
+    """Read loads of both files."""
     found = []
-    for path in paths:
-        with ResultStore.open(path) as store:
-            found.append(view.read(store, LOAD_FIELDS, ()))
-    if len(found[0].results) > len(found[1].results):
-        raise StoreError(str(Fault(str(paths[1]), f"has fewer joints than {paths[0]}", "make both anew")))
-    return found[0], found[1]
+    for plan in plans:
+        with ResultStore.open(plan.path) as store:
+            view = store.view()
+            found.append({load.name: load for load in view.loads(names)})
+    high, low = found
+    if len(high[names[0]].values) > len(low[names[0]].values):
+        fault = Fault(str(plans[1].path), f"has fewer joints than {plans[0].path}", "delete both files and run again")
+        raise StoreError(str(fault))
+    return _Loads(high, low, costs)
 
 
-def _pairs(campaigns: tuple[Campaign, Campaign], name: str, costs: tuple[float, float]) -> Pairs:
-    """Pairs of a load, NaN where not valid; both files have one study and seed, so row i is the same joint."""
-    high, low = (
-        np.where(np.isin(held.results["status"], VALID), view.load(held.results, name)[0], np.nan) for held in campaigns
-    )
-    return Pairs(high, low, *costs)
-
-
-def _table(
-    campaigns: tuple[Campaign, Campaign], asked: list[str], limits: dict[str, float], costs: tuple[float, float]
-) -> pd.DataFrame:
+def _table(loads: _Loads, limits: dict[str, float]) -> pd.DataFrame:
     rows = []
-    for name in asked:
-        pairs = _pairs(campaigns, name, costs)
+    for name in loads.high:
+        pairs = loads.pairs(name)
         found = [("mean", np.nan, multifidelity.mean(pairs))]
         found += [("quantile", share, multifidelity.quantile(pairs, share)) for share in SHARES]
         if name in limits:

@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from tolstat import sampling
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.exceedance import FloatArray, split
 from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
@@ -25,19 +25,18 @@ from tolstat.campaign.extend import grow
 from tolstat.campaign.progress import note
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.tables import VALID
+from tolstat.common.loads import LOADS
 from tolstat.store import ResultStore
-from tolstat.store.view import load
 from tolstat.study import Study, subset_of
 from tolstat.study.model import Subset
 from tolstat.study.selection import limit_of
 
-MANY = 2000
+MIN_PARALLEL = 2000
 """Minimum number of joints of a stage for which worker processes are started: some seconds of work."""
 _LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
 
 
-class Found(NamedTuple):
+class RareEvent(NamedTuple):
     """Result of a subset simulation.
 
     Attributes
@@ -51,11 +50,11 @@ class Found(NamedTuple):
     estimate : Estimate
         The probability.
     joints : int
-        Joints simulated, the nominal one not counted.
+        Number of joints simulated, the nominal one not counted.
     unresolved : int
-        Joints among them without a valid load.
+        Number of these without a valid load.
     unresolved_first : int
-        Joints of level 0 (drawn at random) without a valid load.
+        Number of joints of level 0 (drawn at random) without a valid load.
     """
 
     sampling: Subset
@@ -78,7 +77,7 @@ class Found(NamedTuple):
         return min(1.0, self.estimate.upper + self.unresolved_first / self.sampling.per_level)
 
 
-def parse(text: str) -> tuple[str, float]:
+def parse_limit(text: str) -> tuple[str, float]:
     """Load and level (SI) from a text such as ``"cross1.F > 900 N"``.
 
     Raises
@@ -88,11 +87,11 @@ def parse(text: str) -> tuple[str, float]:
     """
     found = _LIMIT.fullmatch(text)
     if found is None:
-        raise InputError([Fault("--limit", f"{text!r} is no limit", 'write --limit "cross1.F > 900 N"')])
+        raise InputError([Fault("--limit", f"{text!r} is not a limit", 'write --limit "cross1.F > 900 N"')])
     return found["load"], limit_of(found["load"], found["level"], "--limit")
 
 
-def asked(
+def subset_study(
     study: Study,
     limit: str,
     n: int = 1000,
@@ -100,7 +99,7 @@ def asked(
     seed: int | None = None,
     unresolved: Literal["above", "below"] = "below",
 ) -> Study:
-    """Make the study of a subset simulation.
+    """Make the study of a subset simulation, for `run`.
 
     Parameters
     ----------
@@ -109,7 +108,7 @@ def asked(
     limit : str
         Load and level, ``"cross1.F > 15 kN"``.
     n : int
-        Joints a level.
+        Number of joints per level.
     p0 : float
         Share of them that is carried to the next level; ``n * p0`` is a whole number.
     seed : int, optional
@@ -120,20 +119,20 @@ def asked(
     Returns
     -------
     Study
-        For `run`.
+        Its ``sampling`` is a `study.model.Subset`.
 
     Raises
     ------
     InputError
-        With every fault of the question.
+        With every fault of limit and settings.
     """
-    load, above = parse(limit)
+    load, above = parse_limit(limit)
     own = {} if seed is None else {"seed": seed}
     fields = {"load": load, "above": above, "per_level": n, "p0": p0, "unresolved": unresolved}
     return subset_of(study, fields | own)
 
 
-def of_study(study: Study, limit: str, out: str | Path, workers: int | None = None, **question: Any) -> Found:
+def rare_event(study: Study, limit: str, out: str | Path, workers: int | None = None, **settings: Any) -> RareEvent:
     """Estimate the probability of a rare load by subset simulation.
 
     Parameters
@@ -143,20 +142,20 @@ def of_study(study: Study, limit: str, out: str | Path, workers: int | None = No
     limit : str
         Load and level, ``"cross1.F > 15 kN"``.
     out : str or Path
-        Result file; an existing one of the same question is resumed.
+        Result file; an existing one of the same study, limit and settings is resumed.
     workers : int, optional
         As in `run`.
-    **question
-        ``n``, ``p0``, ``seed`` and ``unresolved`` of `asked`.
+    **settings
+        ``n``, ``p0``, ``seed`` and ``unresolved`` of `subset_study`.
 
     Returns
     -------
-    Found
+    RareEvent
 
     Raises
     ------
     InputError
-        With every fault of the question.
+        With every fault of limit and settings.
     StoreError, Interrupted, WorkerDied
         As `run`.
 
@@ -166,57 +165,57 @@ def of_study(study: Study, limit: str, out: str | Path, workers: int | None = No
     >>> found.estimate.lower < 0.0668 < found.estimate.upper  # the load is normal: 700 N, standard deviation 100 N
     True
     """
-    return run(asked(study, limit, **question), Path(out), workers)
+    return run(subset_study(study, limit, **settings), Path(out), workers)
 
 
-def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> Found:
+def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> RareEvent:
     """Run or resume a subset simulation.
 
     Parameters
     ----------
     plan : Study
-        As `asked` makes it.
+        As `subset_study` makes it.
     out : Path
         Result file; created if it does not exist, otherwise resumed.
     workers : int, optional
-        Number of processes for each stage; does not affect results. By default, stages of fewer than `MANY` joints run
-        in this process, which a crash in the simulation of a joint then ends.
+        Number of processes for each stage; does not affect results. By default, stages of fewer than `MIN_PARALLEL`
+        joints run in this process, which a crash in the simulation of a joint then ends.
     tell : callable, optional
         Receives a sentence on each completed level.
 
     Returns
     -------
-    Found
+    RareEvent
 
     Raises
     ------
     StoreError
-        When the file is of another question, or was begun by other code.
+        When the file is of another study, limit or settings, or was begun by other code.
     Interrupted, WorkerDied
         As `campaign.run`; the same call resumes.
     """
-    question = plan.sampling
-    assert isinstance(question, Subset)
-    walk = Walk(Settings(question.per_level, question.p0, question.above), lambda *which: _noise(plan, *which))
+    settings = plan.sampling
+    assert isinstance(settings, Subset)
+    walk = Walk(Settings(settings.per_level, settings.p0, settings.above), lambda *which: _noise(plan, *which))
     unresolved: list[int] = []
-    first, told = int(question.nominal_first), 0
-    held = _rows(out) or first + question.per_level
-    _simulate(plan, out, held, held, workers, tell)  # also checks that the file is of the same question
+    first, told = plan.first_sample, 0
+    rows = _rows(out) or first + settings.per_level
+    _simulate(plan, out, rows, rows, workers, tell)  # also checks that the file is of the same plan
     while not walk.done:
         stage = range(first, first + walk.next.parent.size)
-        if held < stage.stop:
-            held = stage.stop
+        if rows < stage.stop:
+            rows = stage.stop
             _append(plan, out, stage, walk.next)
-            _simulate(plan, out, held, len(stage), workers, tell)
-        loads, lost = _loads(question, out, stage, walk.next)
-        unresolved.append(lost)
+            _simulate(plan, out, rows, len(stage), workers, tell)
+        loads, n_unresolved = _loads(plan, settings, out, stage, walk.next)
+        unresolved.append(n_unresolved)
         walk.take(loads)
         first = stage.stop
         for number, level in enumerate(walk.levels[told:], told):
-            tell(f"level {number}: {level.joints} joints, {level.share:.3g} of them beyond the next threshold")
+            tell(f"level {number}: {level.joints} joints, {level.share:.3g} of them above the next threshold")
         told = len(walk.levels)
-    joints = first - int(question.nominal_first)
-    return Found(question, walk.levels, walk.reached, walk.estimate(), joints, sum(unresolved), unresolved[0])
+    joints = first - plan.first_sample
+    return RareEvent(settings, walk.levels, walk.reached, walk.estimate(), joints, sum(unresolved), unresolved[0])
 
 
 def _noise(plan: Study, level: int, first: int, count: int) -> FloatArray:
@@ -227,6 +226,7 @@ def _noise(plan: Study, level: int, first: int, count: int) -> FloatArray:
 
 
 def _rows(out: Path) -> int:
+    """Number of rows of the file, 0 if there is none."""
     if not out.exists():
         return 0
     with ResultStore.open(out) as store:
@@ -235,14 +235,13 @@ def _rows(out: Path) -> int:
 
 def _sized(plan: Study, rows: int) -> Study:
     """The study with `rows` rows, the nominal joint included."""
-    n = rows - int(plan.sampling.nominal_first)
-    return replace(plan, sampling=plan.sampling.model_copy(update={"n": n}))
+    return replace(plan, sampling=plan.sampling.model_copy(update={"n": rows - plan.first_sample}))
 
 
 def _simulate(plan: Study, out: Path, rows: int, count: int, workers: int | None, tell: Callable[[str], None]) -> None:
     """Simulate the pending rows of the file, about `count` of them."""
     execution = Execution(workers=workers)
-    if workers is None and count < MANY:
+    if workers is None and count < MIN_PARALLEL:
         execution = Execution("serial", 1, block=count)
     campaign.run(_sized(plan, rows), out, execution=execution, tell=tell, check=False)
 
@@ -250,21 +249,25 @@ def _simulate(plan: Study, out: Path, rows: int, count: int, workers: int | None
 def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
     """Append the joints of a stage to the file, as pending rows."""
     origin = np.empty(len(stage), SUBSET)
-    origin["level"], origin["parent"] = joints.level, joints.parent + int(plan.sampling.nominal_first)
+    origin["level"], origin["parent"] = joints.level, joints.parent + plan.first_sample
     with ResultStore.open(out, "r+") as store:
         grow(store, _sized(plan, stage.stop), [sampling.from_scores(plan, joints.scores)], [origin])
 
 
-def _loads(question: Subset, out: Path, stage: range, joints: Candidates) -> tuple[FloatArray, int]:
-    """Loads of a stage, inf or -inf (by `question.unresolved`) where not valid; number of joints not valid."""
-    rows = slice(stage.start, stage.stop)
+def _loads(plan: Study, settings: Subset, out: Path, stage: range, joints: Candidates) -> tuple[FloatArray, int]:
+    """Loads of a stage, inf or -inf (by `settings.unresolved`) where not valid; number of joints not valid.
+
+    The joints of the file are no sample of a production, so that it has no view; it holds all rows, and the rows of a
+    stage are its file slots.
+    """
+    slots = slice(stage.start, stage.stop)
     with ResultStore.open(out) as store:
-        results, origin = store.results(rows), store.origin(rows)
-    parent = np.where(joints.parent < 0, -1, joints.parent + int(question.nominal_first))
+        results, origin = store.results(slots), store.origin(slots)
+    parent = np.where(joints.parent < 0, -1, joints.parent + plan.first_sample)
     if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():
         found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
-        raise StoreError(str(Fault(str(out), found, "run it anew with another --out")))
-    values = load(results, question.load)[0].copy()
-    lost = ~np.isin(results["status"], VALID) | ~np.isfinite(values)
-    values[lost] = math.inf if question.unresolved == "above" else -math.inf
-    return values, int(lost.sum())
+        raise StoreError(str(Fault(str(out), found, "run the simulation again with another --out")))
+    loads = LOADS[settings.load].of(results).copy()
+    valid = split(loads, results["status"])[0]
+    loads[~valid] = math.inf if settings.unresolved == "above" else -math.inf
+    return loads, int(np.count_nonzero(~valid))

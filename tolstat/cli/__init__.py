@@ -21,7 +21,6 @@ from tolstat.cli import (
     status,
     time_above,
     verify,
-    work_precision,
     worst,
 )
 from tolstat.cli._app import app, main
@@ -33,7 +32,8 @@ COMMANDS = (
     *(worst.worst, replay.replay, export.export, fatigue.fatigue, time_above.time_above, report.report),
     *(capability.capability, causes.causes, reweight.reweight, compare.compare, allocate.allocate),
     *(rare.rare, multifidelity.multifidelity),
-    *(work_precision.work_precision, bench.bench),
 )
 for command in COMMANDS:
     app.command()(command)
+for words, instrument in bench.INSTRUMENTS.items():
+    app.command(words, epilog=bench.SEE_ALSO)(instrument)

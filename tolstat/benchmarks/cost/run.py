@@ -1,23 +1,23 @@
-"""All benchmarks on one study."""
+"""All measurements of what a joint of a study costs."""
 
 from __future__ import annotations
 
 import math
-import platform
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tolstat import study as studies
-from tolstat.benchmarks import iteration, joints, others, scaling, startup
+from tolstat.benchmarks.cost import iteration, others, rates, scaling, startup
+from tolstat.benchmarks.machine import machine
+from tolstat.study import load
 
 ROUNDS, QUICK_ROUNDS = 7, 2
 
 
 @dataclass(frozen=True)
-class Bench:
-    """Results of all benchmarks.
+class Cost:
+    """Results of all measurements.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Bench:
 
     study: str
     machine: dict[str, str]
-    rates: joints.Rates
+    rates: rates.Rates
     iteration: iteration.Iteration
     scaling: list[scaling.Scale]
     startup: startup.Startup
@@ -63,8 +63,8 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def bench(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], None]) -> Bench:
-    """Run all benchmarks: two minutes, half a minute with `quick`, two minutes more with `cold`.
+def measure(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], None]) -> Cost:
+    """Make all measurements: two minutes, half a minute with `quick`, two minutes more with `cold`.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def bench(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], None
     n : int
         Number of joints.
     quick : bool
-        Fewer joints and repetitions, and no other integrators: to check that the benchmarks run, not for the numbers.
+        Fewer joints and repetitions, and no other integrators: to check that everything runs, not for the numbers.
     cold : bool
         Measure compilation too.
     say : callable
@@ -81,18 +81,18 @@ def bench(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], None
 
     Returns
     -------
-    Bench
+    Cost
 
     Raises
     ------
     InputError
         When the study cannot be used.
     """
-    study = studies.load(path)
+    study = load(path)
     rounds = QUICK_ROUNDS if quick else ROUNDS
-    these = joints.sample(study, min(n, 32) if quick else n)
+    these = rates.sample(study, min(n, 32) if quick else n)
     say(f"{len(these.params)} joints, in lanes, alone and quasi-static")
-    rates = joints.rates(these, rounds)
+    speeds = rates.measure(these, rounds)
     say("parts of a Newton iteration")
     parts = iteration.measure(these, rounds)
     say("workers")
@@ -103,21 +103,4 @@ def bench(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], None
     if not quick:
         say("other integrators on the same joints")
         against = others.compare(study, 2, 5.0, say)
-    return Bench(study.name, machine(), rates, parts, scales, starts, against)
-
-
-def machine() -> dict[str, str]:
-    """Processor, system, and versions of the packages that compute."""
-    import numba
-    import numpy
-    import scipy
-    from llvmlite.binding import get_host_cpu_name
-
-    return {
-        "processor": get_host_cpu_name(),
-        "system": f"{platform.system()} {platform.machine()}",
-        "python": platform.python_version(),
-        "numba": numba.__version__,
-        "numpy": numpy.__version__,
-        "scipy": scipy.__version__,
-    }
+    return Cost(study.name, machine(), speeds, parts, scales, starts, against)

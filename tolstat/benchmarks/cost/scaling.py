@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.benchmarks.joints import Sample
+from tolstat.benchmarks.cost.rates import Sample
 from tolstat.campaign.executors import Lost, Work, available_workers, map_in_processes
 from tolstat.common.tables import Options
 from tolstat.solver import simulation

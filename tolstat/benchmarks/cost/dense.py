@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.benchmarks.flops import Snapshot
-from tolstat.benchmarks.split import Once
+from tolstat.benchmarks.cost.flops import Snapshot
+from tolstat.benchmarks.cost.split import Once
 from tolstat.benchmarks.timing import Times
 from tolstat.common.tables import Options
 from tolstat.solver import simulation

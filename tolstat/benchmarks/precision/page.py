@@ -1,10 +1,9 @@
-"""Figure and page of a work-precision study."""
+"""Figure and page of a comparison."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from tolstat.benchmarks.work_precision.measure import Run
-from tolstat.benchmarks.work_precision.setup import Setup, measured
-from tolstat.benchmarks.work_precision.table import build, cost, leaders
+from tolstat.benchmarks import machine
+from tolstat.benchmarks.points import build, cost, leaders
+from tolstat.benchmarks.precision.setup import Setup
+from tolstat.benchmarks.runs import Run
 from tolstat.common.files import atomic_write
 from tolstat.display import style, text
 from tolstat.report import Report
@@ -36,14 +36,14 @@ FLOOR = 1e-7
 
 
 def write(runs: Sequence[Run], setup: Setup, base: Study, stem: Path) -> Report:
-    """Write the files of a study: page, table of all points, figure.
+    """Write the files of a comparison: page, table of all points, figure.
 
     Parameters
     ----------
     runs : sequence of Run
         Measured runs.
     setup, base : Setup, Study
-        Setup of the measurement, and study of the joints.
+        The comparison, and the study of the joints.
     stem : Path
         The files' name without ending.
 
@@ -58,11 +58,12 @@ def write(runs: Sequence[Run], setup: Setup, base: Study, stem: Path) -> Report:
         When no joint has a truth to compare with.
     """
     points, truth = build(runs)
+    count = len({run.joint for run in runs})
     steps, rtol = setup.tolstat.steps_per_rev, setup.others.rtol
     subtitle = (
-        f"{measured(setup, base)} joints of {base.path.name} (seed {setup.seed}), {len(truth)} of them with a truth. "
+        f"{count} joints of {base.path.name} (seed {setup.seed}), {len(truth)} of them with a truth. "
         f"tolstat: {steps[0]} to {steps[-1]} steps a revolution; others: rtol {rtol[0]:.0e} to {rtol[-1]:.0e},\n"
-        f"{setup.others.revolutions} revolutions, at most {setup.others.limit:g} s. {_versions()}"
+        f"{setup.others.revolutions} revolutions, at most {setup.others.limit:g} s. {machine.text(machine.versions())}"
     )
     files = style.save(figure(points, truth, subtitle), stem)
     csv, markdown = (stem.with_name(stem.name + ending) for ending in (".csv", ".md"))
@@ -81,23 +82,13 @@ def short(runs: Sequence[Run]) -> str:
     return _markdown(table)
 
 
-def _versions() -> str:
-    found = []
-    for package in ("tolstat", "numba", "scipy", "scikit-sundae"):
-        try:
-            found.append(f"{package} {version(package)}")
-        except PackageNotFoundError:
-            continue
-    return ", ".join(found)
-
-
 def figure(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str) -> Figure:
     """Draw error against core time.
 
     Parameters
     ----------
     points, truth : DataFrame
-        As `table.build` makes them.
+        As `points.build` makes them.
     subtitle : str
         Description of the measurement.
 
@@ -127,40 +118,42 @@ def page(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str, image: str) -
     own_error = f"median {truth['loads'].median():.0e}, worst {truth['loads'].max():.0e}"
     costs = cost(points, "loads", _levels(truth, "loads")).drop(columns="ours")
     parts = [
-        "# Work and precision",
+        "# Speed against error",
         subtitle.replace("\n", " "),
         f"![Error against core time]({image})",
         _EXPLANATION.format(own_error=own_error),
-        "## Who is ahead",
-        "Cheapest setting measured whose error of the largest |F| and |T|, of the median joint, is not larger; times "
-        "in milliseconds of one core a joint. –: no setting comes so far. Errors below the truth's own are left out.",
+        "## Fastest at each error",
+        "The cheapest setting measured whose error of the largest |F| and |T| of the median joint is not larger; times "
+        "in milliseconds of one core a joint. –: no setting reaches the error. Errors below the truth's own are left "
+        "out.",
         _markdown(_ahead(points, truth, "loads")),
-        "The same for the error of the worst joint, at the median time of all:",
+        "The same for the error of the worst joint; the time is still the median over the joints:",
         _markdown(_ahead(points, truth, "loads_worst")),
-        "## What an error costs",
+        "## Cost of an error",
         "Milliseconds of one core a joint, by error of the median joint.",
         _markdown(costs.set_axis(["", *(f"{level:.0e}" for level in costs.columns[1:])], axis=1)),
         "## All points",
-        "Steps a revolution or rtol; errors of the median joint, and of loads of the worst one; joints that failed or "
-        "ran over time; mean number of halvings, and of calls of the right-hand side.",
+        "`setting`: steps a revolution or rtol. `failed`, `over_time`: number of joints. `ms`: median over the joints. "
+        "`loads`, `contact`, `psi`: error of the median joint; `loads_worst`: that of the worst. `halvings`, `rates`: "
+        "mean number of halved steps and of calls of the right-hand side.",
         _markdown(points.drop(columns=["ours", "joints", "force", "torque"])),
     ]
     return "\n\n".join(parts) + "\n"
 
 
 _EXPLANATION = """\
-The task: from the equilibrium of the loaded joint at θ = 0 to the largest loads of a settled, recorded revolution.
-tolstat looks for that equilibrium itself and goes on until the closure error is below `solver.settle_tol`. The others
-are given the equilibrium, integrate a fixed number of revolutions, and have their loads looked at 2880 angles of the
-last one by their own interpolation; their absolute tolerance is `rtol` times 0.1 mm (0.1 mrad) and 1 m/s (1 rad/s).
-They call the same compiled accelerations, without numba's look at the types at each call, with a Jacobian of their own
-making or the compiled one. Times are CPU times of processes with one thread each, compilation excluded: of tolstat the
-median of repeated calls, of the others one.
+Every integrator has the same task: from the equilibrium of the loaded joint at θ = 0 to the largest loads of a settled
+revolution. tolstat computes this equilibrium itself and integrates until the closure is below `solver.settle_tol`. The
+others get the equilibrium at no cost and integrate a fixed number of revolutions; their own interpolation gives the
+loads at 2880 angles of the last one. Their absolute tolerance is `rtol` times 0.1 mm (0.1 mrad) and 1 m/s (1 rad/s).
+They call the same compiled accelerations, without Numba's check of the argument types, and use a Jacobian from finite
+differences or the compiled one ("our Jacobian"). Times are CPU times of processes with one thread, without compilation:
+of tolstat the median of repeated calls, of the others one call.
 
-The truth is scipy's Radau, carried on from the settled state until the largest loads repeat within 1e-5
-(`tolstat.solver.reference`). At its next looser tolerance it gives other loads: {own_error}. Below that no error means
-anything. Errors are relative to the largest load of the kind in the joint; the worst bushing counts, and the median
-over the joints is shown."""
+The truth is a reference solution by scipy's Radau, which starts in the settled state and integrates until the largest
+loads repeat within 1e-5 (`tolstat.solver.reference`). With the next looser tolerance its largest loads differ by
+{own_error}; smaller errors have no meaning. Errors are relative to the largest load of the kind in the joint, and the
+worst bushing counts. Points are medians over the joints."""
 
 
 def _looks(points: pd.DataFrame) -> dict[str, dict[str, Any]]:

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.benchmarks.dense import Dense, against, systems
-from tolstat.benchmarks.flops import Snapshot, count_apart
-from tolstat.benchmarks.joints import Sample, alone
-from tolstat.benchmarks.split import Once, Split, split
+from tolstat.benchmarks.cost.dense import Dense, against, systems
+from tolstat.benchmarks.cost.flops import Snapshot, count_apart
+from tolstat.benchmarks.cost.rates import Sample, alone
+from tolstat.benchmarks.cost.split import Once, Split, split
 from tolstat.benchmarks.timing import Times, in_turn
 from tolstat.common.tables import RESULT, Options
 from tolstat.solver import simulation
@@ -112,7 +112,7 @@ def _tally(these: Sample) -> NDArray[np.int64]:
 
 def _start_counts(these: Sample, n: int) -> tuple[float, float]:
     """Newton iterations and tangents of a joint's initial equilibrium, mean."""
-    from tolstat.benchmarks.parts import start
+    from tolstat.benchmarks.cost.parts import start
     from tolstat.kernel.integrators.state import FACTORISATIONS, ITERATIONS
 
     params, options = these
@@ -139,14 +139,14 @@ def measure(these: Sample, rounds: int) -> Iteration:
     -------
     Iteration
     """
-    from tolstat.benchmarks.parts import CHAINS
+    from tolstat.benchmarks.cost.parts import CHAINS
     from tolstat.kernel.simd.lane import WIDTH
 
-    params, options = these
+    params = these.params
     snaps = list(snapshots(these, STATES))
     times = in_turn(_tasks(these, snaps), rounds)
     once = {"lanes": _once(times, "lanes", TIMES * WIDTH), "alone": _once(times, "alone", TIMES * len(snaps))}
-    results = simulation.simulate_rows(params, options).results
+    results = times.returned["lanes"].results
     mean = {name: float(results[name].mean()) for name in ("steps", "newton_iterations", "factorisations", "halvings")}
     rounds_done, filled, renewals = (int(x) for x in _tally(these))
     start_iterations, start_tangents = _start_counts(these, len(params))
@@ -174,7 +174,7 @@ def _tasks(these: Sample, snaps: list[Snapshot]) -> dict[str, Callable[[], objec
     """Functions to be timed, by name."""
     from scipy.linalg.lapack import dgetrf, dgetrs
 
-    from tolstat.benchmarks import parts
+    from tolstat.benchmarks.cost import parts
 
     params, options = these
     scratch = simulation.scratch(options)

@@ -1,6 +1,6 @@
 """Operations of the kernel's parts, counted by running its Python source with a number class that counts.
 
-``python -m tolstat.benchmarks.flops`` counts in a process of its own without compilation: additions, subtractions,
+``python -m tolstat.benchmarks.cost.flops`` counts in a process of its own without compilation: additions, subtractions,
 multiplications, divisions and square roots count as one each, as written in the source; sines, cosines, comparisons
 and signs do not count. A lane does the same operations, and more where another lane takes a branch that it does not.
 """
@@ -159,7 +159,7 @@ def count(snapshot: Snapshot) -> dict[str, int]:
 def count_apart(snapshots: Sequence[Snapshot]) -> list[dict[str, int]]:
     """Call `count` for each snapshot, in a process without compilation."""
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    command = [sys.executable, "-m", "tolstat.benchmarks.flops"]
+    command = [sys.executable, "-m", "tolstat.benchmarks.cost.flops"]
     told = io.BytesIO()
     np.savez(told, *(np.array(column) for column in zip(*snapshots, strict=True)))
     done = subprocess.run(command, input=told.getvalue(), stdout=subprocess.PIPE, env=environment, check=True)

@@ -1,30 +1,33 @@
-"""Text output of the benchmarks."""
+"""Tables of what a joint costs, as text."""
 
 from __future__ import annotations
 
-from tolstat.benchmarks.iteration import Iteration
-from tolstat.benchmarks.joints import Rates
-from tolstat.benchmarks.others import Comparison
-from tolstat.benchmarks.run import Bench
-from tolstat.benchmarks.scaling import Scale
-from tolstat.benchmarks.split import Split
-from tolstat.benchmarks.startup import Startup
+from tolstat.benchmarks import machine
+from tolstat.benchmarks.cost.iteration import Iteration
+from tolstat.benchmarks.cost.others import Comparison
+from tolstat.benchmarks.cost.rates import Rates
+from tolstat.benchmarks.cost.run import Cost
+from tolstat.benchmarks.cost.scaling import Scale
+from tolstat.benchmarks.cost.split import Split
+from tolstat.benchmarks.cost.startup import Startup
 from tolstat.display.text import align
 
 
-def text(found: Bench) -> str:
-    """Text of all measurements, section by section."""
-    machine = ", ".join(f"{name} {value}" for name, value in found.machine.items())
+def text(found: Cost) -> str:
+    """Compose all tables, each with its title."""
     sections = [
         (_rates_title(found.rates), _rates(found.rates)),
         ("Where the time of a joint goes, µs", _parts(found.iteration)),
-        ("Against the core and against dense linear algebra", _ratios(found.iteration)),
+        ("Rate of operations, and ratios to dense linear algebra", _ratios(found.iteration)),
         ("Workers", _scaling(found.scaling)),
-        ("Start", _startup(found.startup)),
+        ("Start-up", _startup(found.startup)),
     ]
     if found.others is not None:
         sections.append((_others_title(found.others), _others(found.others)))
-    parts = [f"{found.study}: {machine}", *(f"{title}\n\n{align(rows)}" for title, rows in sections)]
+    parts = [
+        f"{found.study}: {machine.text(found.machine)}",
+        *(f"{title}\n\n{align(rows)}" for title, rows in sections),
+    ]
     return "\n\n".join(parts)
 
 
@@ -38,7 +41,7 @@ def _rates_title(rates: Rates) -> str:
 
 def _rates(rates: Rates) -> list[list[str]]:
     return [
-        ["", "ms a joint", "joints/s", "times faster than one at a time", "than in lanes"],
+        ["", "ms a joint", "joints/s", "speed, one at a time = 1", "speed, in lanes = 1"],
         ["dynamic, in lanes", *_two(rates.lanes_ms, rates.lanes_per_second), f"{rates.lanes_ratio:.3g}", "1"],
         ["dynamic, one at a time", *_two(rates.alone_ms, rates.alone_per_second), "1", f"{1 / rates.lanes_ratio:.3g}"],
         [
@@ -55,7 +58,7 @@ def _two(ms: float, per_second: float) -> list[str]:
 
 
 def _parts(of: Iteration) -> list[list[str]]:
-    rows = [["part", "in lanes", "share", "once", "alone", "share", "once"]]
+    rows = [["part", "in lanes", "share", "one execution", "alone", "share", "one execution"]]
     for name in of.lanes.joint_us._fields:
         row = [name]
         for split in (of.lanes, of.alone):
@@ -78,23 +81,23 @@ def _ratios(of: Iteration) -> list[list[str]]:
         ["", "in lanes", "alone"],
         ["operations a second, 1e9", f"{of.lanes.gflops:.3g}", f"{of.alone.gflops:.3g}"],
         [
-            f"share of what the core does at most, {of.peak_gflops:.4g}e9",
+            f"share of the core's peak rate, {of.peak_gflops:.4g}e9",
             f"{100 * of.lanes.share_of_peak:.1f} %",
             f"{100 * of.alone.share_of_peak:.1f} %",
         ],
         [f"lanes filled, of {of.width}", f"{100 * of.lanes_filled:.1f} %", ""],
         [
-            f"Newton iteration with LAPACK ({against.lapack_us:.3g} µs a system), times slower",
+            f"Newton iteration with LAPACK ({against.lapack_us:.3g} µs a system), time over ours",
             f"{against.iteration_ratio_lanes:.3g}",
             f"{against.iteration_ratio:.3g}",
         ],
         [
-            "the same where tangents are kept as in a joint",
+            "the same, tangents reused as in a joint",
             f"{against.kept_ratio_lanes:.3g}",
             f"{against.kept_ratio:.3g}",
         ],
         [
-            f"factors and solution ({against.structured_us:.3g} µs) alone, times faster",
+            f"LAPACK's factorisation and solution, time over ours ({against.structured_us:.3g} µs)",
             "",
             f"{against.solver_ratio:.3g}",
         ],
@@ -102,7 +105,7 @@ def _ratios(of: Iteration) -> list[list[str]]:
 
 
 def _scaling(scales: list[Scale]) -> list[list[str]]:
-    rows = [["workers", "joints/s", "efficiency", "by processor time", "MB each", "MB more at the end"]]
+    rows = [["workers", "joints/s", "efficiency", "by CPU time", "MB a worker", "growth, MB"]]
     for scale in scales:
         rows.append(
             [
@@ -119,25 +122,25 @@ def _scaling(scales: list[Scale]) -> list[list[str]]:
 
 def _startup(found: Startup) -> list[list[str]]:
     rows = [
-        ["", "s", "s of processor time"],
+        ["", "s", "CPU time, s"],
         ["tolstat --help", f"{found.help_s:.2f}", ""],
-        ["to the first joint, kernels in the cache", f"{found.first_joint_s:.2f}", f"{found.first_joint_cpu_s:.2f}"],
+        ["first joint, kernels in the cache", f"{found.first_joint_s:.2f}", f"{found.first_joint_cpu_s:.2f}"],
     ]
     for name, seconds, cpu in (
         ("dynamic", found.cold_s, found.cold_cpu_s),
         ("quasi-static", found.cold_quasistatic_s, found.cold_quasistatic_cpu_s),
     ):
         if seconds is not None and cpu is not None:
-            rows.append([f"to compile for {name} joints", f"{seconds:.0f}", f"{cpu:.0f}"])
+            rows.append([f"compilation for {name} joints", f"{seconds:.0f}", f"{cpu:.0f}"])
     return rows
 
 
 def _others_title(found: Comparison) -> str:
-    return f"To an error of {found.error:g} of the largest loads, of the worst of {found.joints} joints"
+    return f"Cheapest setting whose error of the largest loads is at most {found.error:g} in all {found.joints} joints"
 
 
 def _others(found: Comparison) -> list[list[str]]:
-    rows = [["", "setting", "ms a joint", "error", "times our lanes", "times our lanes, default steps"]]
+    rows = [["", "setting", "ms a joint", "error", "time over ours in lanes", "with the study's steps"]]
     for one in found.contenders:
         met = one.error is not None
         rows.append(

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FIRST_JOINT = "from tolstat.benchmarks.startup import first_joint; first_joint({path!r})"
-COMPILE = "from tolstat.benchmarks.startup import compile_kernels; compile_kernels({fidelity!r})"
+FIRST_JOINT = "from tolstat.benchmarks.cost.startup import first_joint; first_joint({path!r})"
+COMPILE = "from tolstat.benchmarks.cost.startup import compile_kernels; compile_kernels({fidelity!r})"
 
 
 @dataclass(frozen=True)
@@ -78,13 +78,12 @@ def measure(study_path: str, cold: bool, repeats: int = 3) -> Startup:
 
 def first_joint(study_path: str) -> None:
     """Simulate the first joint of a study as a campaign does; `measure` calls this in a new process."""
-    from tolstat import joint, sampling, study
+    from tolstat import study
+    from tolstat.benchmarks.joints import parameters
     from tolstat.solver import simulation
-    from tolstat.store.recorded import perturbed
 
     loaded = study.load(study_path, n=1)
-    params = perturbed(loaded, np.arange(1), sampling.draw(loaded)[:1], joint.perturb)
-    simulation.simulate_rows(params, loaded.solver.options())
+    simulation.simulate_rows(parameters(loaded, np.arange(1)), loaded.solver.options())
 
 
 def compile_kernels(fidelity: str) -> None:

@@ -1,4 +1,4 @@
-"""Instruments: clocks that are set, operations counted by hand, tables with known rates, and the command."""
+"""Cost of a joint: operations counted by hand, tables with known rates, and the command."""
 
 from __future__ import annotations
 
@@ -11,31 +11,13 @@ from typer.testing import CliRunner
 
 from tests.conftest import REFERENCE
 from tolstat import cli, study
-from tolstat.benchmarks import flops, iteration, joints, others, run, scaling, split, startup, timing
-from tolstat.benchmarks import text as page
-from tolstat.benchmarks.flops import Counting
-from tolstat.benchmarks.scaling import Stint
-from tolstat.benchmarks.split import Once
+from tolstat.benchmarks.cost import flops, iteration, others, rates, run, scaling, split, startup
+from tolstat.benchmarks.cost import text as page
+from tolstat.benchmarks.cost.flops import Counting
+from tolstat.benchmarks.cost.scaling import Stint
+from tolstat.benchmarks.cost.split import Once
 
 STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"
-
-
-def test_tasks_take_turns_and_the_first_round_does_not_count():
-    now, order = [0.0], []
-
-    def task(name, seconds):
-        order.append(name)
-        now[0] += seconds * (100 if len(order) <= 2 else 1)  # the first round loads things
-
-    done = timing.in_turn({"a": lambda: task("a", 1.0), "b": lambda: task("b", 3.0)}, 3, lambda: now[0])
-    assert order == ["a", "b"] * 4
-    assert (done.typical("a"), done.least("b"), done.ratio("b", "a")) == (1.0, 3.0, 3.0)
-    assert len(done.seconds["a"]) == 3
-
-
-def test_a_ratio_is_taken_round_by_round():
-    slow = timing.Times({"a": np.array([1.0, 10.0, 2.0]), "b": np.array([2.0, 20.0, 4.0])})
-    assert slow.ratio("b", "a") == 2.0
 
 
 def counted(function):
@@ -55,7 +37,7 @@ def test_numbers_count_what_is_done_with_them():
 
 @pytest.fixture(scope="module")
 def these():
-    return joints.sample(study.load(STUDY), 8)
+    return rates.sample(study.load(STUDY), 8)
 
 
 @pytest.mark.slow
@@ -145,6 +127,26 @@ def test_contenders_are_compared_at_the_cheapest_setting_that_meets_the_error():
     assert "none met" in text
 
 
+@pytest.mark.parametrize(("installed", "others_named"), [(True, ["Radau", "CVODE"]), (False, ["Radau"])])
+def test_other_integrators_are_those_that_are_installed(installed, others_named, monkeypatch):
+    asked, said = [], []
+
+    def run(jobs, say):
+        asked.extend(jobs)
+        raise InterruptedError
+
+    monkeypatch.setattr(others, "has_cvode", lambda: installed)
+    monkeypatch.setattr(others, "run", run)
+    with pytest.raises(InterruptedError):
+        others.compare(study.load(STUDY), 2, 5.0, said.append)
+    names = list(dict.fromkeys(job.contender for job in asked))
+    given = [name for code in others_named for name in (code, f"{code}, our Jacobian")]
+    at_rest = ["Radau, from rest", "Radau, our Jacobian, from rest"]
+    assert names == ["truth", *given, *at_rest, "BDF2", "quasistatic", "BDF2, 64 joints at once"]
+    assert len(asked) == 3 * (len(names) - 1) + 1
+    assert ("scikit-sundae" in "".join(said)) != installed
+
+
 @pytest.fixture
 def light(monkeypatch):
     """No worker processes and no other Pythons."""
@@ -167,11 +169,11 @@ def test_the_command_prints_tables_or_json(light, these, monkeypatch):
     assert set(facts["iteration"]["lanes"]["joint_us"]) == set(split.Parts._fields)
     assert facts["others"] is None
     against = others.Comparison(3, 1e-3, others.contenders(POINTS, 180))
-    rates = joints.Rates(**facts["rates"])
+    speeds = rates.Rates(**facts["rates"])
     scales, starts = scaling.measure(None), startup.measure()
-    whole = run.Bench("iso2768_f", {"processor": "some"}, rates, found, scales, starts, against)
+    whole = run.Cost("iso2768_f", {"processor": "some"}, speeds, found, scales, starts, against)
     text = page.text(whole)
-    for word in ("one at a time", "assembly", "LAPACK", "workers", "--help", "to compile for dynamic joints", "Radau"):
+    for word in ("one at a time", "assembly", "LAPACK", "workers", "--help", "compilation for dynamic joints", "Radau"):
         assert word in text
     assert "quasi-static joints" not in text
     assert json.dumps(whole.plain(), allow_nan=False)

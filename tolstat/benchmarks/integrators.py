@@ -1,6 +1,6 @@
-"""Alternative integrators: those of scipy and SUNDIALS on the joint's compiled right-hand side.
+"""Integrators of scipy and SUNDIALS on the compiled right-hand side of a joint.
 
-The task is that of tolstat's solver: from its initial equilibrium, which the competitors get at no cost, over a given
+The task is that of tolstat's solver: from its initial equilibrium, which these integrators get at no cost, over a given
 number of revolutions to the largest loads of the last one. A call of the right-hand side from Python costs little more
 than its arithmetic (`kernel.simd.jit.compiled_entry`).
 """
@@ -8,13 +8,13 @@ than its arithmetic (`kernel.simd.jit.compiled_entry`).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, InputError
 from tolstat.solver.reference import SAMPLES_PER_REV, FirstOrder, Largest
 
 FloatArray = NDArray[np.float64]
@@ -25,7 +25,7 @@ MAX_STEPS = 10**9
 """Step limit of CVODE, whose default is 500; here the CPU time limits its work."""
 
 
-class Competitor(NamedTuple):
+class Integrator(NamedTuple):
     """An integrator and how it is used.
 
     Attributes
@@ -33,7 +33,7 @@ class Competitor(NamedTuple):
     code : {"Radau", "BDF", "LSODA", "CVODE"}
         The first three from scipy, CVODE (BDF, dense linear algebra) from SUNDIALS through scikit-sundae.
     jacobian : bool
-        Whether it is given the compiled Jacobian; else it uses finite differences.
+        Whether it gets the compiled Jacobian; else it uses finite differences.
     """
 
     code: Code
@@ -88,23 +88,19 @@ class _Counted:
         return self._system.jacobian(t, y)
 
 
-def check_installed(codes: tuple[Code, ...]) -> None:
-    """Check that the packages of the integrators are installed.
+def both_ways(codes: Sequence[Code]) -> list[Integrator]:
+    """Each of `codes` with a Jacobian from finite differences, and with the compiled one."""
+    return [Integrator(code, jacobian) for code in codes for jacobian in (False, True)]
 
-    Raises
-    ------
-    InputError
-        When CVODE is asked for without scikit-sundae.
-    """
-    from importlib.util import find_spec
 
-    if "CVODE" in codes and find_spec("sksundae") is None:
-        raise InputError([Fault("CVODE", "needs scikit-sundae", 'pip install "tolstat[bench]", or leave CVODE out')])
+def has_cvode() -> bool:
+    """Whether scikit-sundae, which CVODE needs, is installed."""
+    return find_spec("sksundae") is not None
 
 
 def solve(
     system: FirstOrder,
-    competitor: Competitor,
+    integrator: Integrator,
     rtol: float,
     revolutions: int,
     limit: float,
@@ -116,7 +112,7 @@ def solve(
     ----------
     system : FirstOrder
         The joint and the state to begin from, see `reference.first_order`.
-    competitor : Competitor
+    integrator : Integrator
         The integrator.
     rtol : float
         Relative tolerance; the absolute one is `rtol` times ``system.scale``.
@@ -131,7 +127,7 @@ def solve(
     -------
     Solution
     """
-    run: Callable[..., FloatArray | None] = _cvode if competitor.code == "CVODE" else _scipy
+    run: Callable[..., FloatArray | None] = _cvode if integrator.code == "CVODE" else _scipy
     last = revolutions - 1 + np.arange(1, angles + 1) / angles
     times = system.t0 + system.period * last
     counted = _Counted(system, limit)
@@ -140,7 +136,7 @@ def solve(
     outcome: Outcome = "failed"
     largest = None
     try:
-        states = run(system, competitor, counted, times, settings)
+        states = run(system, integrator, counted, times, settings)
     except _OverTimeError:
         outcome = "over_time"
     else:
@@ -150,21 +146,21 @@ def solve(
 
 
 def _scipy(
-    system: FirstOrder, competitor: Competitor, counted: _Counted, times: FloatArray, settings: dict[str, Any]
+    system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
 ) -> FloatArray | None:
     """States at `times`, (m, 110); None where the integrator gives up."""
     from scipy.integrate import solve_ivp
 
-    if competitor.jacobian:
+    if integrator.jacobian:
         settings = settings | {"jac": counted.jacobian}
     span = (system.t0, times[-1])
-    method: Any = competitor.code
+    method: Any = integrator.code
     found = solve_ivp(counted.rate, span, system.y0, method, t_eval=times, **settings)
     return np.ascontiguousarray(found.y.T) if found.success else None
 
 
 def _cvode(
-    system: FirstOrder, competitor: Competitor, counted: _Counted, times: FloatArray, settings: dict[str, Any]
+    system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
 ) -> FloatArray | None:
     """As `_scipy`."""
     from sksundae.cvode import CVODE
@@ -175,7 +171,7 @@ def _cvode(
     def jacobian(t: float, y: FloatArray, _: FloatArray, out: FloatArray) -> None:
         out[:] = counted.jacobian(t, y)
 
-    if competitor.jacobian:
+    if integrator.jacobian:
         settings = settings | {"jacfn": jacobian}
     found = CVODE(rate, max_num_steps=MAX_STEPS, **settings).solve(np.concatenate([[system.t0], times]), system.y0)
     return np.ascontiguousarray(found.y[1:]) if found.success else None

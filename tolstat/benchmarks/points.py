@@ -1,4 +1,4 @@
-"""From runs to a table: errors against the truth, medians over joints, and what a given error costs."""
+"""Points of a work-precision diagram: errors against the truth, medians over joints, and what a given error costs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from tolstat.benchmarks.work_precision.measure import TRUTH, Run
+from tolstat.benchmarks.runs import TRUTH, Run
 from tolstat.common.errors import Fault, InputError
 from tolstat.solver.reference import Largest
 
@@ -44,7 +44,7 @@ def build(runs: Sequence[Run]) -> tuple[pd.DataFrame, pd.DataFrame]:
     Parameters
     ----------
     runs : sequence of Run
-        Measured runs, with the references of each joint among them.
+        Measured runs, with the reference solutions of each joint among them.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def build(runs: Sequence[Run]) -> tuple[pd.DataFrame, pd.DataFrame]:
         ``ms`` (median), then the median error of each of `KINDS`, ``loads_worst``, mean ``halvings`` and ``rates``.
         A run without a result has an infinite error; joints without a truth do not count.
     truth : DataFrame
-        One row a joint: difference of the two references, by kind, and CPU time of the tighter one, s.
+        One row a joint: difference of the two reference solutions, by kind.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def _own_error(references: dict[tuple[int, int], Run], joint: int) -> dict[str, 
     tight, loose = references[joint, 0], references[joint, 1]
     assert tight.largest is not None
     own = errors(loose.largest, tight.largest) if loose.largest is not None else dict.fromkeys(KINDS, np.inf)
-    return {"joint": joint, **own, "seconds": tight.seconds}
+    return {"joint": joint, **own}
 
 
 def _point(group: pd.DataFrame) -> dict[str, object]:
@@ -102,6 +102,12 @@ def _point(group: pd.DataFrame) -> dict[str, object]:
     }
 
 
+def cheapest(points: pd.DataFrame, error: str, level: float) -> pd.DataFrame:
+    """Rows of `points` of the cheapest setting of each contender whose `error` is at most `level`, by contender."""
+    good = points[points[error] <= level]
+    return good.loc[good.groupby("contender", sort=False)["ms"].idxmin()].set_index("contender")
+
+
 def cost(points: pd.DataFrame, error: str, levels: Sequence[float]) -> pd.DataFrame:
     """Cost of an error: time of the cheapest setting measured whose error is not larger.
 
@@ -120,11 +126,10 @@ def cost(points: pd.DataFrame, error: str, levels: Sequence[float]) -> pd.DataFr
         One row a contender: ``contender``, ``ours``, then a column a level with milliseconds a joint, NaN where no
         setting reaches the error.
     """
-    rows = []
-    for name, group in points.groupby("contender", sort=False):
-        times = [group.loc[group[error] <= level, "ms"].min() for level in levels]
-        rows.append([name, bool(group["ours"].iloc[0]), *times])
-    return pd.DataFrame(rows, columns=["contender", "ours", *levels])
+    costs = points[["contender", "ours"]].drop_duplicates().set_index("contender")
+    for level in levels:
+        costs[level] = cheapest(points, error, level)["ms"]
+    return costs.reset_index()
 
 
 def leaders(costs: pd.DataFrame) -> pd.DataFrame:

@@ -17,19 +17,14 @@ from typer.testing import CliRunner
 import tolstat
 from tests.support import fakes, synthetic
 from tolstat import cli
+from tolstat.cli import bench
 from tolstat.campaign import run as campaign
 from tolstat.campaign.executors import WorkerDied
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
 from tolstat.store import ResultStore
 
-COMMANDS = (
-    *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
-    *("worst", "replay", "export", "fatigue", "time-above", "report"),
-    *("capability", "causes", "reweight", "compare", "allocate"),
-    *("rare", "multifidelity"),
-    *("bench", "bench precision"),
-)
+COMMANDS = (*(command.replace("_", "-") for command in cli.COMMANDS), *bench.INSTRUMENTS)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
 
 

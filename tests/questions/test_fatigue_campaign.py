@@ -194,8 +194,9 @@ def test_the_lines_of_the_document_read_the_export(campaign, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     done = call("export", campaign(), "--pylife", "cycles.csv")
     assert done.exit_code == 0, done.stderr
-    document = (ROOT / "docs" / "fatigue.md").read_text(encoding="utf-8")
-    code = re.findall(r"```python\n(.*?)```", document, flags=re.DOTALL)[0].split("# with pyLife")[0]
+    document = (ROOT / "docs" / "questions" / "fatigue.md").read_text(encoding="utf-8")
+    found = re.findall(r"```python\n(.*?)```", document, flags=re.DOTALL)
+    code = next(code for code in found if "cycles.csv" in code).split("# with pyLife")[0]
     names: dict[str, object] = {}
     exec(code, names)
     with ResultStore.open(campaign()) as store:

@@ -51,7 +51,7 @@ def export(
     share above each limit, quantiles, capability, the numerical error and what the file was made by.
 
     With --pylife one row a joint, channel and class of range and mean: cycles per revolution, for files whose study
-    keeps cycles or load histories. See docs/fatigue.md for the lines that read it as a Series.
+    keeps cycles or load histories. See docs/questions/fatigue.md for the lines that read it as a Series.
     """
     from tolstat.common.files import check_target
     from tolstat.store import ResultStore

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from tolstat.questions.time_above.query import TimeAbove
 
-COLUMNS = 4
+MAX_LOADS = 4
 """Maximum number of loads in the picture."""
 _LINES = {
     "time": "mean joint",
@@ -31,7 +31,7 @@ _LINES = {
 
 
 def text(found: TimeAbove) -> str:
-    """Table of `Duration.table`, shares in per cent."""
+    """Text of `TimeAbove.table`, shares in per cent."""
     rows = [
         ["load > level", "joints above it at any time", "time above it: mean", "median", "90 % below", "99 % below"]
     ]
@@ -43,7 +43,8 @@ def text(found: TimeAbove) -> str:
 
 def note(found: TimeAbove) -> str:
     """Notes to the table: number of joints, restrictions."""
-    lines = [f"{found.joints} joints, {found.lost} without a valid revolution left out; time: share of a revolution"]
+    counts = f"{found.joints} joints, {found.left_out} without a settled revolution left out"
+    lines = [f"{counts}; time: share of a revolution"]
     if found.table["time_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only")
     return "\n".join(lines)
@@ -54,7 +55,7 @@ def write(found: TimeAbove, stem: Path) -> list[Path]:
 
     Parameters
     ----------
-    found : Duration
+    found : TimeAbove
         Result with curves.
     stem : Path
         Folder, and beginning of all file names.
@@ -69,8 +70,8 @@ def write(found: TimeAbove, stem: Path) -> list[Path]:
 
 
 def figure(found: TimeAbove) -> Figure:
-    """Draw the curves of at most `COLUMNS` loads: share of the joints (upper row), share of the revolution (lower)."""
-    loads = list(dict.fromkeys(found.curves["load"]))[:COLUMNS]
+    """Draw the curves of at most `MAX_LOADS` loads: share of the joints (upper row), of the revolution (lower)."""
+    loads = list(dict.fromkeys(found.curves["load"]))[:MAX_LOADS]
     with style.settings():
         page = Figure(figsize=(max(4.2 * len(loads), 6.5), 6.6))
         axes = page.subplots(2, len(loads), squeeze=False, sharex="col", sharey="row")

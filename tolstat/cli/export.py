@@ -109,8 +109,9 @@ def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO
     from tolstat.questions.causes import query as causes
     from tolstat.report import summary
 
-    found = summary.of_store(store)
-    asked = {load: causes.of_store(store, load) for load in by}
+    view = store.view()
+    found = summary.statistics(view)
+    asked = {load: causes.causes_of(view, load) for load in by}
     found["causes"] = {load: own._asdict() | {"table": text.records(own.table)} for load, own in asked.items()}
     return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"
 

@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 import tolstat
 from tests.support import fakes, synthetic
 from tolstat import cli
-from tolstat.cli import bench
 from tolstat.campaign import run as campaign
 from tolstat.campaign.executors import WorkerDied
+from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
 from tolstat.store import ResultStore

@@ -287,13 +287,25 @@ def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
     assert isinstance(loads, Table)
     row = next(row for row in loads.rows if row[0] == f"{leading}, m = 4")
     assert row[1:5] == [f"{x:.4g} N" for x in (own["nominal"][0.5], *own["estimate"])]
-    assert (len(loads.rows), len(damages.rows), damages.rows[0][3]) == (4, 8, "0 of 12")
+    assert (len(loads.rows), len(damages.rows), damages.rows[0][4]) == (4, 8, f"0 of {loading.settled}")
     assert note == Text(f"{rendering.notes(loading, table)}.", small=True)
     assert [text.split(":")[0] for text in asked.notes] == ["load cycles are left out"]
     for path in (campaign("none"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):
         with ResultStore.open(path) as store:
             assert sections(store.view(), asked) == []
     assert len(asked.notes) == 1
+
+
+def test_a_slice_of_a_campaign_has_the_rows_of_the_campaign(campaign, tmp_path):
+    part = tmp_path / "part.h5"
+    tolstat.run(tolstat.load(campaign().with_suffix(".toml")), part, workers=1, rows=range(4, 9), check=False)
+    assert load_cycles([part]).status.tolist() == load_cycles([campaign()]).status[3:8].tolist()
+    joints = []
+    for path in (campaign(), part):
+        with ResultStore.open(path) as store:
+            joints.append(set(tolstat.pylife_series(store.view()).index.get_level_values("joint")))
+    assert joints[1] == joints[0] & set(range(4, 9))
+    assert joints[1]
 
 
 def test_only_the_first_samples_are_read(campaign):

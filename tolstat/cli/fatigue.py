@@ -34,6 +34,7 @@ def fatigue(
     bushing's force and torque is printed, and all channels are written.
     """
     from tolstat.common.files import check_target
+    from tolstat.display.table import as_text
     from tolstat.questions.fatigue import query, rendering
     from tolstat.questions.fatigue.counting import channels
     from tolstat.store import ResultStore
@@ -44,9 +45,13 @@ def fatigue(
     with ExitStack() as stack:
         views = [stack.enter_context(ResultStore.open(file)).view() for file in files]
         loading = query.load_cycles(views, share or [1.0], names)
-    loads = query.equivalent_loads(loading)
+    loads, damages = query.equivalent_loads(loading), query.damages(loading)
     shown = [] if channel else query.most_loaded(loads)
-    typer.echo(rendering.text(loads[loads["channel"].isin(shown)] if shown else loads, query.damages(loading)))
+    table = rendering.by_channel(loads[loads["channel"].isin(shown)] if shown else loads)
+    typer.echo(as_text(rendering.LOADS, table))
+    if len(damages):
+        typer.echo("\nshare of the joints whose damage exceeds 1")
+        typer.echo(as_text(rendering.DAMAGES, damages))
     say(rendering.notes(loading, loads))
     if csv:
         with writing(csv) as temporary:

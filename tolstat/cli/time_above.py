@@ -31,7 +31,7 @@ def time_above(
     joints do not exceed. A further column gives the share of the joints that are above the level at any time. For files
     whose study keeps load histories, in full or as harmonics.
     """
-    from tolstat.display import text
+    from tolstat.display import table, text
     from tolstat.questions.time_above import query, rendering
     from tolstat.store import ResultStore
 
@@ -41,7 +41,7 @@ def time_above(
         summary = {"joints": found.joints, "left_out": found.left_out, "loads": text.records(found.table)}
         typer.echo(as_text(summary))
     else:
-        typer.echo(rendering.text(found))
+        typer.echo(table.as_text(rendering.LEVELS, found.table))
     say(rendering.note(found))
     if out is not None:
         make_folder(out)

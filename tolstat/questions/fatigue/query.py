@@ -112,9 +112,10 @@ def load_cycles(
 def _cycles_of(view: View, names: Sequence[str] | None, samples: int | None) -> tuple[Cycles, Cycles]:
     """Cycles of the first samples, and of the nominal joint (no rows if there is none that settled)."""
     n = view.n if samples is None else min(samples, view.n)
-    whole = cycles_of(view.store, np.arange(view.slots(n)), names)
-    nominal = int((view.nominal["status"] == Status.OK).sum())
-    return _rows(whole, slice(int(view.slots(0)), None)), _rows(whole, slice(nominal))
+    first, end = map(int, view.slots([0, n]))
+    whole = cycles_of(view.store, np.arange(end), names)  # the nominal joint, if the file has it, is before the samples
+    settled = int((view.nominal["status"] == Status.OK).sum())
+    return _rows(whole, slice(first, None)), _rows(whole, slice(settled))
 
 
 def _rows(whole: Cycles, rows: slice) -> Cycles:
@@ -262,7 +263,8 @@ def leading(table: pd.DataFrame) -> list[str]:
 
 def _highest(table: pd.DataFrame) -> pd.DataFrame:
     """Rows of the highest share of the joints."""
-    return table[table["share"] == table["share"].max()]
+    part: pd.DataFrame = table[table["share"] == table["share"].max()]
+    return part
 
 
 def _numbers(part: Cycles) -> FloatArray:

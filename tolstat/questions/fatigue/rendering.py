@@ -1,6 +1,8 @@
-"""Fatigue of a campaign: equivalent loads and damage sums as text, load spectra as figures."""
+"""Fatigue of a campaign: tables of equivalent loads and of damage sums, figures of load spectra."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pandas as pd
@@ -11,8 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from tolstat.analysis.cycles import FloatArray
-from tolstat.display import style
-from tolstat.display.text import UNITS, plain, quantiles
+from tolstat.common.tables import CHANNELS
+from tolstat.display import style, text
+from tolstat.display.table import Column, Row
 from tolstat.questions.fatigue.query import SHARES, Loading, equivalent_loads, leading, spectra
 
 MIN_RANGE = 1e-3
@@ -21,14 +24,50 @@ MAX_LACKING = 1e-3
 """Relative increase of the sum of S^m by cycles that the file does not hold, above which a note says so."""
 
 
-def text(loads: pd.DataFrame, damages: pd.DataFrame) -> str:
-    """Tables of `query.equivalent_loads` and, unless it is empty, of `query.damages`."""
-    names = [f"{channel}, m = {m:g}" for channel, m in zip(loads["channel"], loads["m"], strict=True)]
-    lines = [quantiles(loads.assign(load=names))]
-    if len(damages):
-        columns = ["channel", "m", "S0", "N0", "nominal", "median", "n", "count", "estimate", "lower", "upper"]
-        lines += ["", "share of the joints whose damage exceeds 1", plain(damages[columns])]
-    return "\n".join(lines)
+def _quantile(share: float) -> Column:
+    return Column(f"{100 * share:g} % stay below", lambda row: text.value(row[share][0], row["unit"]))
+
+
+def _interval(row: Row) -> str:
+    _, lower, upper = row[SHARES[-1]]
+    return text.span_of(lower, upper, row["unit"])
+
+
+def _line(row: Row) -> str:
+    return f"{text.value(row['S0'], CHANNELS[row['channel']])} at {row['N0']:g} cycles, m = {row['m']:g}"
+
+
+def _damage(x: float) -> str:
+    return "-" if math.isnan(x) else f"{x:.3g}"
+
+
+LOADS = (
+    Column("channel and exponent", lambda row: f"{row['channel']}, m = {row['m']:g}"),
+    Column("nominal", lambda row: text.value(row["nominal"], row["unit"])),
+    *(_quantile(share) for share in SHARES),
+    Column(f"95 % interval of {100 * SHARES[-1]:g} %", _interval),
+)
+"""Columns of the table `by_channel`."""
+DAMAGES = (
+    Column("channel", lambda row: str(row["channel"])),
+    Column("S–N line", _line, words=True),
+    Column("nominal damage", lambda row: _damage(row["nominal"])),
+    Column("median", lambda row: _damage(row["median"])),
+    Column("joints above 1", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
+    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+)
+"""Columns of the table `query.damages`. Joints above 1 are counted among the settled ones, as the share is."""
+
+
+def by_channel(loads: pd.DataFrame) -> pd.DataFrame:
+    """One row per channel and exponent of `query.equivalent_loads`: for each share (estimate, lower, upper)."""
+    rows = []
+    for (channel, m), part in loads.groupby(["channel", "m"], sort=False):
+        ends = {row["share"]: (row["estimate"], row["lower"], row["upper"]) for row in part.to_dict("records")}
+        unit, nominal = part["unit"].iloc[0], part["nominal"].iloc[0]
+        rows.append({"channel": channel, "m": m, "unit": unit, "nominal": nominal, **ends})
+    return pd.DataFrame(rows)
 
 
 def notes(loading: Loading, table: pd.DataFrame) -> str:
@@ -118,7 +157,7 @@ def panel(ax: Axes, spectrum: pd.DataFrame, revolutions: float) -> None:
     ax.set_xticks([t for t in (0.01, 0.03, 0.1, 0.3, 1, 2, 3, 4, 6, 8, 12, 16) if x[0] <= t <= ax.get_xlim()[1]])
     channel, unit = spectrum[["channel", "unit"]].iloc[0]
     ax.set_xlabel("cycles a revolution with at least this range")
-    ax.set_ylabel(f"range of {channel} [{UNITS.get(unit, unit)}]")
+    ax.set_ylabel(f"range of {channel} [{text.UNITS.get(unit, unit)}]")
 
 
 def _settled(loading: Loading) -> str:

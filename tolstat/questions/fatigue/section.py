@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -11,7 +10,8 @@ from matplotlib.axes import Axes
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
+from tolstat.display.blocks import Block, Panel, Panels, Section, Text
+from tolstat.display.table import as_block
 from tolstat.questions.fatigue import query, rendering
 from tolstat.questions.fatigue.query import Loading
 from tolstat.store.view import View
@@ -29,15 +29,13 @@ def sections(view: View, asked: Asked) -> list[Section]:
 
 
 def _section(loading: Loading) -> Section:
-    loads = query.equivalent_loads(loading)
+    loads, damages = query.equivalent_loads(loading), query.damages(loading)
     leading = query.leading(loads)
+    shown = rendering.by_channel(loads[loads["channel"].isin(leading)].sort_values(["channel", "m", "share"]))
     blocks: list[Block] = [Panels([_panel(loading, channel) for channel in leading])] if leading else []
-    blocks.append(_loads(loads[loads["channel"].isin(leading)]))
-    damages = query.damages(loading)
+    blocks.append(as_block("Damage-equivalent loads", rendering.LOADS, shown))
     if len(damages):
-        head = ["channel", "nominal damage", "median", "joints above 1", "share", "95 % interval"]
-        sums = [_damage(row) for row in damages.to_dict("records")]
-        blocks.append(Table("Damage sum of the service life", head, sums))
+        blocks.append(as_block("Damage sum of the service life", rendering.DAMAGES, damages))
     lines = rendering.notes(loading, loads).splitlines()
     blocks += [Text(text.sentence(line), small=True) for line in lines]
     return Section("fatigue", "Fatigue", blocks)
@@ -57,23 +55,3 @@ def _panel(loading: Loading, channel: str) -> Panel:
 def _draw(ax: Axes, spectrum: pd.DataFrame, revolutions: float) -> None:
     rendering.panel(ax, spectrum, revolutions)
     ax.legend(*rendering.key(), loc="upper right")
-
-
-def _loads(shown: pd.DataFrame) -> Table:
-    """Damage-equivalent loads, one row per channel and exponent."""
-    rows = []
-    ordered = shown.sort_values(["channel", "m", "share"])
-    for (channel, m), part in ordered.groupby(["channel", "m"], sort=False):
-        unit, highest = str(part["unit"].iloc[0]), part.iloc[-1]
-        cells = [f"{channel}, m = {m:g}", text.value(float(part["nominal"].iloc[0]), unit)]
-        cells += [text.value(x, unit) for x in part["estimate"]]
-        rows.append([*cells, text.span_of(float(highest["lower"]), float(highest["upper"]), unit)])
-    shares = [f"{100 * share:g} % stay below" for share in query.SHARES]
-    return Table(
-        "Damage-equivalent loads", ["channel and exponent", "nominal", *shares, "95 % interval of the last"], rows
-    )
-
-
-def _damage(row: dict[Any, Any]) -> list[str]:
-    own = [row["channel"], f"{row['nominal']:.2g}", f"{row['median']:.2g}", f"{row['count']} of {row['n']}"]
-    return [*own, text.percent(row["estimate"]), text.span(row["lower"], row["upper"])]

@@ -1,8 +1,10 @@
 """The report as one page: its figures against counts by hand, every state of a campaign, the same bytes each time."""
 
 import re
+from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -18,7 +20,9 @@ from tolstat.questions.exceedance import query
 from tolstat.questions.joints import query as joints
 from tolstat.report import html as writer
 from tolstat.report import page, verdict
-from tolstat.store import ResultStore
+from tolstat.store import ResultStore, revolutions
+from tolstat.store.reader import Reader
+from tolstat.store.recall import recall
 from tolstat.store.view import KEPT_ROWS
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
@@ -86,6 +90,36 @@ def test_every_picture_has_a_title_and_a_description(html):
         assert own["role"] == "img"
         for name in own["aria-labelledby"].split():
             assert re.search(rf'id="{name}">[^<]{{10,}}<', html), name
+
+
+@pytest.mark.parametrize("replay", [0, 100])
+def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypatch, replay):
+    """Reads of each dataset, in rows; joints that the page draws over the revolution are simulated again."""
+    read, plain = Counter(), Reader.column
+
+    def counting(self, group, name, rows):
+        values = plain(self, group, name, rows)
+        read[f"{group}/{name}"] += len(values)
+        return values
+
+    monkeypatch.setattr(Reader, "column", counting)
+    monkeypatch.setattr(revolutions, "read", drawn)
+    opened = mock.Mock(side_effect=ResultStore.open)
+    monkeypatch.setattr(ResultStore, "open", opened)
+    recalled = mock.Mock(side_effect=recall)
+    monkeypatch.setattr("tolstat.store.view.recall", recalled)
+    page.write(path, tmp_path / "page.html", accepted=0.05, replay=replay)
+    tables = {name: rows for name, rows in read.items() if name.startswith(("results/", "errors/"))}
+    assert len(tables) > 150
+    assert set(tables.values()) == {401}
+    assert (opened.call_count, recalled.call_count) == (1, 1)
+
+
+def drawn(store, slots, most_angles=60):
+    """Stands for `revolutions.read`: moduli without a simulation."""
+    moduli = 600.0 + np.random.default_rng(5).normal(size=(2, len(slots), most_angles, 8))
+    angles = 2.0 * np.pi * np.arange(most_angles) / most_angles
+    return revolutions.Revolutions(slots, angles, *moduli, "simulated again", 0.0)
 
 
 def test_text_of_the_study_is_shown_and_not_run(html):

@@ -44,14 +44,13 @@ def draw(study: Study, rows: range | None = None) -> Table:
     Returns
     -------
     ndarray, (len(rows),), dtype ERROR
-        Row 0 of the study is the nominal joint when ``sampling.nominal_first`` is true: no error of any kind, not even
-        the study's fixed ones. The other rows are samples 0, 1, 2, ...
+        Row 0 is the nominal joint if the study has one: no error of any kind, not even the study's fixed ones. The
+        other rows are samples 0, 1, 2, ...
     """
     rows = range(study.rows) if rows is None else rows
     table = nominal_errors(len(rows), study.operation)
-    nominal = int(study.sampling.nominal_first)
-    samples = table[max(0, nominal - rows.start) :]
-    numbers = range(rows.stop - nominal - samples.size, rows.stop - nominal)
+    numbers = study.sampling.samples(rows)
+    samples = table[len(rows) - len(numbers) :]
     for name, value in study.errors.items():
         samples[name] = value
     if study.sampling.method == "sweep":
@@ -71,8 +70,8 @@ def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
     A Latin hypercube is drawn as one table, because its permutations go over all joints.
     """
     size = len(rows) if study.sampling.method == "lhs" else BLOCK
-    for first in range(rows.start, rows.stop, size):
-        yield draw(study, range(first, min(first + size, rows.stop)))
+    for first in range(0, len(rows), size):
+        yield draw(study, rows[first : first + size])
 
 
 def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
@@ -81,13 +80,12 @@ def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
         return iter([_level_0(study, rows)])
     if study.sampling.method != "importance":
         return None
-    blocks = range(rows.start, rows.stop, BLOCK)
-    return (_origin(study, range(first, min(first + BLOCK, rows.stop))) for first in blocks)
+    return (_origin(study, rows[first : first + BLOCK]) for first in range(0, len(rows), BLOCK))
 
 
 def _level_0(study: Study, rows: range) -> Table:
     table = np.zeros(len(rows), draw_records.SUBSET)
-    table["level"][: max(0, int(study.sampling.nominal_first) - rows.start)] = -1  # the nominal joint
+    table["level"][: len(rows) - len(study.sampling.samples(rows))] = -1  # the nominal joint
     table["parent"] = -1
     return table
 
@@ -95,9 +93,9 @@ def _level_0(study: Study, rows: range) -> Table:
 def _origin(study: Study, rows: range) -> Table:
     table = np.zeros(len(rows), draw_records.IMPORTANCE)
     table["component"] = -1  # the nominal joint
-    drawn = table[max(0, int(study.sampling.nominal_first) - rows.start) :]
-    last = rows.stop - int(study.sampling.nominal_first)
-    scores, drawn["component"] = _proposed(study, columns(study), range(last - drawn.size, last))
+    numbers = study.sampling.samples(rows)
+    drawn = table[len(rows) - len(numbers) :]
+    scores, drawn["component"] = _proposed(study, columns(study), numbers)
     drawn["weight"] = weights(study.proposals, scores)
     return table
 

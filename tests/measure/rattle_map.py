@@ -23,7 +23,7 @@ def draw(source: Path, target: Path) -> None:
 
     with ResultStore.open(source) as store:
         errors, status = store.errors(), store.status()
-        rows = np.arange(int(store.sampling["nominal_first"]), len(errors))
+        rows = np.arange(store.first_sample, len(errors))
         errors, status = errors[rows], status[rows]
         params = perturb(joint_of(store, 1), errors)
     speeds, torques = (np.unique(errors[f"operation.{name}"].round(6)) for name in ("speed", "torque"))

@@ -246,11 +246,11 @@ class TestChoice:
         assert fidelity.apply(DYNAMIC, record)[:2] == DYNAMIC[:2]
 
     def test_pilot(self):
-        rows = fidelity.pilot(1000, True, seed=3)
+        rows = fidelity.pilot(1000, 1, seed=3)
         assert rows[0] == 0
         assert len(set(rows)) == 1 + fidelity.JOINTS
-        assert (rows == fidelity.pilot(1000, True, seed=3)).all()
-        assert list(fidelity.pilot(3, False, seed=3)) == [0, 1, 2]
+        assert (rows == fidelity.pilot(1000, 1, seed=3)).all()
+        assert list(fidelity.pilot(3, 0, seed=3)) == [0, 1, 2]
 
 
 AUTO = """

@@ -53,7 +53,7 @@ def choose(study: Study, n: int, seed: int, block: int) -> tuple[Params, int]:
     count : int
         Number of joints that are compared.
     """
-    first = int(study.sampling.nominal_first)
+    first = study.first_sample
     drawn = first + np.random.default_rng(seed).permutation(study.rows - first)
     rows = np.concatenate([np.arange(first), drawn])
     count = min(first + n, len(rows))

@@ -230,14 +230,14 @@ def _blocks(
     for chunk in pending(store, last):
         held = slice(chunk[0], chunk[-1] + 1)
         errors, attempt = store.errors(held), store.attempt(held)[chunk - chunk[0]]
-        numbers = variants(study, chunk + store.rows.start)
+        numbers = variants(study, store.row(chunk))
         options = [again[k - 1] if k else own[i] for i, k in zip(numbers.tolist(), attempt.tolist(), strict=True)]
         which = np.array([known.index(one) for one in options])
         for number in np.unique(which):
             alike = chunk[which == number]
             while alike.size:
                 rows, alike = np.split(alike, [pace.take(alike.size)])
-                params = perturbed(study, rows + store.rows.start, errors[rows - chunk[0]], perturb)
+                params = perturbed(study, store.row(rows), errors[rows - chunk[0]], perturb)
                 yield Block(rows, params, known[number])
 
 

@@ -140,7 +140,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
     check_free(out)
     with ExitStack() as opened:
         stores = [opened.enter_context(ResultStore.open(path)) for path in paths]
-        stores.sort(key=lambda store: (store.rows.start, store.rows.stop))
+        stores.sort(key=lambda store: (store.rows[0], store.rows.stop))
         _check_one_campaign(stores)
         attrs = stores[0].attributes()
         attrs.pop("stop", None)
@@ -168,7 +168,7 @@ def _check_extendable(store: ResultStore, n: int) -> None:
     elif n <= held:
         faults.append(Fault(place, f"has {held} joints already", f"give --n more than {held}"))
     if not store.whole:
-        found = f"holds rows {store.rows.start}:{store.rows.stop} of a campaign only"
+        found = f"holds rows {store.rows[0]}:{store.rows.stop} of a campaign only"
         faults.append(Fault(place, found, "merge all slices first, with: tolstat merge"))
     elif store.history_specs and not store.complete:
         faults.append(Fault(place, "has joints pending, with histories to come", "finish it first, with: tolstat run"))
@@ -196,7 +196,7 @@ def _check_one_campaign(stores: Sequence[ResultStore]) -> None:
             )
     missing = _missing(stores)
     if missing:
-        listed = ", ".join(f"{rows.start}:{rows.stop}" for rows in missing)
+        listed = ", ".join(f"{part.start}:{part.stop}" for part in missing)
         remedy = f"compute each, with: tolstat run STUDY --rows {missing[0].start}:{missing[0].stop} --out FILE"
         faults.append(Fault("merge", f"no file holds rows {listed} of {first.campaign_rows}", remedy))
     if first.history_specs:
@@ -211,8 +211,8 @@ def _missing(stores: Sequence[ResultStore]) -> list[range]:
     """Rows of the campaign that no file holds."""
     missing, covered = [], 0
     for store in stores:
-        if store.rows.start > covered:
-            missing.append(range(covered, store.rows.start))
+        if store.rows[0] > covered:
+            missing.append(range(covered, store.rows[0]))
         covered = max(covered, store.rows.stop)
     if covered < stores[0].campaign_rows:
         missing.append(range(covered, stores[0].campaign_rows))
@@ -224,7 +224,7 @@ def _shares(stores: Sequence[ResultStore]) -> Iterator[tuple[ResultStore, int]]:
     covered = 0
     for store in stores:
         if store.rows.stop > covered:
-            yield store, covered - store.rows.start
+            yield store, store.slot(covered)
             covered = store.rows.stop
 
 

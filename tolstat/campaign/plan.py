@@ -159,7 +159,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
     simulation, seconds = simulate_timed(study, params, [own[number] for number in variants(study, rows)])
     each = seconds / len(rows)
     iid = study.sampling.method == "random"
-    valid = slice(int(study.sampling.nominal_first), None)
+    valid = slice(study.first_sample, None)
     status = simulation.results["status"]
     return Plan(
         rows=study.rows,

@@ -86,9 +86,9 @@ def replay(store: ResultStore, row: int) -> Replay:
     """
     place = str(store.path)
     if row not in store.rows:
-        found = f"has the rows {store.rows.start} to {store.rows.stop - 1}, not {row}"
+        found = f"has the rows {store.rows[0]} to {store.rows[-1]}, not {row}"
         raise InputError([Fault(place, found, "give one of these with --row")])
-    here = slice(row - store.rows.start, row - store.rows.start + 1)
+    here = slice(store.slot(row), store.slot(row) + 1)
     stored = store.results(here)
     if stored["status"][0] == Status.PENDING:
         raise InputError([Fault(place, f"row {row} is pending", "simulate it first, with: tolstat run")])

@@ -121,7 +121,7 @@ def run(
             retry = retry.chosen(store.fidelity)
             begin(store, retry, stages.history_specs(retry.options, *_history_options(study)), tell)
         counts = store.counts()
-        last = store.n if until_row is None else until_row - store.rows.start
+        last = store.n if until_row is None else store.slot(until_row)
         try:
             if progress:
                 progress(counts)
@@ -172,9 +172,7 @@ def _create_or_resume(
     study: Study, path: Path, stages: Stages, rows: range | None, tell: Callable[[str], None]
 ) -> ResultStore:
     rows = range(study.rows) if rows is None else rows
-    if not (0 <= rows.start < rows.stop <= study.rows and rows.step == 1):
-        found = f"{rows.start}:{rows.stop} are no rows of the {study.rows} that the study has"
-        raise InputError([Fault("rows", found, f"give a part of 0:{study.rows}")])
+    _check_part(rows, study.rows)
     if not path.exists():
         choice = choose_fidelity(study, stages) if study.solver.fidelity == "auto" else {}
         if choice:
@@ -194,10 +192,17 @@ def _create_or_resume(
     return store
 
 
+def _check_part(part: range, n: int) -> None:
+    """Refuse what is not a part, without gaps, of the n rows of a study."""
+    if not (0 <= part.start < part.stop <= n and part.step == 1):
+        found = f"{part.start}:{part.stop} are no rows of the {n} that the study has"
+        raise InputError([Fault("rows", found, f"give a part of 0:{n}")])
+
+
 def _rows_of(study: Study, store: ResultStore, stages: Stages, rows: NDArray[np.intp]) -> NDArray[np.void]:
     """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
     errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
-    return perturbed(study, rows + store.rows.start, errors, stages.perturb)
+    return perturbed(study, store.row(rows), errors, stages.perturb)
 
 
 def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any]:
@@ -210,7 +215,7 @@ def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any
     """
     stages = stages or _own_stages()
     stages.warm_up()
-    rows = fidelity.pilot(study.rows, study.sampling.nominal_first, study.sampling.seed)
+    rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
     errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
     params = perturbed(study, rows, errors, stages.perturb)
     simulate = partial(stages.simulate, histories="none", n_harmonics=0)

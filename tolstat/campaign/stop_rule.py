@@ -172,7 +172,7 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
         remedy = f"add {', '.join(LOADS[rule.load].columns)}"
         raise InputError([Fault(f"{study.path}: output.results", f"leaves out {rule.load} of --until", remedy)])
     planned = looks(rule.width, study.samples)
-    first = int(study.sampling.nominal_first)
+    first = study.first_sample
     for joints in planned:
         run(first + joints)
         with ResultStore.open(out) as store:
@@ -188,8 +188,9 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
 
 def _look(store: ResultStore, rule: Rule, rows: range, n_looks: int) -> Look:
     count = unresolved = 0
-    for begin in range(rows.start, rows.stop, BLOCK):
-        results = store.results(slice(begin, min(begin + BLOCK, rows.stop)))
+    for begin in range(0, len(rows), BLOCK):
+        block = rows[begin : begin + BLOCK]
+        results = store.results(slice(block.start, block.stop))
         part = exceedance.at(LOADS[rule.load].of(results), results["status"], rule.level, iid=False)
         count += part.count
         unresolved += part.n_failed + part.n_unsettled

@@ -202,8 +202,8 @@ def of_campaign(
         None when no joint is settled.
     """
     settled = np.flatnonzero(store.status() == Status.OK)
-    if joints is not None and store.sampling["nominal_first"] and len(settled) > 1:
-        settled = settled[settled > 0]  # the nominal joint is not in the statistics either
+    if joints is not None and len(settled) > 1:
+        settled = settled[settled >= store.first_sample]  # the nominal joint is not in the statistics either
     rows = choose(settled, joints, seed)
     if not rows.size:
         return None
@@ -325,7 +325,7 @@ def check_study(
         remedy = "run the study and verify its result file"
         raise InputError([Fault(f"{plan.path}: solver.fidelity", "'auto' chooses when the study is run", remedy)])
     seed = plan.sampling.seed if seed is None else seed
-    first = int(plan.sampling.nominal_first and number is not None)
+    first = 0 if number is None else plan.first_sample
     rows = choose(np.arange(first, plan.rows), number, seed)
     params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)
     options = [plan.solvers[number].options() for number in recorded.variants(plan, rows).tolist()]

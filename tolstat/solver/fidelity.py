@@ -63,12 +63,11 @@ class Choice(NamedTuple):
     record: dict[str, Any]
 
 
-def pilot(rows: int, nominal_first: bool, seed: int) -> NDArray[np.intp]:
+def pilot(rows: int, first_sample: int, seed: int) -> NDArray[np.intp]:
     """Select the rows of the pilot: the nominal joint, if the campaign has one, and random others; ascending."""
-    first = int(nominal_first)
-    count = min(JOINTS, rows - first)
-    drawn = first + np.random.default_rng([seed, JOINTS]).choice(rows - first, count, replace=False)
-    return np.sort(np.concatenate([np.arange(first), drawn])).astype(np.intp)
+    samples = rows - first_sample
+    drawn = np.random.default_rng([seed, JOINTS]).choice(samples, min(JOINTS, samples), replace=False)
+    return np.sort(np.concatenate([np.arange(first_sample), first_sample + drawn])).astype(np.intp)
 
 
 def choose(

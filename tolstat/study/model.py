@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
@@ -147,6 +147,15 @@ class Sampling(Strict):
             raise refuse("nominal_first with 'cases'", "leave it out: each group of joints has the ideal one")
         return self
 
+    @property
+    def first_sample(self) -> int:
+        """Row of the first random joint: 1 if row 0 is the nominal joint, else 0."""
+        return int(self.nominal_first)
+
+    def samples(self, rows: range) -> range:
+        """Numbers, among the random joints, of those in some rows."""
+        return range(max(0, rows.start - self.first_sample), max(0, rows.stop - self.first_sample))
+
 
 class Subset(Sampling):
     """How the joints of a subset simulation are drawn, see `analysis.subset`; `n` is their present number.
@@ -164,6 +173,9 @@ class Subset(Sampling):
     unresolved : str
         Whether a joint without a valid load counts as above every level or below.
     """
+
+    FROM_STUDY: ClassVar[tuple[str, ...]] = ("seed", "nominal_first")
+    """Fields that have the values of the study whose tolerances are used."""
 
     method: SamplingMethod = "subset"
     per_level: Annotated[int, Field(strict=True, ge=20, le=MAX_ROWS)]

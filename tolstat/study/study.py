@@ -136,7 +136,7 @@ class Study(Case):
     @property
     def first_sample(self) -> int:
         """Row of the first random joint: 1 if row 0 is the nominal joint, else 0."""
-        return int(self.sampling.nominal_first)
+        return self.sampling.first_sample
 
     @property
     def rows(self) -> int:

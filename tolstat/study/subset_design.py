@@ -43,7 +43,7 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
     if not selected_results.holds(study.output.columns, load.name):
         remedy = f"add {', '.join(load.columns)}"
         faults.append(Fault(f"{study.path}: output.results", f"leaves out {load.name} of --limit", remedy))
-    own = study.sampling.model_dump(include={"seed", "nominal_first"})
+    own = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
     with gather(faults):
         read = validate(Subset, own | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
     if faults:

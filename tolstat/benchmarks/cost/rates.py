@@ -79,7 +79,7 @@ class Sample(NamedTuple):
 
 def sample(study: Study, n: int) -> Sample:
     """Take the first n random joints of a study, and keep those with as many contact stations as the first."""
-    first = int(study.sampling.nominal_first)
+    first = study.first_sample
     params = parameters(study, np.arange(first, min(first + n, study.rows)))
     alike = params["n_stations"] == params["n_stations"][0]
     options = study.solver.options()

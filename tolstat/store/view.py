@@ -124,6 +124,10 @@ class View:
         """Fields `LOAD_FIELDS` of the results, (n,)."""
         return self._tables.results
 
+    def read_results(self, fields: Sequence[str]) -> NDArray[np.void]:
+        """Read other fields of the results, (n,) table; they are not kept."""
+        return self.store.results(slice(self.store.first_sample, None), fields)
+
     @property
     def status(self) -> NDArray[np.uint8]:
         """Status of the joints, (n,)."""
@@ -133,6 +137,11 @@ class View:
     def nominal(self) -> NDArray[np.void]:
         """The nominal joint, RESULT (1,); (0,) if the file has none or its results are not valid."""
         return self._tables.nominal
+
+    @property
+    def nominal_slots(self) -> NDArray[np.intp]:
+        """File slots of `nominal`, (1,) or (0,)."""
+        return np.zeros(len(self.nominal), dtype=np.intp)
 
     @property
     def without_load(self) -> NDArray[np.void]:
@@ -146,7 +155,6 @@ class View:
 
     @cached_property
     def _tables(self) -> _Tables:
-        check_equal_weights(self.store.sampling, self.path, weighted=True)
         skip, store = self.store.first_sample, self.store
         nominal = np.empty(0, RESULT)
         results = np.empty(self.n, [(name, RESULT[name]) for name in LOAD_FIELDS])
@@ -174,8 +182,11 @@ class View:
         ------
         InputError
             When there is no such load, or the study does not keep it.
+        StoreError
+            When the file holds levels of a subset simulation, which are not a sample.
         """
         if name not in self._loads:
+            check_equal_weights(self.store.sampling, self.path, weighted=True)
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
             if not selected_results.holds(self.columns, name):

@@ -132,7 +132,7 @@ def test_same_file_same_bytes(path, tmp_path):
     contents = []
     for k in (0, 1):
         with ResultStore.open(path) as store:
-            made = page.compose(store.view(), Asked(0.05))
+            made = page.compose(store.view(), Asked(path, 0.05))
         some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
         writer.write(replace(made, sections=some), tmp_path / f"{k}.html")
         contents.append((tmp_path / f"{k}.html").read_bytes())
@@ -194,7 +194,7 @@ def test_leading_load_is_the_one_whose_limit_most_joints_exceed(view):
 def words(path, accepted=np.nan):
     """Sections of a page, and its paragraphs and cells, without drawing it."""
     with ResultStore.open(path) as store:
-        made = page.compose(store.view(), Asked(accepted))
+        made = page.compose(store.view(), Asked(path, accepted))
     found = [made.subtitle]
     for block in (block for section in made.sections for block in section.blocks):
         found += [block.text] if block.kind == "text" else []

@@ -105,8 +105,13 @@ def at(
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    above = exceedance.at(values, status, limit, confidence, iid, ends)
-    valid = exceedance.sort_out(values, status).valid
+    return of_sample(exceedance.sort_out(values, status, ends), limit, confidence, iid)
+
+
+def of_sample(sample: Sample, limit: float, confidence: float = 0.95, iid: bool = True) -> Capability:
+    """Capability of one load from loads that are sorted already; other parameters as in `at`."""
+    valid = sample.valid
+    above = Exceedance(*exceedance.curve_of(sample, [limit], confidence, iid)[0].tolist())
     blank = (np.nan, np.nan, np.nan)
     scatters = valid.size > 1 and np.ptp(valid) > 0
     normal = _normal(valid, limit, confidence, iid) if scatters else blank

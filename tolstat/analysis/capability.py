@@ -121,25 +121,6 @@ def of_sample(sample: Sample, limit: float, confidence: float = 0.95, iid: bool 
     return Capability(above, *normal, _normality(valid) if scatters else np.nan, *general, needed)
 
 
-def utilization(values: ArrayLike, limits: ArrayLike) -> FloatArray:
-    """Largest ratio of load to limit in each joint: the joint meets all limits if it is at most 1.
-
-    Parameters
-    ----------
-    values : array_like, shape (n, m)
-        m loads of each joint.
-    limits : array_like, shape (m,)
-        Limit of each load, in its unit.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        NaN where a load is not finite.
-    """
-    part: NDArray[np.float64] = (np.asarray(values, dtype=float) / np.asarray(limits, dtype=float)).max(axis=1)
-    return part
-
-
 def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
     """Exact interval of a one-sided capability index of a normal load.
 

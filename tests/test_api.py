@@ -24,7 +24,8 @@ ON_ARRAYS = (
 
 
 def test_names_are_documented_functions_and_no_modules():
-    listed = re.findall(r"`(\w+)`", (ROOT / "docs" / "python.md").read_text(encoding="utf-8").split("|---|---|")[1])
+    pages = [ROOT / "docs" / "python.md", *(ROOT / "docs" / "questions").glob("*.md")]
+    listed = {name for page in pages for name in re.findall(r"(?:`|tolstat\.)(\w+)\b", page.read_text("utf-8"))}
     for name in tolstat.__all__:
         value = getattr(tolstat, name)
         assert value == getattr(tolstat, name)

@@ -10,8 +10,8 @@ import pytest
 
 from tests.conftest import REFERENCE
 from tolstat import study
-from tolstat.benchmarks import iteration, joints, parts
-from tolstat.benchmarks.split import Once
+from tolstat.benchmarks.cost import iteration, parts, rates
+from tolstat.benchmarks.cost.split import Once
 from tolstat.common.tables import Fidelity
 from tolstat.solver import simulation
 
@@ -21,7 +21,7 @@ STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"
 
 @pytest.fixture(scope="module")
 def these():
-    return joints.sample(study.load(STUDY), 64)
+    return rates.sample(study.load(STUDY), 64)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_joints_in_lanes(benchmark, these):
 
 
 def test_joints_one_at_a_time(benchmark, these):
-    benchmark(joints.alone, these.params, these.options)
+    benchmark(rates.alone, these.params, these.options)
 
 
 def test_quasistatic_joints(benchmark, these):

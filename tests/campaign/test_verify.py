@@ -17,9 +17,10 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import LARGEST, Method, Options, Start, Status
-from tolstat.questions.exceedance import accuracy as tables
-from tolstat.questions.exceedance import rendering as exceedance
-from tolstat.store import ResultStore, recorded, verification, view
+from tolstat.questions.accuracy import query as tables
+from tolstat.questions.accuracy import rendering
+from tolstat.questions.exceedance import query as exceedance
+from tolstat.store import ResultStore, recorded, verification
 from tolstat.store.verification import Check, Verification
 
 REAL = """
@@ -197,10 +198,10 @@ def off_by(path, factor, rows=(5, 9)):
 def test_report_moves_every_load_by_the_numerical_error(tmp_path):
     path = synthetic.store(tmp_path)
     with ResultStore.open(path) as store:
-        assert exceedance.limits(view.read(store))["numerical_lower"].isna().all()
+        assert exceedance.limits(store.view())["numerical_lower"].isna().all()
     off_by(path, 1.25)
     with ResultStore.open(path) as store:
-        limits = exceedance.limits(view.read(store)).set_index("load").loc["cross1.F"]
+        limits = exceedance.limits(store.view()).set_index("load").loc["cross1.F"]
         results = store.results()[1:]
     assert limits["numerical_error"] == pytest.approx(0.2)
     moved = 0.2 * results["F_max"].max(axis=1)
@@ -210,7 +211,7 @@ def test_report_moves_every_load_by_the_numerical_error(tmp_path):
         assert limits[f"total_{end}"] == pytest.approx(accuracy_end(int(count), 60)[0 if end == "lower" else 1])
     assert limits["numerical_lower"] < limits["estimate"] < limits["numerical_upper"]
     done = call("report", path)
-    assert done.stdout.splitlines()[0].split()[-2:] == ["all", "together"]
+    assert done.stdout.splitlines()[0].split()[-2:] == ["numerical", "error"]
     assert "measured on 2 of 2 joints against a tight reference: F 2.0e-01" in done.stderr
 
 
@@ -227,7 +228,7 @@ def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
         found = verification.read(store)
     assert found is not None
     found.checks["reference"].results["status"][0] = Status.NOT_SETTLED
-    assert "1 not settled in reference" in tables.note(found)
+    assert "1 not settled in reference" in rendering.note(found)
     # the estimate stands in: invented checks that change nothing
     assert accuracy.by_kind(tables.errors(found)[tables.TOTAL])[:, 0] == pytest.approx([0.0, 0.2])
 
@@ -287,7 +288,7 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     assert true.min() > 1e-3  # the inertia of bodies that deviate from the ideal motion
     np.testing.assert_allclose(seen, true, rtol=0.3)
     assert force_and_torque(found.base, found.checks["half_step"].results).max() < 0.1 * true.min()
-    assert "error of numerics and fidelity, measured" in tables.note(found)
+    assert "error of numerics and fidelity, measured" in rendering.note(found)
     auto = study.load(written(tmp_path, REAL.replace("steps_per_rev = 12", 'fidelity = "auto"')))
     with pytest.raises(InputError, match="auto"):
         verify.check_study(auto)

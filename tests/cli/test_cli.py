@@ -19,17 +19,12 @@ from tests.support import fakes, synthetic
 from tolstat import cli
 from tolstat.campaign import run as campaign
 from tolstat.campaign.executors import WorkerDied
+from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
 from tolstat.store import ResultStore
 
-COMMANDS = (
-    *("simulate", "plan", "run", "extend", "merge", "status", "verify"),
-    *("worst", "replay", "export", "fatigue", "time-above", "report"),
-    *("capability", "causes", "reweight", "compare", "allocate"),
-    *("rare", "multifidelity"),
-    *("work-precision", "bench"),
-)
+COMMANDS = (*(command.replace("_", "-") for command in cli.COMMANDS), *bench.INSTRUMENTS)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
 
 
@@ -69,8 +64,9 @@ def study(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help_with_every_option_explained(command):
-    done = call(command, "--help")
+    done = call(*command.split(), "--help")
     assert done.exit_code == 0
+    assert done.stdout.startswith(f"Usage: tolstat {command} [OPTIONS]")
     options = [line for line in done.stdout.splitlines() if line.startswith("  --")]
     assert options or command == "status"
     for line in options:
@@ -79,8 +75,17 @@ def test_every_command_has_help_with_every_option_explained(command):
 
 
 def test_help_lists_the_commands_and_the_readme_order():
-    listed = re.findall(r"^  ([\w-]+)  ", call("--help").stdout.split("Commands:")[1], flags=re.MULTILINE)
+    listed = re.findall(r"^  ([\w-]+(?: [\w-]+)?)  ", call("--help").stdout.split("Commands:")[1], flags=re.MULTILINE)
     assert tuple(listed) == COMMANDS
+
+
+def test_a_file_may_be_named_like_an_instrument(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for args in (["precision.toml"], ["./precision"], ["--quick", "precision"]):
+        done = call("bench", *args)
+        assert done.exit_code == 2
+        assert done.stderr.startswith("error: precision")
+    assert "Missing argument 'COMPARISON'" in call("bench", "precision").stderr
 
 
 def test_help_is_light():

@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import LAWS, with_law
 from tests.support import naive
-from tolstat.benchmarks.dense import dense
+from tolstat.benchmarks.cost.dense import dense
 from tolstat.common.tables import RESULTANT, Mode, Options
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.motion import ideal_motion

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
-from tolstat.benchmarks.work_precision.competitors import Code, Competitor, solve
-from tolstat.benchmarks.work_precision.measure import largest_of
+from tolstat.benchmarks.integrators import Code, Integrator, solve
+from tolstat.benchmarks.runs import largest_of
 from tolstat.common.tables import Method, Options
 from tolstat.solver.reference import FirstOrder, Largest, first_order
 from tolstat.solver.simulation import simulate_rows
@@ -82,7 +82,7 @@ def main() -> None:
         show(f"RK45 (scipy), {rtol:.0e}", errors, [run[1] for run in runs])
     for code, rtols in CODES.items():
         for rtol in rtols:
-            found = [solve(system, Competitor(code, True), rtol, REVOLUTIONS, LIMIT, ANGLES) for system in systems]
+            found = [solve(system, Integrator(code, True), rtol, REVOLUTIONS, LIMIT, ANGLES) for system in systems]
             errors = [error(run.largest, best) for run, best in zip(found, true, strict=True)]
             show(f"{code}, our Jacobian, {rtol:.0e}", errors, [run.seconds for run in found])
 

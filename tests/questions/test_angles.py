@@ -13,7 +13,6 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.loads import BUSHING_LOADS
 from tolstat.display.asked import Asked
-from tolstat.questions.causes import angles, tail_section
 from tolstat.questions.causes.angles import against_angle
 from tolstat.questions.causes.section import sections
 from tolstat.questions.causes.tail import worst_joints
@@ -67,10 +66,9 @@ def known(tmp_path, monkeypatch):
         one, other = (errors[name][:, None] / SIGMA for name in ("pin1.offset_t", "pin3.offset_z"))
         load = 600.0 + 20.0 * one * np.cos(theta) + 10.0 * other * np.sin(theta)
         moduli = np.repeat(load[:, :, None], 8, axis=2)
-        return Revolutions(slots, theta, moduli, 0.1 * moduli, "stored", 0.0)
+        return Revolutions(theta, moduli, 0.1 * moduli, "stored", 0.0)
 
-    for module in (angles, tail_section):
-        monkeypatch.setattr(module, "read", invented)
+    monkeypatch.setattr(revolutions, "read", invented)
     return synthetic.store(tmp_path, TEXT, "known", failed=5)
 
 
@@ -103,7 +101,7 @@ def test_command_writes_shares_and_picture(known, tmp_path):
 
 
 def test_page_draws_loads_over_the_revolution(known):
-    asked = Asked(replay=800)
+    asked = Asked(known, replay=800)
     with ResultStore.open(known) as store:
         view = store.view()
         found = sections(view, asked)

@@ -13,7 +13,7 @@ from tolstat.cli import app
 from tolstat.common.tables import SIMULATED, Simulation, Status
 from tolstat.display.asked import Asked
 from tolstat.display.text import value
-from tolstat.questions.capability import rendering as capability
+from tolstat.questions.capability import query as capability
 from tolstat.questions.causes import query, rendering, tail_section
 from tolstat.questions.causes.query import causes_of
 from tolstat.questions.causes.section import sections
@@ -134,7 +134,7 @@ PAGE = synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").
 
 def shown(path):
     """Sections of the page by key, the notes, and the leading loads of a result file."""
-    asked = Asked()
+    asked = Asked(path)
     with ResultStore.open(path) as store:
         view = store.view()
         found = {section.key: section.blocks for section in sections(view, asked)}
@@ -184,16 +184,14 @@ def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
 
 def test_capability_of_each_limit_and_of_all_together(path):
     with ResultStore.open(path) as store:
-        campaign = view.read(store)
-    table = capability.limits(campaign).set_index("load")
-    assert list(table.index) == [*campaign.limits, capability.TOGETHER]
-    status = campaign.results["status"]
-    shares = {
-        name: exceedance.at(view.load(campaign.results, name)[0], status, x) for name, x in campaign.limits.items()
-    }
-    assert table.loc["cross1.F", "ppm"] == pytest.approx(1e6 * shares["cross1.F"].estimate)
-    above = pd.DataFrame({n: view.load(campaign.results, n)[0] > x for n, x in campaign.limits.items()})
-    assert table.loc[capability.TOGETHER, "count"] == above[status == Status.OK].any(axis=1).sum()
+        known = store.view()
+        table = capability.limits(known).set_index("load")
+        loads = known.loads(list(known.limits))
+    assert list(table.index) == [*known.limits, capability.TOGETHER]
+    share = exceedance.at(known.load("cross1.F").values, known.status, known.limits["cross1.F"])
+    assert table.loc["cross1.F", "ppm"] == pytest.approx(1e6 * share.estimate)
+    above = pd.DataFrame({load.name: load.values > load.limit for load in loads})
+    assert table.loc[capability.TOGETHER, "count"] == above[known.status == Status.OK].any(axis=1).sum()
     assert table.loc[capability.TOGETHER, "good"] <= table["good"].min()
     assert (table["ppm_lower"] <= table["ppm"]).all()
     assert (table["ppm"] < table["ppm_upper"]).all()

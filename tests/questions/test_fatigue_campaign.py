@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import re
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 import tolstat
 from tests.questions.test_fatigue import needs
+from tests.support import synthetic
 from tests.support.environment import ROOT
 from tolstat.analysis import damage
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import CHANNELS
-from tolstat.questions.fatigue import pylife
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panels, Table, Text
+from tolstat.questions.fatigue import pylife, rendering
 from tolstat.questions.fatigue import query as fatigue
+from tolstat.questions.fatigue.counting import channels, cycles_of
+from tolstat.questions.fatigue.section import sections
 from tolstat.solver import rainflow
 from tolstat.store import ResultStore
 from tolstat.study.fatigue import Fatigue, read
@@ -64,8 +71,15 @@ def campaign(tmp_path_factory):
 
 
 def cycles(path):
+    """Cycles of all joints of a file, the nominal joint included, and their status."""
     with ResultStore.open(path) as store:
-        return fatigue.cycles(store), store.status()
+        return cycles_of(store, np.arange(store.n)), store.status()
+
+
+def load_cycles(files, shares=(1.0,), names=None, samples=None):
+    with ExitStack() as stack:
+        views = [stack.enter_context(ResultStore.open(file)).view() for file in files]
+        return fatigue.load_cycles(views, shares, names, samples)
 
 
 @pytest.mark.slow
@@ -92,26 +106,26 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
 
 def test_a_duty_cycle_of_two_campaigns(campaign):
     files = [campaign("cycles", alpha) for alpha in (15.0, 5.0)]
-    both = fatigue.read(files, [0.25, 0.75])
+    both = load_cycles(files, [0.25, 0.75])
     single = [cycles(file) for file in files]
     power = sum(s * damage.equivalent_load(c, 4.0)[1:] ** 4 for s, (c, _) in zip((0.25, 0.75), single, strict=True))
     np.testing.assert_allclose(damage.equivalent_load(both.cycles, 4.0), power**0.25)
     assert both.status.tolist() == np.maximum(*(status[1:] for _, status in single)).tolist()
     assert both.cycles.ranges.shape[0] == 12
     assert both.nominal.ranges.shape[0] == 1
-    assert both.judged == Fatigue(
+    assert both.settings == Fatigue(
         (4.0,), 1e7, 1e6, {f"cross{i}.F_{a}": tuple(LINE) for i in (1, 2, 3, 4) for a in "et"}
     )
     with pytest.raises(InputError, match=r"does not hold the joints of .*\n  hint: run both studies with the same"):
-        fatigue.read([files[0], campaign("cycles", seed=2)], [0.5, 0.5])
+        load_cycles([files[0], campaign("cycles", seed=2)], [0.5, 0.5])
     for shares in ([1.0], [0.5, 0.6], [-1.0, 2.0]):
         with pytest.raises(InputError, match="their sum is 1"):
-            fatigue.read(files, shares)
+            load_cycles(files, shares)
 
 
 def test_a_file_without_histories_says_what_to_do(campaign):
     with pytest.raises(StoreError, match='holds neither cycles nor load histories\n  hint: set histories = "cycles"'):
-        fatigue.read([campaign("none")])
+        load_cycles([campaign("none")])
 
 
 def test_the_section_may_be_edited_after_the_run(campaign, tmp_path):
@@ -120,7 +134,7 @@ def test_the_section_may_be_edited_after_the_run(campaign, tmp_path):
     text = campaign().with_suffix(".toml").read_text(encoding="utf-8")
     source.write_text(text.replace("exponents = [4]", "exponents = [7]"), encoding="utf-8")
     tolstat.run(tolstat.load(source), out, workers=1)
-    assert fatigue.read([out]).judged.exponents == (7.0,)
+    assert load_cycles([out]).settings.exponents == (7.0,)
     source.write_text(text.replace('"cycles"', '"none"'), encoding="utf-8")
     with pytest.raises(InputError, match='fatigue: has no effect without cycles\n  hint: write histories = "cycles"'):
         tolstat.load(source)
@@ -128,7 +142,6 @@ def test_the_section_may_be_edited_after_the_run(campaign, tmp_path):
 
 def test_a_campaign_without_a_valid_joint(tmp_path):
     from tests.cli.test_cli import call
-    from tolstat.questions.fatigue import rendering as report
 
     source, out = tmp_path / "a.toml", tmp_path / "a.h5"
     text = STUDY.format(histories="cycles", alpha=15, seed=1) + '[errors]\npin1.diameter = "0.5 mm"\n'
@@ -137,16 +150,16 @@ def test_a_campaign_without_a_valid_joint(tmp_path):
     done = call("fatigue", out)
     assert done.exit_code == 0, done.output
     assert len(done.stdout.splitlines()) == 1 + 64 + 3 + 8
-    page = report.figure(fatigue.read([out]))
+    page = rendering.figure(load_cycles([out]))
     assert all("no joint" in ax.texts[0].get_text() for ax in page.axes)
 
 
 def test_channels_are_selected_by_patterns():
-    assert fatigue.channels(["cross2.F", "cross[12].F_?"]) == (
+    assert channels(["cross2.F", "cross[12].F_?"]) == (
         *(f"cross1.F_{axis}" for axis in "etz"), *(f"cross2.F_{axis}" for axis in "etz"), "cross2.F",
     )  # fmt: skip
     with pytest.raises(InputError, match="pin1"):
-        fatigue.channels(["pin1.contact", "cross1.F"])
+        channels(["pin1.contact", "cross1.F"])
 
 
 def test_every_fault_of_the_section_is_told():
@@ -172,8 +185,8 @@ def test_every_fault_of_the_section_is_told():
 
 def test_pylife_series_holds_every_cycle_and_survives_a_file(campaign, tmp_path):
     with ResultStore.open(campaign()) as store:
-        series = tolstat.pylife_series(store, revolutions=10.0)
-        counted = fatigue.cycles(store)
+        series = tolstat.pylife_series(store.view(), revolutions=10.0)
+        counted = cycles_of(store, np.arange(store.n))
     assert series.index.names == ["range", "mean", "joint", "channel"]
     assert isinstance(series.index.levels[0], pd.IntervalIndex)
     assert series.groupby("joint").sum().to_dict() == {
@@ -194,12 +207,13 @@ def test_the_lines_of_the_document_read_the_export(campaign, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     done = call("export", campaign(), "--pylife", "cycles.csv")
     assert done.exit_code == 0, done.stderr
-    document = (ROOT / "docs" / "fatigue.md").read_text(encoding="utf-8")
-    code = re.findall(r"```python\n(.*?)```", document, flags=re.DOTALL)[0].split("# with pyLife")[0]
+    document = (ROOT / "docs" / "questions" / "fatigue.md").read_text(encoding="utf-8")
+    found = re.findall(r"```python\n(.*?)```", document, flags=re.DOTALL)
+    code = next(code for code in found if "cycles.csv" in code).split("# with pyLife")[0]
     names: dict[str, object] = {}
     exec(code, names)
     with ResultStore.open(campaign()) as store:
-        pd.testing.assert_series_equal(names["series"], tolstat.pylife_series(store))
+        pd.testing.assert_series_equal(names["series"], tolstat.pylife_series(store.view()))
 
 
 @needs("pylife")
@@ -208,8 +222,8 @@ def test_pylifes_own_damage(campaign):
     import pylife.stress.collective  # noqa: F401
 
     with ResultStore.open(campaign()) as store:
-        series = tolstat.pylife_series(store, ["cross1.F_t"], bins=2000, revolutions=1e7)
-        sums = damage.damage(fatigue.cycles(store, ["cross1.F_t"]), LINE, 1e7)[:, 0]
+        series = tolstat.pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7)
+        sums = damage.damage(cycles_of(store, np.arange(store.n), ["cross1.F_t"]), LINE, 1e7)[:, 0]
     curve = pd.Series({"k_1": LINE.m, "ND": LINE.N0, "SD": LINE.S0 / 2})  # amplitudes
     theirs = curve.fatigue.miner_elementary().damage(series.load_collective).groupby("joint").sum()
     valid = np.flatnonzero(np.isfinite(sums))
@@ -228,7 +242,7 @@ def test_command_prints_loads_and_damage(campaign, tmp_path):
     assert "share of the joints whose damage exceeds 1" in done.stdout
     frame = pd.read_csv(out)
     assert len(frame) == 64 * 3
-    loading = fatigue.read([campaign(), campaign("cycles", 5.0)], [0.5, 0.5])
+    loading = load_cycles([campaign(), campaign("cycles", 5.0)], [0.5, 0.5])
     median = frame[(frame["channel"] == "fork1.F_z") & (frame["share"] == 0.5)].iloc[0]
     values = damage.equivalent_load(loading.cycles.of("fork1.F_z"), 4.0, 1e7, 1e6)[:, 0]
     ordered = np.sort(values[loading.status == tolstat.Status.OK])
@@ -240,17 +254,63 @@ def test_command_prints_loads_and_damage(campaign, tmp_path):
 
 
 def test_spectra_fall_and_the_figure_shows_four_panels(campaign):
-    from tolstat.questions.fatigue import rendering as report
-
-    loading = fatigue.read([campaign()])
-    table = report.spectra(loading, ["fork1.F_z"])
+    loading = load_cycles([campaign()])
+    table = fatigue.spectra(loading, ["fork1.F_z"])
     for _, part in table.groupby("share"):
         assert (np.diff(part["cycles"]) > 0).all()
         assert (np.diff(part["estimate"]) <= 0).all()
         assert (part["lower"] <= part["estimate"]).all()
         assert (part["estimate"] <= part["upper"]).all()
-    thirds = fatigue.read([campaign()] * 3, [1 / 3, 1 / 3, 1 / 3])
-    assert set(table["cycles"]) <= set(report.spectra(thirds, ["fork1.F_z"])["cycles"].round())
-    page = report.figure(loading)
+    thirds = load_cycles([campaign()] * 3, [1 / 3, 1 / 3, 1 / 3])
+    assert set(table["cycles"]) <= set(fatigue.spectra(thirds, ["fork1.F_z"])["cycles"].round())
+    page = rendering.figure(loading)
     assert [ax.get_ylabel().split(" of ")[1][:4] for ax in page.axes] == ["cros", "cros", "fork", "fork"]
-    assert report.worst(report.equivalent_loads(loading))[-1].startswith("fork4.T_")
+    assert fatigue.most_loaded(fatigue.equivalent_loads(loading))[-1].startswith("fork4.T_")
+
+
+def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
+    asked = Asked(tmp_path / "c.h5")
+    with ResultStore.open(campaign()) as store:
+        found = sections(store.view(), asked)
+        store.study_text = store.study_text.replace("exponents = [4]", "exponents = [0]")
+        assert sections(store.view(), asked) == []
+    assert [section.key for section in found] == ["fatigue"]
+    spectra, loads, damages, note = found[0].blocks
+    assert isinstance(spectra, Panels)
+    assert [panel.key.split("-")[1][:-1] for panel in spectra.panels] == ["cross", "cross", "fork", "fork"]
+    ax = Figure().add_subplot()
+    spectra.panels[2].draw(ax)
+    leading = spectra.panels[2].title.split(":")[0]
+    assert (ax.get_ylabel(), len(ax.get_legend().get_texts())) == (f"range of {leading} [N]", 4)
+    loading = load_cycles([campaign()])
+    table = fatigue.equivalent_loads(loading)
+    own = table[table["channel"] == leading].set_index("share")
+    assert isinstance(loads, Table)
+    row = next(row for row in loads.rows if row[0] == f"{leading}, m = 4")
+    assert row[1:5] == [f"{x:.4g} N" for x in (own["nominal"][0.5], *own["estimate"])]
+    assert (len(loads.rows), len(damages.rows), damages.rows[0][4]) == (4, 8, f"0 of {loading.settled}")
+    assert note == Text(f"{rendering.notes(loading, table)}.", small=True)
+    assert [text.split(":")[0] for text in asked.notes] == ["load cycles are left out"]
+    for path in (campaign("none"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):
+        with ResultStore.open(path) as store:
+            assert sections(store.view(), asked) == []
+    assert len(asked.notes) == 1
+
+
+def test_a_slice_of_a_campaign_has_the_rows_of_the_campaign(campaign, tmp_path):
+    part = tmp_path / "part.h5"
+    tolstat.run(tolstat.load(campaign().with_suffix(".toml")), part, workers=1, rows=range(4, 9), check=False)
+    assert load_cycles([part]).status.tolist() == load_cycles([campaign()]).status[3:8].tolist()
+    joints = []
+    for path in (campaign(), part):
+        with ResultStore.open(path) as store:
+            joints.append(set(tolstat.pylife_series(store.view()).index.get_level_values("joint")))
+    assert joints[1] == joints[0] & set(range(4, 9))
+    assert joints[1]
+
+
+def test_only_the_first_samples_are_read(campaign):
+    whole, part = load_cycles([campaign()]), load_cycles([campaign()], samples=5)
+    assert part.status.tolist() == whole.status[:5].tolist()
+    assert np.array_equal(damage.moment(part.cycles, 3.0), damage.moment(whole.cycles, 3.0)[:5], equal_nan=True)
+    assert np.array_equal(damage.moment(part.nominal, 3.0), damage.moment(whole.nominal, 3.0))

@@ -13,9 +13,9 @@ from tolstat import cli, sampling, study
 from tolstat.analysis import exceedance
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import CHANNELS, Options, Simulation
-from tolstat.questions.time_above import query as duration
+from tolstat.questions.time_above.query import time_above
 from tolstat.solver.simulation import history_specs
-from tolstat.store import ResultStore
+from tolstat.store import ResultStore, revolutions
 
 SEEDS = 500
 SAMPLES = 720
@@ -30,13 +30,13 @@ def wave(tops):
     return loads
 
 
-def time_above(level, tops):
+def time_of(level, tops):
     return np.arccos(np.clip((level - 500.0) / (np.asarray(tops) - 500.0), -1, 1)) / np.pi
 
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("duration")
+    folder = tmp_path_factory.mktemp("time_above")
     source = folder / "waves.toml"
     source.write_text(TEXT, encoding="utf-8")
     plan = study.load(source)
@@ -58,10 +58,10 @@ def run(*arguments):
 
 def test_times_of_known_waves_and_joints_told_apart_from_them(path):
     with ResultStore.open(path) as store:
-        found = duration.of_store(store, ["cross1.F", "cross1.F_t"], ["0.75 kN"])
+        found = time_above(store.view(), ["cross1.F", "cross1.F_t"], ["0.75 kN"])
     own = tops(201)[1:-2]  # row 0 is the nominal joint, the last two have failed
-    expected = time_above(750.0, own)
-    assert (found.joints, found.lost) == (198, 2)
+    expected = time_of(750.0, own)
+    assert (found.joints, found.left_out) == (198, 2)
     for row in found.table.to_dict("records"):
         assert row["time"] == pytest.approx(expected.mean(), abs=1e-3)
         assert row["time_90"] == pytest.approx(np.quantile(expected, 0.9, method="inverted_cdf"), abs=1e-3)
@@ -88,9 +88,9 @@ def test_the_mean_time_is_covered_where_few_joints_exceed_a_level_and_students_i
 def test_channels_are_components_and_moduli():
     loads = np.random.default_rng(1).normal(size=(2, 5, 8, 6))
     for name in CHANNELS:
-        assert duration.channel(loads, name).shape == (2, 5)
-    np.testing.assert_array_equal(duration.channel(loads, "fork2.T_t"), loads[:, :, 5, 4])
-    np.testing.assert_allclose(duration.channel(loads, "cross3.T") ** 2, (loads[:, :, 2, 3:] ** 2).sum(axis=-1))
+        assert revolutions.channel(loads, name).shape == (2, 5)
+    np.testing.assert_array_equal(revolutions.channel(loads, "fork2.T_t"), loads[:, :, 5, 4])
+    np.testing.assert_allclose(revolutions.channel(loads, "cross3.T") ** 2, (loads[:, :, 2, 3:] ** 2).sum(axis=-1))
 
 
 def test_command_prints_limits_and_writes_curves(path, tmp_path):
@@ -114,19 +114,19 @@ def test_command_prints_limits_and_writes_curves(path, tmp_path):
 def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_path):
     with ResultStore.open(path) as store:
         with pytest.raises(InputError) as found:
-            duration.of_store(store, ["psi", "fork1.F"], ["700 mm"])
+            time_above(store.view(), ["psi", "fork1.F"], ["700 mm"])
         for words in ("'psi' is no load of a bushing", "'700 mm' cannot be a value in N"):
             assert words in str(found.value)
         with pytest.raises(InputError, match="neither a level nor a limit"):
-            duration.of_store(store, ["fork1.F"])
-        both = duration.of_store(store, ["cross1.F", "cross1.T"], ["1 N*m", "2 N", "1 N"]).table
+            time_above(store.view(), ["fork1.F"])
+        both = time_above(store.view(), ["cross1.F", "cross1.T"], ["1 N*m", "2 N", "1 N"]).table
         assert list(zip(both["load"], both["level"], strict=True)) == [
             ("cross1.F", 2.0),
             ("cross1.F", 1.0),
             ("cross1.T", 1.0),
         ]
     with ResultStore.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
-        duration.of_store(store)
+        time_above(store.view())
     done = run(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"))
     assert done.exit_code == 2
     assert "no sample of a production" in done.stderr

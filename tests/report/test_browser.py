@@ -13,7 +13,6 @@ from tests.support import synthetic
 from tolstat.analysis import exceedance
 from tolstat.report import page
 from tolstat.store import ResultStore
-from tolstat.store.view import load
 
 BROWSER = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
@@ -74,33 +73,35 @@ def probe(text, asked, folder, width=1280):
 def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("browser")
     path = synthetic.store(folder, TEXT, failed=15, unsettled=12)
-    page.write(path, folder / "page.html", accepted=0.05, again=0)
+    page.write(path, folder / "page.html", accepted=0.05, replay=0)
     with ResultStore.open(path) as store:
-        return folder / "page.html", page.read(store)[0]
+        view = store.view()
+        view.loads(view.shown_loads)  # read while the file is open
+    return folder / "page.html", view
 
 
 @pytest.mark.parametrize("width", [1280, 400])
 def test_reader_reads_what_is_counted_and_the_page_keeps_its_width(made, tmp_path, width):
-    source, campaign = made
+    source, view = made
     asked = [["cross1.F", 741.3], ["fork3.T", 18], ["cross2.T", 0]]
     found, console = probe(source.read_text(encoding="utf-8"), asked, tmp_path, width)
     assert console == []
     assert found["width"] == width
     assert found["page"] <= width
-    status = campaign.results["status"]
+    status = view.status
     for name, wanted in asked:
         x, said = found["readings"][name]
-        values, unit = load(campaign.results, name)
-        share = exceedance.at(values, status, x)
+        load = view.load(name)
+        share = exceedance.at(load.values, status, x)
         assert abs(x - wanted) < 5 or wanted == 0
         assert said.startswith(
-            f"{100 * share.estimate:.3g} % of the joints exceed {x:g} {unit.replace('*', ' ')} on {name}"
+            f"{100 * share.estimate:.3g} % of the joints exceed {x:g} {load.unit.replace('*', ' ')} on {name}"
         )
         assert f": {share.count} of {share.n - 27}." in said
         assert f"95 % interval {100 * share.lower:.3g} % to {100 * share.upper:.3g} %" in said
         assert f"below and above: {100 * share.outer_lower:.3g} % to {100 * share.outer_upper:.3g} %" in said
     assert found["start"].startswith(
-        f"{100 * exceedance.at(load(campaign.results, 'cross1.F')[0], status, 700.0).estimate:.3g} %"
+        f"{100 * exceedance.at(view.load('cross1.F').values, status, 700.0).estimate:.3g} %"
     )
     assert found["first"].startswith("100 % ")
     assert found["cursors"] == 1

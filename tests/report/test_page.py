@@ -1,8 +1,10 @@
 """The report as one page: its figures against counts by hand, every state of a campaign, the same bytes each time."""
 
 import re
+from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -13,10 +15,15 @@ from tolstat.analysis import exceedance
 from tolstat.cli import app
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
-from tolstat.report import compose, loads, page, verdict
+from tolstat.display.asked import Asked
+from tolstat.questions.exceedance import query
+from tolstat.questions.joints import query as joints
 from tolstat.report import html as writer
-from tolstat.store import ResultStore
-from tolstat.store.view import load
+from tolstat.report import page, verdict
+from tolstat.store import ResultStore, revolutions
+from tolstat.store.reader import Reader
+from tolstat.store.recall import recall
+from tolstat.store.view import KEPT_ROWS
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
 TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
@@ -31,14 +38,14 @@ def path(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def found(path):
+def view(path):
     with ResultStore.open(path) as store:
-        return page.gather(store, accepted=0.05, again=0)
+        yield store.view()
 
 
 @pytest.fixture(scope="module")
-def html(found, path):
-    writer.write(compose.compose(found), path.with_suffix(".html"))
+def html(path):
+    page.write(path, path.with_suffix(".html"), accepted=0.05, replay=0)
     return path.with_suffix(".html").read_text(encoding="utf-8")
 
 
@@ -73,7 +80,7 @@ def test_page_is_well_formed_and_loads_nothing(html):
     assert all(link.startswith(("#", "data:")) for link in read.links)
     assert {link[1:] for link in read.links if link.startswith("#")} <= set(read.names)
     assert not re.search(r"@import|url\((?!#)|fetch\(|XMLHttp", html)
-    assert read.sections == ["verdict", "exceedance", "capability", "causes", "worst", "modes", "lost", "provenance"]
+    assert read.sections == ["verdict", "exceedance", "capability", "causes", "worst", "modes", "failed", "provenance"]
 
 
 def test_every_picture_has_a_title_and_a_description(html):
@@ -85,28 +92,57 @@ def test_every_picture_has_a_title_and_a_description(html):
             assert re.search(rf'id="{name}">[^<]{{10,}}<', html), name
 
 
+@pytest.mark.parametrize("replay", [0, 100])
+def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypatch, replay):
+    """Reads of each dataset, in rows; joints that the page draws over the revolution are simulated again."""
+    read, plain = Counter(), Reader.column
+
+    def counting(self, group, name, rows):
+        values = plain(self, group, name, rows)
+        read[f"{group}/{name}"] += len(values)
+        return values
+
+    monkeypatch.setattr(Reader, "column", counting)
+    monkeypatch.setattr(revolutions, "read", drawn)
+    opened = mock.Mock(side_effect=ResultStore.open)
+    monkeypatch.setattr(ResultStore, "open", opened)
+    recalled = mock.Mock(side_effect=recall)
+    monkeypatch.setattr("tolstat.store.view.recall", recalled)
+    page.write(path, tmp_path / "page.html", accepted=0.05, replay=replay)
+    tables = {name: rows for name, rows in read.items() if name.startswith(("results/", "errors/"))}
+    assert len(tables) > 150
+    assert {name: rows for name, rows in tables.items() if rows != (400 if name.startswith("errors/") else 401)} == {}
+    assert (opened.call_count, recalled.call_count) == (1, 1)
+
+
+def drawn(store, slots, most_angles=60):
+    """Stands for `revolutions.read`: moduli without a simulation."""
+    moduli = 600.0 + np.random.default_rng(5).normal(size=(2, len(slots), most_angles, 8))
+    angles = 2.0 * np.pi * np.arange(most_angles) / most_angles
+    return revolutions.Revolutions(angles, *moduli, "simulated again", 0.0)
+
+
 def test_text_of_the_study_is_shown_and_not_run(html):
     assert '<script>alert("no")' not in html
     assert "&lt;script&gt;alert(" in html
     assert "Question: how often is too much too much?<" in html
 
 
-def test_same_file_same_bytes(path, found, html, tmp_path):
-    with ResultStore.open(path) as store:
-        again = compose.compose(page.gather(store, 0.05, 0))
+def test_same_file_same_bytes(path, tmp_path):
     contents = []
-    for k, made in enumerate((compose.compose(found), again)):
+    for k in (0, 1):
+        with ResultStore.open(path) as store:
+            made = page.compose(store.view(), Asked(path, 0.05))
         some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
         writer.write(replace(made, sections=some), tmp_path / f"{k}.html")
         contents.append((tmp_path / f"{k}.html").read_bytes())
     assert contents[0] == contents[1]
 
 
-def test_limits_and_their_verdicts_stand_on_the_page(found, html):
-    status = found.campaign.results["status"]
-    for name, level in found.campaign.limits.items():
-        share = exceedance.at(load(found.campaign.results, name)[0], status, level)
-        assert f"{share.count} of {share.n}" in html
+def test_limits_and_their_verdicts_stand_on_the_page(view, html):
+    for name, level in view.limits.items():
+        share = exceedance.at(view.load(name).values, view.status, level)
+        assert f"{share.count} of {share.n - share.n_failed - share.n_unsettled}" in html
         assert f"{100 * share.estimate:.3g} %" in html
         if share.outer_lower > 0.05:
             assert ">not kept<" in html
@@ -122,14 +158,14 @@ def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, 
     assert verdict.verdict(narrow | {"outer_lower": np.nan, "outer_upper": np.nan}, 0.05) == "open"
 
 
-def test_reader_holds_the_shares_that_are_counted(found):
-    curves = loads.readings(found.campaign)
-    assert list(curves) == list(found.campaign.drawn)
-    status = found.campaign.results["status"]
+def test_reader_holds_the_shares_that_are_counted(view):
+    curves = query.readings(view)
+    assert list(curves) == list(view.bushing_loads)
+    status = view.status
     for name, curve in curves.items():
-        values = load(found.campaign.results, name)[0]
-        assert 100 < len(curve["x"]) <= 3 * loads.STEPS
-        assert curve["x"][curve["start"]] == found.campaign.limits.get(name, curve["x"][curve["start"]])
+        values = view.load(name).values
+        assert 100 < len(curve["x"]) <= 3 * query.READER_LEVELS
+        assert curve["x"][curve["start"]] == view.limits.get(name, curve["x"][curve["start"]])
         for i in (0, 7, curve["start"], -1):
             share = exceedance.at(values, status, curve["x"][i])
             assert curve["count"][i] == share.count
@@ -137,35 +173,28 @@ def test_reader_holds_the_shares_that_are_counted(found):
             assert curve["outer_upper"][i] == pytest.approx(share.outer_upper, rel=5e-3)
 
 
-def test_lost_joints_are_named_with_what_to_do_and_compared_with_the_others(found):
-    assert found.counts["newton_failed"] == 15
-    assert found.counts["not_settled"] == 12
-    assert len(found.lost) == page.NAMED
-    assert {joint.row for joint in found.lost} <= set(range(401 - 27, 401))
-    assert all(joint.remedy for joint in found.lost)
-    assert found.lost_errors is not None
-    assert list(found.lost_errors.columns[:2]) == ["error", "direction"]
-    assert found.lost_errors["direction_p"].min() > 0.01  # they are the last rows: chance
+def test_joints_without_a_load_are_named_with_what_to_do_and_compared_with_the_others(view):
+    assert view.count(Status.NEWTON_FAILED) == 15
+    assert view.count(Status.NOT_SETTLED) == 12
+    found = joints.without_load(view)
+    assert len(found) == KEPT_ROWS
+    assert {joint.row for joint in found} <= set(range(401 - 27, 401))
+    assert all(joint.remedy for joint in found)
+    table = joints.their_errors(view)
+    assert list(table.columns[:2]) == ["error", "direction"]
+    assert table["direction_p"].min() > 0.01  # they are the last rows: chance
 
 
-def test_leading_load_is_the_one_whose_limit_most_joints_exceed(found):
-    assert found.leading[0] == "cross1.F"
-    torques = {f"fork{i}.T": exceedance.at(*_of(found, f"fork{i}.T"), 18.0).estimate for i in (1, 2, 3, 4)}
-    assert torques[found.leading[1]] == max(torques.values()) > min(torques.values())
-    assert [worst.load for worst in found.worst] == list(found.leading)
-    for worst in found.worst:
-        values, _ = _of(found, worst.load)
-        assert [joint.value for joint in worst.joints] == sorted(values[np.isfinite(values)])[::-1][: page.WORST]
-
-
-def _of(found, name):
-    return load(found.campaign.results, name)[0], found.campaign.results["status"]
+def test_leading_load_is_the_one_whose_limit_most_joints_exceed(view):
+    assert view.leading[0] == "cross1.F"
+    torques = {f"fork{i}.T": view.load(f"fork{i}.T").above(18.0).estimate for i in (1, 2, 3, 4)}
+    assert torques[view.leading[1]] == max(torques.values()) > min(torques.values())
 
 
 def words(path, accepted=np.nan):
     """Sections of a page, and its paragraphs and cells, without drawing it."""
     with ResultStore.open(path) as store:
-        made = compose.compose(page.gather(store, accepted, 0))
+        made = page.compose(store.view(), Asked(path, accepted))
     found = [made.subtitle]
     for block in (block for section in made.sections for block in section.blocks):
         found += [block.text] if block.kind == "text" else []
@@ -179,14 +208,14 @@ def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
     said = words(path)[1][0]
     assert f"{60 - max(0, simulated - 1)} still pending" in said
     if not simulated:
-        assert page.write(path, tmp_path / "page.html", again=0) == tmp_path / "page.html"
+        assert page.write(path, tmp_path / "page.html", replay=0) == tmp_path / "page.html"
         assert said in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
-    page.write(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, again=0)
+    page.write(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, replay=0)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert Reading(text).sections == ["verdict", "lost", "provenance"]
+    assert Reading(text).sections == ["verdict", "failed", "provenance"]
     assert text.count(">open<") == 7
 
 
@@ -214,7 +243,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     calls = []
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(page, "write", lambda *given: calls.append(given) or tmp_path / "written")
-    monkeypatch.setattr(page, "simulates", lambda store: False)
+    monkeypatch.setattr("tolstat.cli.report.announce_compilation", lambda: None)
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
     assert "wrote" in done.stderr
@@ -245,15 +274,14 @@ def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
     proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
     text = synthetic.STUDY.replace("n = 60", 'method = "importance"\nn = 300') + proposal
     path = synthetic.store(tmp_path, text, failed=3)
-    with ResultStore.open(path) as store:
-        found = page.gather(store, 0.05, 0)
-    page.write(path, tmp_path / "page.html", accepted=0.05, again=0)
+    page.write(path, tmp_path / "page.html", accepted=0.05, replay=0)
     html = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert Reading(html).sections == ["verdict", "exceedance", "worst", "modes", "lost", "provenance"]
-    campaign = found.campaign
-    valid = campaign.results["status"] == Status.OK
-    above = (campaign.results["F_max"][:, 0] > 700.0) & valid
-    share = campaign.weights[above].sum() / campaign.weights[valid].sum()
+    assert Reading(html).sections == ["verdict", "exceedance", "worst", "modes", "failed", "provenance"]
+    with ResultStore.open(path) as store:
+        weights, results = store.origin()["weight"][1:], store.results()[1:]
+    valid = results["status"] == Status.OK
+    above = (results["F_max"][:, 0] > 700.0) & valid
+    share = weights[above].sum() / weights[valid].sum()
     assert abs(share - above.sum() / valid.sum()) > 1e-3
     assert f"{100 * share:.3g} %" in html
     assert "counted by their weights" in html

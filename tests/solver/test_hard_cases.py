@@ -43,7 +43,7 @@ def assert_honest(results: np.ndarray) -> None:
 
 
 DEAREST = ("no damping, nor by the method", "0 N m", "1 N m", "70 deg", "85 deg, 720 steps", "5000 rpm", "Js x 1e4")
-"""Variants whose joints rattle or ring for ever; their classes are in docs/numerics.md."""
+"""Variants whose joints rattle or ring for ever; their classes are in docs/notes/hard_cases.md."""
 
 
 @pytest.fixture(scope="module")

@@ -202,7 +202,7 @@ def test_load_histories_of_a_joint_whose_contacts_stay_are_of_order_two(params, 
 
 @METHODS
 def test_largest_loads_of_a_joint_whose_contacts_switch_still_converge(params, method):
-    """Ringing after a switch costs the histories their order; docs/numerics.md states the slopes measured."""
+    """Ringing after a switch costs the histories their order; docs/notes/accuracy.md states the slopes measured."""
     par = params(alpha=np.radians(15), **TWIST)
     fine = full(par, steps_per_rev=1440, method=int(method), **TIGHT)[0]["F_max"]
     errors = []

@@ -12,10 +12,10 @@ from tolstat import cli
 from tolstat.common.columns import ERROR_COLUMNS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.loads import BUSHING_LOADS
-from tolstat.questions.capability import rendering as capability
-from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.questions.capability import query as capability
+from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import summary
-from tolstat.store import ResultStore, view
+from tolstat.store import ResultStore
 
 
 def export(*arguments):
@@ -28,10 +28,11 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
     assert done.exit_code == 0
     found = json.loads(out.read_text(encoding="utf-8"))
     with ResultStore.open(path) as store:
-        campaign = view.read(store)
+        view = store.view()
+        tables = (("limits", exceedance.limits(view)), ("capability", capability.limits(view)))
         assert found["provenance"]["versions"] == store.versions
     assert found["joints"] == {"ok": 295, "not_settled": 2, "newton_failed": 3}
-    for key, table in (("limits", exceedance.limits(campaign)), ("capability", capability.limits(campaign))):
+    for key, table in tables:
         told = pd.DataFrame(found[key]).astype(table.dtypes.to_dict())
         pd.testing.assert_frame_equal(
             told, table.replace([float("inf"), -float("inf")], float("nan")), check_exact=False
@@ -43,7 +44,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
 def test_statistics_are_of_a_sample(tmp_path):
     path = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
     with ResultStore.open(path) as store, pytest.raises(StoreError, match="no sample of a production"):
-        summary.of_store(store)
+        summary.statistics(store.view())
     done = export(synthetic.store(tmp_path), "--csv", "x.csv", "--by", "cross1.F")
     assert done.exit_code == 2
     assert "--by is for --json" in done.stderr

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -13,9 +12,9 @@ import pytest
 
 from tests.campaign.test_campaign import datasets
 from tests.campaign.test_extend import make, run, slices  # noqa: F401  (make is a fixture)
-from tests.report.test_report import campaign as campaign_of
-from tests.report.test_report import swept, texts
+from tests.report.test_report import texts
 from tests.support import fakes, synthetic
+from tests.support.views import swept, view
 from tolstat import report, study
 from tolstat.analysis import accuracy
 from tolstat.campaign import extend, replay, stop_rule, verify
@@ -24,10 +23,11 @@ from tolstat.common import selected_results as kept
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Status
+from tolstat.questions.accuracy import query as accuracy_tables
+from tolstat.questions.accuracy import rendering
 from tolstat.questions.causes.tail import worst_joints
-from tolstat.questions.exceedance import accuracy as accuracy_tables
+from tolstat.questions.exceedance import query, sweep
 from tolstat.questions.exceedance import rendering as exceedance
-from tolstat.questions.exceedance import sweep
 from tolstat.store import ResultStore, integrity, result_file, verification
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
@@ -206,8 +206,8 @@ def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
     assert set(table["load"]) == {"F"}
     assert table["worst"].max() > 0
     assert set(accuracy_tables.joints(held)["load"]) == {f"cross{i}.F" for i in (1, 2, 3, 4)}
-    assert accuracy_tables.note(held).count("F ") == 1
-    assert "T " not in accuracy_tables.note(held)
+    assert rendering.note(held).count("F ") == 1
+    assert "T " not in rendering.note(held)
 
 
 def test_errors_are_relative_to_the_largest_load_kept() -> None:
@@ -226,20 +226,20 @@ def test_errors_are_relative_to_the_largest_load_kept() -> None:
 
 
 def test_reports_show_what_there_is() -> None:
-    made = replace(campaign_of(), columns=columns(*CROSS_F, "fork2.T_max"))
-    kept.blank_others(made.results, made.columns)
+    held = columns(*CROSS_F, "fork2.T_max")
+    made = view(columns=held, change=lambda results: kept.blank_others(results, held))
     held = ["cross1.F", "cross2.F", "cross3.F", "cross4.F", "fork2.T"]
-    assert list(exceedance.quantiles(made)["load"].unique()) == held
-    assert list(exceedance.curves(made)["load"].unique()) == held
+    assert list(query.quantiles(made)["load"].unique()) == held
+    assert list(query.curves(made)["load"].unique()) == held
     assert texts(exceedance.figure(made)).count("not kept by the study") == 2
     assert "cross1.T, cross2.T" in made.missing()
-    assert exceedance.limits(made)["estimate"].between(0, 1).all()
+    assert query.limits(made)["estimate"].between(0, 1).all()
 
 
 @pytest.mark.parametrize("second", [1, 3])
 def test_sweeps_show_what_there_is(second: int) -> None:
-    made = replace(swept(second), columns=columns("cross1.F_max", "fork2.T_max", "psi_max"))
-    kept.blank_others(made.results, made.columns)
+    held = columns("cross1.F_max", "fork2.T_max", "psi_max")
+    made = swept(second, columns=held, change=lambda results: kept.blank_others(results, held))
     loads = [name for name in sweep.table(made).columns if name.startswith(("cross", "fork", "psi"))]
     assert loads == ["cross1.F [N]", "fork2.T [N*m]", "psi"]
     short = sweep.worst(made)

@@ -33,7 +33,7 @@ ACCEPTANCE = 0.44
 LAG = 2
 """Number of levels back that families reach: with more, too few families are left to estimate a variance."""
 FAMILIES = 5
-"""Seeds per degree of freedom of the variance: from its scatter, measured over random seeds (docs/rare_events.md)."""
+"""Seeds per degree of freedom of the variance: from its scatter, measured over seeds (docs/notes/coverage.md)."""
 LEAST = 1e-12
 """Probability below which no further level starts: normal scores reach the end of double precision not far from it."""
 

@@ -1,148 +1,60 @@
-"""Joints of a study for the benchmarks, and CPU time of a joint: in lanes, one at a time, quasi-static."""
+"""Joints of a study that are measured."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import joint, sampling
-from tolstat.benchmarks.timing import in_turn
-from tolstat.common.tables import RESULT, Fidelity, Method, Options, Status
-from tolstat.solver import simulation
 from tolstat.store.recorded import perturbed
+from tolstat.study import Study
 
-if TYPE_CHECKING:
-    from tolstat.study import Study
-
-Table = NDArray[np.void]
+Params = NDArray[np.void]
 
 
-@dataclass(frozen=True)
-class Rates:
-    """CPU time of a joint on one core, and counts of its numerical work.
-
-    Attributes
-    ----------
-    joints : int
-        Number of joints simulated in each way.
-    settled : int
-        Number of them that settled.
-    lanes_ms, alone_ms, quasistatic_ms : float
-        CPU time of a joint, ms: dynamic in lanes, dynamic one at a time, quasi-static.
-    lanes_per_second, alone_per_second, quasistatic_per_second : float
-        Joints a second.
-    lanes_ratio : float
-        Time alone over time in lanes.
-    quasistatic_ratio, quasistatic_ratio_alone : float
-        Time of a dynamic joint, in lanes and alone, over that of a quasi-static one.
-    steps, iterations, factorisations, halvings, revolutions : float
-        Counts of a dynamic joint, mean.
-    iterations_per_step : float
-        Newton iterations a step.
-    """
-
-    joints: int
-    settled: int
-    lanes_ms: float
-    alone_ms: float
-    quasistatic_ms: float
-    lanes_per_second: float
-    alone_per_second: float
-    quasistatic_per_second: float
-    lanes_ratio: float
-    quasistatic_ratio: float
-    quasistatic_ratio_alone: float
-    steps: float
-    iterations: float
-    factorisations: float
-    halvings: float
-    revolutions: float
-    iterations_per_step: float
-
-
-class Sample(NamedTuple):
-    """Joints of a benchmark, and their settings.
-
-    Attributes
-    ----------
-    params : ndarray of PARAM, shape (n,)
-        Joints, all with the same number of contact stations.
-    options : Options
-        Settings of the study, with BDF2 at fixed steps, dynamic fidelity and no refinement: the same work in lanes and
-        one at a time.
-    """
-
-    params: Table
-    options: Options
-
-
-def sample(study: Study, n: int) -> Sample:
-    """Take the first n random joints of a study, and keep those with as many contact stations as the first."""
-    first = int(study.sampling.nominal_first)
-    rows = np.arange(first, min(first + n, study.rows))
-    whole = study.sampling.method == "lhs"  # its joints cannot be drawn one by one
-    errors = sampling.draw(study)[rows] if whole else sampling.draw(study, range(rows[0], rows[-1] + 1))
-    params = perturbed(study, rows, errors, joint.perturb)
-    alike = params["n_stations"] == params["n_stations"][0]
-    options = study.solver.options()
-    fixed = options._replace(fidelity=int(Fidelity.DYNAMIC), method=int(Method.BDF2), rtol=0.0, max_refinements=0)
-    return Sample(np.ascontiguousarray(params[alike]), fixed)
-
-
-def alone(params: Table, options: Options) -> NDArray[np.void]:
-    """Simulate joints one after the other, without lanes; results, (n,) RESULT."""
-    from tolstat.kernel.revolution.simulate import simulate_joint
-
-    results = np.zeros(len(params), RESULT).view(np.recarray)
-    rows = params.view(np.recarray)
-    scratch = simulation.scratch(options)
-    for i in range(len(params)):
-        simulate_joint(rows[i], options, scratch, results[i])
-    return results
-
-
-def rates(these: Sample, rounds: int) -> Rates:
-    """Measure the CPU time of a joint in each way, and its counts.
+def parameters(study: Study, rows: NDArray[np.intp]) -> Params:
+    """Draw joints of a study.
 
     Parameters
     ----------
-    these : Sample
-        The joints.
-    rounds : int
-        Number of rounds; each simulates all joints once in each way.
+    study : Study
+        The study.
+    rows : ndarray, shape (m,)
+        Rows of the joints, in any order.
 
     Returns
     -------
-    Rates
+    ndarray of PARAM, shape (m,)
     """
-    params, options = these
-    static = options._replace(fidelity=int(Fidelity.QUASISTATIC))
-    tasks: dict[str, Callable[[], object]] = {
-        "lanes": lambda: simulation.simulate_rows(params, options),
-        "alone": lambda: alone(params, options),
-        "quasistatic": lambda: simulation.simulate_rows(params, static),
-    }
-    times = in_turn(tasks, rounds)
-    results = simulation.simulate_rows(params, options).results
-    n = len(params)
-    each = {name: times.typical(name) / n for name in tasks}
-    mean = {name: float(results[name].mean()) for name in ("steps", "newton_iterations", "factorisations", "halvings")}
-    return Rates(
-        joints=n,
-        settled=int((results["status"] == Status.OK).sum()),
-        **{f"{name}_ms": 1e3 * seconds for name, seconds in each.items()},
-        **{f"{name}_per_second": 1 / seconds for name, seconds in each.items()},
-        lanes_ratio=times.ratio("alone", "lanes"),
-        quasistatic_ratio=times.ratio("lanes", "quasistatic"),
-        quasistatic_ratio_alone=times.ratio("alone", "quasistatic"),
-        steps=mean["steps"],
-        iterations=mean["newton_iterations"],
-        factorisations=mean["factorisations"],
-        halvings=mean["halvings"],
-        revolutions=float(np.nanmean(results["revolutions"])),
-        iterations_per_step=mean["newton_iterations"] / mean["steps"],
-    )
+    whole = study.sampling.method == "lhs"  # its joints cannot be drawn one by one
+    first, end = (0, study.rows) if whole else (int(rows.min()), int(rows.max()) + 1)
+    errors = sampling.draw(study, range(first, end))[rows - first]
+    return perturbed(study, rows, errors, joint.perturb)
+
+
+def choose(study: Study, n: int, seed: int, block: int) -> tuple[Params, int]:
+    """Choose the joints on which integrators are compared, then further ones for a block.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    n : int
+        Number of random joints to compare, beside the nominal one if the study has it.
+    seed : int
+        Seed of the choice.
+    block : int
+        Number of joints to return, if the study has as many and not more are compared.
+
+    Returns
+    -------
+    params : ndarray of PARAM
+        The joints, those that are compared first.
+    count : int
+        Number of joints that are compared.
+    """
+    first = int(study.sampling.nominal_first)
+    drawn = first + np.random.default_rng(seed).permutation(study.rows - first)
+    rows = np.concatenate([np.arange(first), drawn])
+    count = min(first + n, len(rows))
+    return parameters(study, rows[: max(block, count)]), count

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,12 @@ class Times(NamedTuple):
     ----------
     seconds : dict of str to ndarray, shape (rounds,)
         CPU time of each task, s.
+    returned : dict of str to object
+        What each task returned in the last round.
     """
 
     seconds: dict[str, NDArray[np.float64]]
+    returned: dict[str, Any]
 
     def typical(self, name: str) -> float:
         """Median over the rounds, s."""
@@ -52,11 +55,11 @@ def in_turn(
     -------
     Times
     """
-    seconds = {name: np.empty(rounds) for name in tasks}
+    times = Times({name: np.empty(rounds) for name in tasks}, {})
     for count in range(-1, rounds):
         for name, task in tasks.items():
             begin = clock()
-            task()
+            times.returned[name] = task()
             if count >= 0:
-                seconds[name][count] = clock() - begin
-    return Times(seconds)
+                times.seconds[name][count] = clock() - begin
+    return times

@@ -29,7 +29,11 @@ EPILOG = "Exit codes: 0 done, 1 internal error, 2 input that cannot be used, 130
 
 
 class _Commands(TyperGroup):
-    """Turns errors that a user can mend into a message and an exit code, for every command in one place."""
+    """Commands of one or two words; errors that a user can mend become a message and an exit code."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        two = " ".join(args[:2])
+        return super().resolve_command(ctx, [two, *args[2:]] if two in self.commands else args)
 
     def invoke(self, ctx: Any) -> Any:
         try:

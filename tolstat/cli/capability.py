@@ -23,31 +23,30 @@ def capability(
     With --one-in also the loads that one in N joints exceeds, and the median of the largest of N joints, from a
     generalised Pareto tail; N may be more than the joints simulated, and the intervals tell what that is worth.
     """
-    from tolstat.common.loads import LOAD_FIELDS
     from tolstat.display import text
-    from tolstat.questions.capability import rendering as tables
+    from tolstat.display.table import as_text as aligned
+    from tolstat.questions.capability import query, rendering
     from tolstat.store import ResultStore
-    from tolstat.store.view import read
 
     with ResultStore.open(file) as store:
-        campaign = read(store, LOAD_FIELDS, ())
-    if not campaign.limits or campaign.method in ("sweep", "cases"):
-        remedy = 'give the file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(file), "has no joints judged by limits", remedy)))
-    table = tables.limits(campaign)
-    try:
-        rare = tables.returns(campaign, list(campaign.limits), one_in) if one_in else None
-    except ValueError as error:
-        found, _, remedy = str(error).partition(": ")
-        raise InputError([Fault("--one-in", found, remedy)]) from error
+        view = store.view()
+        if not view.limits or view.method in ("sweep", "cases"):
+            remedy = 'give the file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
+            raise StoreError(str(Fault(str(file), "has no joints judged by limits", remedy)))
+        view.check_sample(weighted=False)
+        table = query.limits(view)
+        try:
+            rare = query.returns(view, list(view.limits), one_in) if one_in else None
+        except ValueError as error:
+            found, _, remedy = str(error).partition(": ")
+            raise InputError([Fault("--one-in", found, remedy)]) from error
     if as_json:
         typer.echo(as_text({"limits": text.records(table), "one_in": [] if rare is None else text.records(rare)}))
         return
-    typer.echo(tables.text(table))
+    typer.echo(aligned(rendering.LIMITS, table))
     if rare is not None:
-        columns = ["load", "unit", "one_in", "estimate", "lower", "upper", "fleet", "fleet_lower", "fleet_upper", "p"]
-        typer.echo("\nload that one in N joints exceeds; median of the largest of N (fleet)")
-        typer.echo(text.plain(rare[columns]))
-    say(tables.note(table))
+        typer.echo("\nload that one in N joints exceeds; median of the largest of N joints")
+        typer.echo(aligned(rendering.RETURNS, rare))
+    say(rendering.note(table))
     if rare is not None and (rare["p"] < 0.05).any():
         say("a tail with p < 0.05 is not generalised Pareto: do not extrapolate it")

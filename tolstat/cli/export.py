@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tolstat.store import ResultStore
+    from tolstat.store.view import View
 
 
 def export(
@@ -51,7 +52,7 @@ def export(
     share above each limit, quantiles, capability, the numerical error and what the file was made by.
 
     With --pylife one row a joint, channel and class of range and mean: cycles per revolution, for files whose study
-    keeps cycles or load histories. See docs/fatigue.md for the lines that read it as a Series.
+    keeps cycles or load histories. See docs/questions/fatigue.md for the lines that read it as a Series.
     """
     from tolstat.common.files import check_target
     from tolstat.store import ResultStore
@@ -71,7 +72,7 @@ def export(
             check_target(Path(target), file)
     with ResultStore.open(file) as store:
         if cycles is not None:
-            _write(cycles, *_collectives(store))
+            _write(cycles, *_collectives(store.view()))
         if statistics is not None:
             _write(statistics, *_statistics(store, by or ()))
         if out is None and parquet is None:
@@ -95,22 +96,22 @@ def _write(out: str, write: Callable[[TextIO], object], what: str) -> None:
     say(f"wrote {out}: {what}")
 
 
-def _collectives(store: ResultStore) -> tuple[Callable[[TextIO], None], str]:
+def _collectives(view: View) -> tuple[Callable[[TextIO], None], str]:
     from tolstat.questions.fatigue import pylife
 
-    table = pylife.table(pylife.series(store))
+    table = pylife.table(pylife.pylife_series(view))
     what = f"cycles of {table['joint'].nunique()} joints"
     return lambda stream: table.to_csv(stream, index=False, lineterminator="\n"), what
 
 
 def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
-    from tolstat.display import text
-    from tolstat.questions.causes import query as causes
+    from tolstat.questions.causes import rendering
+    from tolstat.questions.causes.query import causes_of
     from tolstat.report import summary
 
-    found = summary.of_store(store)
-    asked = {load: causes.of_store(store, load) for load in by}
-    found["causes"] = {load: own._asdict() | {"table": text.records(own.table)} for load, own in asked.items()}
+    view = store.view()
+    found = summary.statistics(view)
+    found["causes"] = {load: rendering.values(causes_of(view, load)) for load in by}
     return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"
 
 

@@ -1,7 +1,8 @@
-"""``tolstat fatigue``: what the cycles of a revolution do over a service life."""
+"""``tolstat fatigue``: equivalent loads and damage sums of the load cycles over a service life."""
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -33,25 +34,25 @@ def fatigue(
     bushing's force and torque is printed, and all channels are written.
     """
     from tolstat.common.files import check_target
-    from tolstat.display import text
-    from tolstat.questions.fatigue import query as source
-    from tolstat.questions.fatigue import rendering as tables
+    from tolstat.display.table import as_text
+    from tolstat.questions.fatigue import query, rendering
+    from tolstat.questions.fatigue.counting import channels
+    from tolstat.store import ResultStore
 
     if csv:
         check_target(csv, *files)
-    names = source.channels(channel) if channel else None
-    loading = source.read(files, share or [1.0], names)
-    loads = tables.equivalent_loads(loading)
-    worst = [] if channel else tables.worst(loads)
-    shown = loads[loads["channel"].isin(worst)] if worst else loads
-    rows = [f"{channel}, m = {m:g}" for channel, m in zip(shown["channel"], shown["m"], strict=True)]
-    typer.echo(text.quantiles(shown.assign(load=rows)))
-    sums = tables.damages(loading)
-    if len(sums):
-        columns = ["channel", "m", "S0", "N0", "nominal", "median", "n", "count", "estimate", "lower", "upper"]
+    names = channels(channel) if channel else None
+    with ExitStack() as stack:
+        views = [stack.enter_context(ResultStore.open(file)).view() for file in files]
+        loading = query.load_cycles(views, share or [1.0], names)
+    loads, damages = query.equivalent_loads(loading), query.damages(loading)
+    shown = [] if channel else query.most_loaded(loads)
+    table = rendering.by_channel(loads[loads["channel"].isin(shown)] if shown else loads)
+    typer.echo(as_text(rendering.LOADS, table))
+    if len(damages):
         typer.echo("\nshare of the joints whose damage exceeds 1")
-        typer.echo(text.plain(sums[columns]))
-    say(tables.notes(loading, loads))
+        typer.echo(as_text(rendering.DAMAGES, damages))
+    say(rendering.notes(loading, loads))
     if csv:
         with writing(csv) as temporary:
             loads.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")

@@ -51,7 +51,7 @@ def rare(
 
     Each level starts from the joints of the one before with the largest loads. All joints are kept in a result file;
     stopped with Ctrl-C or killed, the same command goes on where it was. For what the interval does not cover, see
-    docs/rare_events.md.
+    docs/questions/rare.md.
     """
     from tolstat.campaign import run as campaign
     from tolstat.campaign.executors import WorkerDied

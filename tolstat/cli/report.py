@@ -69,7 +69,8 @@ def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
         os.environ.setdefault(name, "1")
     from tolstat.common.files import check_target
     from tolstat.report import page
-    from tolstat.store import ResultStore
+    from tolstat.store import ResultStore, revolutions
+    from tolstat.store.view import DRAWN
 
     faults: list[Fault] = []
     with gather(faults):
@@ -80,7 +81,7 @@ def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
     if faults:
         raise InputError(faults)
     with ResultStore.open(file) as store:
-        if again and page.simulates(store):
+        if again and store.sampling["method"] in DRAWN and not revolutions.held(store):
             announce_compilation()
     say(f"wrote {page.write(file, out, accepted, again)}")
 

@@ -37,31 +37,32 @@ def status(
 
 
 def _summary(store: ResultStore) -> dict[str, Any]:
-    """What there is to say, read some rows at a time; blocks of pending ones are not read."""
+    """Everything that the command prints, read in blocks; blocks of pending rows are not read."""
     import numpy as np
 
+    from tolstat.common.loads import LOADS
     from tolstat.common.tables import Status
-    from tolstat.store import view
     from tolstat.store.result_file import BLOCK
 
-    states = np.full(store.n, Status.PENDING, np.uint8)
-    loads, units, damaged = {name: np.zeros(store.n) for name in store.limits}, {}, 0
+    states, damaged = np.full(store.n, Status.PENDING, np.uint8), 0
+    limits = {} if store.sampling["method"] == "subset" else store.limits  # whose joints are no sample
+    loads = {name: np.full((3, store.n), np.nan) for name in limits}
     for first in range(0, store.n, BLOCK):
-        rows = slice(first, first + BLOCK)
-        written = store.column("results", "status", rows)
+        slots = slice(first, first + BLOCK)
+        written = store.column("results", "status", slots)
         if (written != Status.PENDING).any():
-            results = store.results(rows)
-            states[rows] = results["status"]
-            damaged += int(((written != Status.PENDING) & (states[rows] == Status.PENDING)).sum())
+            results = store.results(slots)
+            states[slots] = results["status"]
+            damaged += int(((written != Status.PENDING) & (states[slots] == Status.PENDING)).sum())
             for name, values in loads.items():
-                values[rows], units[name] = view.load(results, name)
+                values[:, slots] = LOADS[name].of(results), *LOADS[name].ends(results)
     found = np.bincount(states, minlength=len(Status))
     summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     summary |= {state.label: int(found[state]) for state in Status}
     condition = {"damaged": damaged, "simulated_again": int((store.attempt() > 0).sum())}
     summary |= {name: count for name, count in condition.items() if count} | _pace(store, summary["pending"])
-    judged = {} if store.sampling["method"] == "subset" else units  # whose joints are no sample
-    summary["exceedance"] = [_exceedance(store, states, name, loads[name], unit) for name, unit in judged.items()]
+    done = summary["pending"] < store.n
+    summary["exceedance"] = [_exceedance(store, states, name, loads[name]) for name in loads if done]
     return summary
 
 
@@ -78,17 +79,19 @@ def _pace(store: ResultStore, pending: int) -> dict[str, Any]:
 
 
 def _exceedance(
-    store: ResultStore, states: NDArray[np.uint8], name: str, values: NDArray[np.float64], unit: str
+    store: ResultStore, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]
 ) -> dict[str, Any]:
-    """Share of the joints above a limit so far; None for what cannot be said."""
-    from tolstat.analysis import exceedance, weighted
+    """Share of the joints above a limit so far, from loads and their ends, (3, n); None without an estimate."""
+    from tolstat.common.loads import UNIT_OF_LOAD
+    from tolstat.store.sample_load import SampleLoad
 
-    counting = slice(int(store.sampling["nominal_first"] and store.rows.start == 0), None)
-    level, iid = store.limits[name], store.sampling["method"] == "random"
-    if store.sampling["method"] == "importance":
-        share = weighted.at(values[counting], states[counting], store.origin()["weight"][counting], level)
-    else:
-        share = exceedance.at(values[counting], states[counting], level, 0.95, iid)
+    samples, method = slice(store.first_sample, None), store.sampling["method"]
+    weights = store.origin()["weight"][samples] if method == "importance" else None
+    limit, unit = store.limits[name], UNIT_OF_LOAD[name]
+    own, lower, upper = values[:, samples]
+    iid = method in ("random", "importance")
+    load = SampleLoad(name, unit, limit, float("nan"), own, (lower, upper), states[samples], weights, iid)
+    share = load.above(limit)
     numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
     rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}
-    return {"load": name, "limit": level, "unit": unit, **rounded}
+    return {"load": name, "limit": limit, "unit": unit, **rounded}

@@ -1,4 +1,4 @@
-"""``tolstat time-above``: how long a load is above a level."""
+"""``tolstat time-above``: share of a revolution in which a load is above a level."""
 
 from __future__ import annotations
 
@@ -25,28 +25,27 @@ def time_above(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
-    """Tell for which share of a revolution loads are above a level.
+    """Estimate for which share of a revolution loads are above a level.
 
-    That is time within each joint: its mean over the joints, and what half, 90 % and 99 % of the joints do not surpass.
-    Beside it stands the share of the joints that are above the level at any time. For files whose study keeps load
-    histories, in full or as harmonics.
+    Every joint has such a share: printed are its mean over the joints, and the share that half, 90 % and 99 % of the
+    joints do not exceed. A further column gives the share of the joints that are above the level at any time. For files
+    whose study keeps load histories, in full or as harmonics.
     """
-    from tolstat.display import text
-    from tolstat.questions.time_above import query as source
-    from tolstat.questions.time_above import rendering as report
+    from tolstat.display import table, text
+    from tolstat.questions.time_above import query, rendering
     from tolstat.store import ResultStore
 
     with ResultStore.open(file) as store:
-        found = source.of_store(store, by or (), level or (), curves=out is not None)
+        found = query.time_above(store.view(), by or (), level or (), curves=out is not None)
     if as_json:
-        summary = {"joints": found.joints, "lost": found.lost, "loads": text.records(found.table)}
+        summary = {"joints": found.joints, "left_out": found.left_out, "loads": text.records(found.table)}
         typer.echo(as_text(summary))
     else:
-        typer.echo(report.text(found))
-    say(report.note(found))
+        typer.echo(table.as_text(rendering.LEVELS, found.table))
+    say(rendering.note(found))
     if out is not None:
         make_folder(out)
         with filling(out):
-            files = report.write(found, out / file.stem)
+            files = rendering.write(found, out / file.stem)
         for path in files:
             say(f"wrote {path}")

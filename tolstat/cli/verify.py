@@ -37,8 +37,8 @@ def verify(
     from tolstat.campaign import verify as verification
     from tolstat.campaign.executors import available_workers
     from tolstat.common.files import check_target
-    from tolstat.display import text
-    from tolstat.questions.exceedance import accuracy
+    from tolstat.display.table import as_text as aligned
+    from tolstat.questions.accuracy import query, rendering
 
     if out is not None:
         check_target(out, what)
@@ -49,21 +49,21 @@ def verify(
     if as_json:
         typer.echo(as_text(_summary(found)))
     else:
-        typer.echo(text.accuracy(accuracy.distribution(found)))
-    say(accuracy.note(found))
+        typer.echo(aligned(rendering.ERRORS, query.distribution(found)))
+    say(rendering.note(found))
     if out is not None:
         with writing(out) as temporary:
-            accuracy.joints(found).to_csv(temporary, index=False, lineterminator="\n")
+            query.joints(found).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")
 
 
 def _summary(found: Verification) -> dict[str, Any]:
     """Distributions as plain values, None where nothing is known: by check and kind of load, and by load."""
-    from tolstat.questions.exceedance import accuracy
+    from tolstat.questions.accuracy import query
 
     facts: dict[str, Any] = {"rows": found.rows.tolist(), "seed": found.seed}
     facts["checks"] = {name: check.description for name, check in found.checks.items()}
-    for key, table in (("kinds", accuracy.distribution(found)), ("loads", accuracy.by_observable(found))):
+    for key, table in (("kinds", query.distribution(found)), ("loads", query.by_observable(found))):
         errors: dict[str, Any] = {}
         for line in table.astype(object).where(table.notna(), None).to_dict("records"):
             errors.setdefault(line.pop("error"), {})[line.pop("load")] = line

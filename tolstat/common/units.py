@@ -39,6 +39,14 @@ EXAMPLES = {
     "1": "0.5",
 }
 """How a value of each unit is written; shown in the remedy of a fault."""
+DISPLAY_UNITS = {
+    "m": ("mm", 1e3),
+    "rad": ("deg", 180.0 / math.pi),
+    "rad/s": ("rpm", 30.0 / math.pi),
+    "N*m": ("N m", 1.0),
+    "1": ("", 1.0),
+}
+"""Unit in which figures show errors of each SI unit, and the factor to it."""
 
 
 @cache

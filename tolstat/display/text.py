@@ -14,76 +14,6 @@ if TYPE_CHECKING:
 UNITS = {"N*m": "N m", "1": ""}
 
 
-def limits(table: pd.DataFrame) -> str:
-    """Text of `exceedance.limits`: the share of joints above each limit.
-
-    Parameters
-    ----------
-    table : DataFrame
-        As `exceedance.limits` returns it.
-
-    Returns
-    -------
-    str
-        One line per limit. If joints failed or did not settle, a further column gives the share with all of them
-        counted below, then above the limit (for independent samples with the interval). If the numerical error is
-        known, two more columns give the share with every load shifted by it down and up, and the range that covers
-        numerical error, unresolved joints and sampling.
-    """
-    unresolved = bool((table["n_failed"] + table["n_unsettled"]).any())
-    rows = [["load", "nominal", "limit", "joints", "above", "share", "95 % interval"]]
-    rows[0] += ["failed, unsettled both ways"] if unresolved else []
-    verified = bool(table["numerical_error"].notna().any())
-    rows[0] += ["numerical error both ways", "all together"] if verified else []
-    for row in table.to_dict("records"):
-        line = [row["load"], value(row["nominal"], row["unit"]), value(row["level"], row["unit"])]
-        line += [str(row["n"]), str(row["count"]), percent(row["estimate"])]
-        line.append(span(row["lower"], row["upper"]))
-        if unresolved:
-            iid = not math.isnan(row["outer_lower"])
-            ends = ("outer_lower", "outer_upper") if iid else ("bound_lower", "bound_upper")
-            line.append(span(row[ends[0]], row[ends[1]]))
-        if verified:
-            line.append(span(row["numerical_lower"], row["numerical_upper"]))
-            line.append(span(row["total_lower"], row["total_upper"]))
-        rows.append(line)
-    return align(rows)
-
-
-def quantiles(table: pd.DataFrame) -> str:
-    """Text of `exceedance.quantiles`: one line per load, one column per share.
-
-    Returns
-    -------
-    str
-        The interval is that of the highest share; ``inf`` if there are too few joints for its upper end.
-    """
-    shares = sorted(table["share"].unique())
-    heads = [f"{100.0 * share:g} %" for share in shares]
-    rows = [["load", "nominal", *heads, f"95 % interval of {heads[-1]}"]]
-    for name, part in table.groupby("load", sort=False):
-        lines = part.sort_values("share").to_dict("records")
-        last, unit = lines[-1], lines[-1]["unit"]
-        interval = "-" if math.isnan(last["lower"]) else f"{last['lower']:.4g} .. {value(last['upper'], unit)}"
-        rows.append(
-            [
-                str(name),
-                value(last["nominal"], unit),
-                *(value(q["estimate"], unit) for q in lines),
-                interval,
-            ]
-        )
-    return align(rows)
-
-
-def accuracy(table: pd.DataFrame) -> str:
-    """Text of `accuracy.distribution`: one line per kind of load and check."""
-    rows = [["load", "error", "joints", "median", "95 % below", "worst"]]
-    for row in table.itertuples(index=False):
-        rows.append([str(row.load), str(row.error), str(row.joints), *(_small(x) for x in row[3:])])
-    return align(rows)
-
-
 def plain(table: pd.DataFrame) -> str:
     """Text of any frame, numbers to five digits, headed by its columns."""
     rows = [[str(column) for column in table.columns]]
@@ -144,10 +74,6 @@ def sentence(words: str) -> str:
     """Make words a sentence: capital letter (unless the first word has a digit, as names of loads) and full stop."""
     first = words.partition(" ")[0]
     return (words if any(letter.isdigit() for letter in first) else words[:1].upper() + words[1:]) + "."
-
-
-def _small(x: float) -> str:
-    return "-" if math.isnan(x) else f"{x:.1e}"
 
 
 def percent(share: float) -> str:

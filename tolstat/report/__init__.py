@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
-from tolstat.common.loads import LOAD_FIELDS
 from tolstat.display import text
 from tolstat.solver import fidelity
 from tolstat.store import ResultStore
-from tolstat.store.view import Campaign, read
+from tolstat.store.view import View
 
 
 class Report(NamedTuple):
@@ -82,13 +81,11 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
             stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
                 return _noted(_cases(store, stem), stands_on)
-            errors = None if store.sampling["method"] == "sweep" else ()
-            campaign = read(store, LOAD_FIELDS, errors, weighted=True)
-            stop = _stopped(store.stop) if store.stop else ""
-        report = _sweep(campaign, stem) if campaign.method == "sweep" else _exceedance(campaign, stem)
-        for note in (campaign.missing(), stop, stands_on):
-            report = _noted(report, note)
-        return report
+            view = store.view()
+            report = _sweep(view, stem) if view.method == "sweep" else _exceedance(view, stem)
+            for note in (view.missing(), _stopped(store.stop) if store.stop else "", stands_on):
+                report = _noted(report, note)
+            return report
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
         raise InputError([Fault(str(stem.parent), found, "name an existing folder with --out")]) from error
@@ -98,38 +95,39 @@ def _noted(report: Report, note: str) -> Report:
     return report._replace(notes=f"{report.notes}\n{note}") if note else report
 
 
-def _exceedance(campaign: Campaign, stem: Path) -> Report:
+def _exceedance(view: View, stem: Path) -> Report:
     from tolstat.display import style
-    from tolstat.questions.exceedance import rendering as exceedance
+    from tolstat.display.table import as_text
+    from tolstat.questions.exceedance import query, rendering
 
     files, table = [], "no largest load is kept; the results that are: tolstat export"
-    if campaign.drawn:
-        files = style.save(exceedance.figure(campaign), stem.with_name(f"{stem.name}_exceedance"))
-    if campaign.listed:
-        files.append(text.csv(exceedance.curves(campaign), stem, "exceedance"))
-        quantiles = exceedance.quantiles(campaign)
+    if view.bushing_loads:
+        files = style.save(rendering.figure(view), stem.with_name(f"{stem.name}_exceedance"))
+    if view.shown_loads:
+        files.append(text.csv(query.curves(view), stem, "exceedance"))
+        quantiles = query.quantiles(view)
         files.append(text.csv(quantiles, stem, "quantiles"))
-        table = text.quantiles(quantiles)
-    if campaign.limits:
-        limits = exceedance.limits(campaign)
+        table = as_text(rendering.quantile_columns(), rendering.by_load(quantiles))
+    if view.limits:
+        limits = query.limits(view)
         files.append(text.csv(limits, stem, "limits"))
-        table = text.limits(limits)
-    return Report(table, f"{campaign.head()}\n{exceedance.note(campaign)}{_accuracy(campaign)}", files)
+        table = as_text(rendering.LIMITS, limits)
+    return Report(table, f"{view.head()}\n{rendering.note(view)}{_accuracy(view)}", files)
 
 
-def _sweep(campaign: Campaign, stem: Path) -> Report:
+def _sweep(view: View, stem: Path) -> Report:
     from tolstat.display import style
     from tolstat.questions.exceedance import sweep
 
-    files = style.save(sweep.figure(campaign), stem.with_name(f"{stem.name}_sweep")) if campaign.drawn else []
-    files.append(text.csv(sweep.table(campaign), stem, "sweep"))
-    return Report(text.plain(sweep.worst(campaign)), f"{campaign.head()}{_accuracy(campaign)}", files)
+    files = style.save(sweep.figure(view), stem.with_name(f"{stem.name}_sweep")) if view.bushing_loads else []
+    files.append(text.csv(sweep.table(view), stem, "sweep"))
+    return Report(text.plain(sweep.worst(view)), f"{view.head()}{_accuracy(view)}", files)
 
 
-def _accuracy(campaign: Campaign) -> str:
-    from tolstat.questions.exceedance import accuracy
+def _accuracy(view: View) -> str:
+    from tolstat.questions.accuracy import rendering
 
-    return f"\n{accuracy.note(campaign.verification)}" if campaign.verification else ""
+    return f"\n{rendering.note(view.verification)}" if view.verification else ""
 
 
 def _cases(store: ResultStore, stem: Path) -> Report:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,30 +14,44 @@ from matplotlib.axes import Axes
 from tolstat.analysis import exceedance as shares
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.blocks import Block, Card, Cards, Panel, Panels, Section, Table, Text
-from tolstat.questions.capability import rendering as capability
-from tolstat.questions.exceedance import accuracy
-from tolstat.questions.exceedance import rendering as exceedance
-from tolstat.report.findings import Findings
-from tolstat.store import Counts
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Block, Card, Cards, Panel, Panels, Section, Text
+from tolstat.display.table import Column, as_block
+from tolstat.questions.accuracy import rendering as accuracy
+from tolstat.questions.capability import query as capability
+from tolstat.questions.exceedance import query as exceedance
+from tolstat.questions.exceedance.rendering import LIMIT_DASH, LIMITS
+from tolstat.store.view import View
 
 WORDS = {"yes": "kept", "no": "not kept", "open": "open"}
 
 
-def section(found: Findings) -> Section:
+def section(view: View, asked: Asked) -> Section:
     """Question, headline, and each limit with its share of joints above it."""
-    blocks: list[Block] = [Text(f"Question: {found.question}")] if found.question else []
-    if found.sampled and found.campaign.limits:
-        table = exceedance.limits(found.campaign)
-        judged = [verdict(row, found.accepted) for row in table.to_dict("records")]
-        blocks += [Cards([*_headline(found, table), *_basis(found)]), *_limits(found, table, judged)]
+    question = question_of(view.store.study_text)
+    blocks: list[Block] = [Text(f"Question: {question}")] if question else []
+    if view.sampled and view.limits:
+        table = exceedance.limits(view)
+        verdicts = [verdict(row, asked.accepted) for row in table.to_dict("records")]
+        blocks.append(Cards([*_headline(view, asked, table, verdicts), *_basis(view)]))
+        blocks += _limits(view, asked, table, verdicts)
     else:
-        blocks.append(Cards(_basis(found)))
-        if found.sampled:
-            remedy = "The study sets no limits: nothing is judged. Its loads are below."
-            blocks.append(Text(remedy))
-    blocks += [Text(note, small=True) for note in found.notes]
+        blocks.append(Cards(_basis(view)))
+        if view.sampled:
+            blocks.append(Text("The study sets no limits, so there is no verdict. Its loads are below."))
+    blocks += [Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes]
     return Section("verdict", "Verdict", blocks)
+
+
+def question_of(text: str) -> str:
+    """Question of a study: the paragraph ``# Question: ...`` of its opening comment; empty if there is none."""
+    lines = []
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            break
+        lines.append(line.lstrip("#").strip())
+    found = re.search(r"^Question:\s*(.*?)(?=^\w[\w ]*:|\Z)", "\n".join(lines), flags=re.DOTALL | re.MULTILINE)
+    return " ".join(found[1].split()) if found else ""
 
 
 def verdict(row: Mapping[Any, Any], accepted: float) -> str:
@@ -67,104 +83,89 @@ def ends(row: Mapping[Any, Any]) -> tuple[float, float]:
     return (row["outer_lower"], row["outer_upper"]) if np.isnan(wide[0]) else wide
 
 
-def _headline(found: Findings, table: pd.DataFrame) -> list[Card]:
+def _headline(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str]) -> list[Card]:
     count, cards = len(table), []
-    if found.alike:
-        together = capability.limits(found.campaign).iloc[-1]
+    if asked.judges:
+        kept = verdicts.count("yes")
+        whole = "no" if "no" in verdicts else "open" if "open" in verdicts else "yes"
+        label = f"limits kept: at most {text.percent(asked.accepted)} of the joints are above"
+        words = ", ".join(f"{verdicts.count(v)} {WORDS[v]}" for v in ("no", "open") if v in verdicts)
+        cards.append(Card(f"{kept} of {count}", label, words or "each with 95 % confidence", whole))
+    if not view.weighted:
+        together = capability.limits(view).iloc[-1]
         keep = "its limit" if count == 1 else f"all {count} limits"
-        ends_of_yield = text.span(together["good_lower"], together["good_upper"])
-        cards.append(
-            Card(text.percent(together["good"]), f"of the joints keep {keep} (yield)", f"95 %: {ends_of_yield}")
-        )
-    first = table[table["load"].isin(found.leading)].sort_values("estimate", ascending=False, kind="stable")
+        interval = text.span(together["good_lower"], together["good_upper"])
+        cards.append(Card(text.percent(together["good"]), f"of the joints keep {keep} (yield)", f"95 %: {interval}"))
+    first = table[table["load"].isin(view.leading)].sort_values("estimate", ascending=False, kind="stable")
     if first["estimate"].notna().any():
         worst = first.iloc[0]
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"
-        ends_of_share = text.span(worst["outer_lower"], worst["outer_upper"])
-        cards.append(Card(text.percent(worst["estimate"]), label, f"95 %: {ends_of_share}"))
-    if found.judged:
-        all_of_them = [verdict(row, found.accepted) for row in table.to_dict("records")]
-        kept = all_of_them.count("yes")
-        whole = "no" if "no" in all_of_them else "open" if "open" in all_of_them else "yes"
-        label = f"limits kept: at most {text.percent(found.accepted)} of the joints are above"
-        words = ", ".join(f"{all_of_them.count(v)} {WORDS[v]}" for v in ("no", "open") if v in all_of_them)
-        cards.insert(0, Card(f"{kept} of {count}", label, words or "each with 95 % confidence", whole))
+        interval = text.span(worst["outer_lower"], worst["outer_upper"])
+        cards.append(Card(text.percent(worst["estimate"]), label, f"95 %: {interval}"))
     return cards
 
 
-def _basis(found: Findings) -> list[Card]:
-    campaign = found.campaign
-    counts = Counts.of(campaign.results["status"])
+def _basis(view: View) -> list[Card]:
+    counts = view.counts
     pending = counts.total - counts.done
     note = counts.shortfall + (f", {pending} still pending" if pending else "")
-    whole = campaign.count(*VALID) == counts.total
+    whole = view.count(*VALID) == counts.total
     cards = [Card(str(counts.done), "joints simulated", note, "" if whole else "open")]
-    if campaign.verification:
-        kinds = {name.rpartition(".")[2] for name in found.leading}
-        errors = accuracy.usual(campaign.verification).items()
-        usual = {kind: error for kind, error in errors if kind in kinds and not np.isnan(error)}
-        if usual:
-            kind = max(usual, key=lambda name: usual[name])
-            label = f"numerical error of the largest loads ({kind}), relative"
-            cards.append(Card(f"{usual[kind]:.1e}", label, accuracy.basis(campaign.verification)))
+    kinds = {name.rpartition(".")[2] for name in view.leading}
+    usual = {k: error for k, error in view.numerical_error.items() if k in kinds and not np.isnan(error)}
+    if usual and view.verification:
+        kind = max(usual, key=lambda name: usual[name])
+        label = f"numerical error of the largest loads ({kind}), relative"
+        cards.append(Card(f"{usual[kind]:.1e}", label, accuracy.basis(view.verification)))
     return cards
 
 
-def _limits(found: Findings, table: pd.DataFrame, judged: list[str]) -> list[Block]:
-    records = table.to_dict("records")
-    unresolved = bool((table["n_failed"] + table["n_unsettled"]).any())
-    known = bool(table["numerical_error"].notna().any())
-    head = ["load", "limit", "nominal", "above", "share", "95 % interval"]
-    head += ["with failed and unsettled"] if unresolved else []
-    head += ["with numerical error"] if known else []
-    head += ["kept"] if found.judged else []
-    rows = []
-    for row, answer in zip(records, judged, strict=True):
-        cells = [row["load"], text.value(row["level"], row["unit"]), text.value(row["nominal"], row["unit"])]
-        cells += [f"{row['count']} of {row['n']}", text.percent(row["estimate"]), text.span(row["lower"], row["upper"])]
-        if unresolved:
-            kind = "bound" if np.isnan(row["outer_lower"]) else "outer"
-            cells.append(text.span(row[f"{kind}_lower"], row[f"{kind}_upper"]))
-        cells += [text.span(row["total_lower"], row["total_upper"])] if known else []
-        rows.append([*cells, *([WORDS[answer]] if found.judged else [])])
+def _limits(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str]) -> list[Block]:
+    words = dict(zip(table["load"], (WORDS.get(v, "") for v in verdicts), strict=True))
+    kept = Column("kept", lambda row: words[row["load"]], shown=lambda _: asked.judges)
+    block = as_block("Limits", (*LIMITS, kept), table, verdicts if asked.judges else ())
+    said = (
+        f"{row['load']} above {text.value(row['level'], row['unit'])}: {text.percent(row['estimate'])}, "
+        f"95 % interval {text.span(row['lower'], row['upper'])}"
+        for row in table.to_dict("records")
+    )
     panel = Panel(
         "forest",
         "Share of the joints above each limit",
-        "; ".join(f"{row[0]} above {row[1]}: {row[4]}, 95 % interval {row[5]}" for row in rows),
-        lambda ax: _forest(ax, table, found.accepted),
+        "; ".join(said),
+        partial(_forest, table=table, accepted=asked.accepted),
         (4.9, drawing.rows_height(len(table))),
         1.4,
     )
-    blocks: list[Block] = [Panels([panel])]
-    blocks.append(Table("Limits", head, rows, verdicts=judged if found.judged else ()))
-    if "open" in judged and found.campaign.iid and found.alike:
-        blocks.append(Text(_open(records, judged, found.accepted)))
-    blocks.append(Text(_how(found), small=True))
+    blocks: list[Block] = [Panels([panel]), block]
+    if "open" in verdicts and view.iid and not view.weighted:
+        blocks.append(Text(_open(table.to_dict("records"), verdicts, asked.accepted)))
+    blocks.append(Text(_how(view, asked), small=True))
     return blocks
 
 
-def _open(records: list[dict[Any, Any]], judged: list[str], accepted: float) -> str:
+def _open(records: list[dict[Any, Any]], verdicts: list[str], accepted: float) -> str:
     """Sentence on the number of joints that would decide each open limit if the shares stayed the same."""
     said = []
-    for row, answer in zip(records, judged, strict=True):
+    for row, answer in zip(records, verdicts, strict=True):
         if answer == "open":
             joints = np.inf if np.isnan(row["estimate"]) else shares.needed(row["estimate"], accepted)
-            said.append(f"{row['load']} {text.number(joints) if joints < 1e7 else 'more than can be told'}")
-    return f"Open limits. Valid joints that would tell, if the shares stay as they are: {', '.join(said)}."
+            said.append(f"{row['load']} {text.number(joints) if joints < 1e7 else 'unknown'}")
+    return f"Valid joints that would decide the open limits if their shares stayed the same: {', '.join(said)}."
 
 
-def _how(found: Findings) -> str:
-    if not found.campaign.iid:
+def _how(view: View, asked: Asked) -> str:
+    if not view.iid:
         return (
-            "No intervals: Clopper–Pearson holds for independent samples only; replicates of other seeds tell. "
-            "Failed and unsettled joints are counted below and above every limit."
+            "No intervals: Clopper–Pearson holds for independent samples only; replicates with other seeds show the "
+            "scatter. Failed and unsettled joints are counted below and above every limit."
         )
-    said = "" if found.alike else "Joints are counted by their weights. "
+    said = "Joints are counted by their weights. " if view.weighted else ""
     said += "Intervals are Clopper–Pearson's, 95 % for each limit by itself; failed and unsettled joints are counted "
     said += "below the limit at the lower end and above it at the upper end."
-    if found.judged:
-        said += f" A limit is kept when the widest interval lies below {text.percent(found.accepted)}, not kept when it"
-        said += " lies above, and open in between: then more joints decide."
+    if asked.judges:
+        said += f" A limit is kept if the widest interval lies below {text.percent(asked.accepted)}, not kept if it"
+        said += " lies above, and open otherwise: more joints will decide."
     return said
 
 
@@ -188,6 +189,6 @@ def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
         elif row["estimate"] == 0:
             ax.plot(ax.get_xlim()[0], i, "<", color=style.COLOURS[0], ms=6, clip_on=False)
     if accepted > 0:
-        ax.axvline(accepted, color=style.INK, lw=1.4, ls=exceedance.LIMIT_DASH)
+        ax.axvline(accepted, color=style.INK, lw=1.4, ls=LIMIT_DASH)
         ax.text(accepted, -0.75, f"accepted: {text.percent(accepted)}", ha="center", va="bottom")
     ax.set_xlabel("share of the joints above the limit")

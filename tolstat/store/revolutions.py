@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.tables import BUSHINGS
 from tolstat.joint import perturb
 from tolstat.solver.simulation import restore, simulate_rows, warm_up
 from tolstat.store.recorded import joint_of, options_of
@@ -19,11 +20,9 @@ if TYPE_CHECKING:
 AGAIN = "simulated again"
 ANGLES = 60
 """Default number of input angles per revolution to read, if the histories have as many samples."""
-JOINTS_PER_BLOCK = 64
-"""Joints whose histories are in memory at a time."""
-
-JOINTS_PER_READ = 256
-"""Largest number of joints whose loads a caller should read at a time: 9 MB at 180 samples a revolution."""
+JOINTS_PER_BLOCK = 256
+"""Maximum number of joints whose loads are read at a time: 9 MB at 180 samples per revolution."""
+_COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 FloatArray = NDArray[np.float64]
 
@@ -33,8 +32,6 @@ class Revolutions(NamedTuple):
 
     Attributes
     ----------
-    rows : ndarray of int, shape (m,)
-        File slots.
     angles : ndarray, shape (k,)
         Input angles, rad.
     F, T : ndarray, shape (m, k, 8)
@@ -46,7 +43,6 @@ class Revolutions(NamedTuple):
         machine and with the versions that made the file. 0 for loads from histories.
     """
 
-    rows: NDArray[np.intp]
     angles: FloatArray
     F: FloatArray
     T: FloatArray
@@ -65,14 +61,20 @@ def held(store: Reader) -> str:
     )
 
 
-def read(store: Reader, rows: NDArray[np.intp], most_angles: int = ANGLES) -> Revolutions:
+def blocks(n: int) -> Iterator[slice]:
+    """Yield consecutive parts of `n` joints, each of at most `JOINTS_PER_BLOCK`, to read their loads part by part."""
+    for first in range(0, n, JOINTS_PER_BLOCK):
+        yield slice(first, min(first + JOINTS_PER_BLOCK, n))
+
+
+def read(store: Reader, slots: NDArray[np.intp], most_angles: int = ANGLES) -> Revolutions:
     """Return the loads of joints over the input angle.
 
     Parameters
     ----------
     store : ResultStore
         A campaign whose joints are drawn from tolerances.
-    rows : ndarray of int, shape (m,)
+    slots : ndarray of int, shape (m,)
         File slots, ascending; none pending.
     most_angles : int
         Approximate number of samples per revolution to keep; the samples are thinned evenly.
@@ -90,31 +92,30 @@ def read(store: Reader, rows: NDArray[np.intp], most_angles: int = ANGLES) -> Re
     steps = int(store.options["steps_per_rev"])
     every = max(1, steps // most_angles)
     angles = 2.0 * np.pi * np.arange(0, steps, every) / steps
-    moduli = np.empty((2, len(rows), angles.size, 8))
+    moduli = np.empty((2, len(slots), angles.size, 8))
     apart = 0.0
-    if origin == AGAIN and len(rows):
+    if origin == AGAIN and len(slots):
         warm_up()
-    for first in range(0, len(rows), JOINTS_PER_BLOCK):
-        some = rows[first : first + JOINTS_PER_BLOCK]
+    for part in blocks(len(slots)):
         if origin == AGAIN:
-            found, difference = _again(store, some)
+            found, difference = _again(store, slots[part])
             apart = max(apart, difference)
         else:
-            found = loads(store, some)
+            found = loads(store, slots[part])
         kept = found[:, ::every].astype(float)
         for k in (0, 1):
-            moduli[k, first : first + len(some)] = np.linalg.norm(kept[..., 3 * k : 3 * k + 3], axis=-1)
-    return Revolutions(rows, angles, moduli[0], moduli[1], origin, apart)
+            moduli[k, part] = np.linalg.norm(kept[..., 3 * k : 3 * k + 3], axis=-1)
+    return Revolutions(angles, moduli[0], moduli[1], origin, apart)
 
 
-def loads(store: Reader, rows: NDArray[np.intp]) -> NDArray[Any]:
+def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:
     """Bushing loads of joints over a revolution.
 
     Parameters
     ----------
     store : ResultStore
         The campaign.
-    rows : ndarray of int, shape (m,)
+    slots : ndarray of int, shape (m,)
         File slots.
 
     Returns
@@ -128,24 +129,46 @@ def loads(store: Reader, rows: NDArray[np.intp]) -> NDArray[Any]:
         When the file holds neither.
     """
     if "loads" in store.history_specs:
-        return store.histories("loads", rows)
+        return store.histories("loads", slots)
     if "coefficients_real" not in store.history_specs:
         remedy = 'set histories = "harmonics" or "full" in [output] of the study and run it anew'
         raise StoreError(str(Fault(str(store.path), "holds no load histories", remedy)))
-    real, imag = (store.histories(f"coefficients_{part}", rows) for part in ("real", "imag"))
+    real, imag = (store.histories(f"coefficients_{part}", slots) for part in ("real", "imag"))
     return np.moveaxis(restore(real, imag, int(store.options["steps_per_rev"])), 0, 1)
 
 
-def _again(store: Reader, rows: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
+def channel(loads: NDArray[Any], name: str) -> FloatArray:
+    """One load of joints over a revolution.
+
+    Parameters
+    ----------
+    loads : ndarray, shape (m, samples, 8, 6)
+        As `loads` returns them.
+    name : str
+        One of `tables.CHANNELS`.
+
+    Returns
+    -------
+    ndarray, shape (m, samples)
+        A component, or the modulus of force or torque; N or N m.
+    """
+    bushing, _, load = name.partition(".")
+    own = loads[:, :, BUSHINGS.index(bushing)].astype(float)
+    if load in _COMPONENTS:
+        return np.asarray(own[..., _COMPONENTS.index(load)])
+    return np.asarray(np.linalg.norm(own[..., :3] if load == "F" else own[..., 3:], axis=-1))
+
+
+def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
     """Simulate joints again: their loads, (m, samples, 8, 6), and `Revolutions.apart`."""
-    params = perturb(joint_of(store, int(rows[0])), _pick(store.errors, rows))
-    attempts = _pick(store.attempt, rows)
-    stored = _pick(store.results, rows)
-    loads = np.empty((len(rows), int(store.options["steps_per_rev"]), 8, 6), np.float32)
+    params = perturb(joint_of(store, int(slots[0])), _pick(store.errors, slots))
+    attempts = _pick(store.attempt, slots)
+    stored = _pick(store.results, slots)
+    loads = np.empty((len(slots), int(store.options["steps_per_rev"]), 8, 6), np.float32)
     apart = 0.0
     for attempt in np.unique(attempts):
         here = np.flatnonzero(attempts == attempt)
-        found = simulate_rows(params[here], options_of(store, int(rows[here[0]])), "full")
+        found = simulate_rows(params[here], options_of(store, int(slots[here[0]])), "full")
         samples = found.histories["loads"]
         loads[here] = samples[:, :: max(1, samples.shape[1] // loads.shape[1])]
         for name in ("F_max", "T_max"):
@@ -155,9 +178,9 @@ def _again(store: Reader, rows: NDArray[np.intp]) -> tuple[NDArray[np.float32], 
     return loads, apart
 
 
-def _pick(read: Callable[[slice], NDArray[Any]], rows: NDArray[np.intp]) -> NDArray[Any]:
-    """Read `rows` of a table that is read by slices; as one slice if they lie close together."""
-    first, last = int(rows[0]), int(rows[-1]) + 1
-    if last - first <= 8 * len(rows):
-        return read(slice(first, last))[rows - first]
-    return np.concatenate([read(slice(row, row + 1)) for row in rows.tolist()])
+def _pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
+    """Read `slots` of a table that is read by slices; as one slice if they lie close together."""
+    first, last = int(slots[0]), int(slots[-1]) + 1
+    if last - first <= 8 * len(slots):
+        return read(slice(first, last))[slots - first]
+    return np.concatenate([read(slice(slot, slot + 1)) for slot in slots.tolist()])

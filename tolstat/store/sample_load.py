@@ -101,6 +101,13 @@ class SampleLoad:
         """Return the load of the same joints with `by`, (n,), added to values and ends."""
         return replace(self, values=self.values + by, ends=(self.ends[0] + by, self.ends[1] + by))
 
+    def of_limit(self) -> SampleLoad:
+        """Return the ratio of load to limit of the same joints; its limit is 1."""
+        assert self.limit is not None
+        ends = (self.ends[0] / self.limit, self.ends[1] / self.limit)
+        values, nominal = self.values / self.limit, self.nominal / self.limit
+        return replace(self, unit="1", limit=1.0, nominal=nominal, values=values, ends=ends)
+
     def only(self, samples: NDArray[np.intp] | Mask) -> SampleLoad:
         """Return the load of some of the joints."""
         return replace(

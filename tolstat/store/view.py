@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
+from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
@@ -21,7 +22,7 @@ from tolstat.store import verification
 from tolstat.store.counts import Counts
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
-from tolstat.store.sample_load import FloatArray, SampleLoad
+from tolstat.store.sample_load import SampleLoad
 from tolstat.store.verification import Verification
 
 if TYPE_CHECKING:
@@ -298,7 +299,7 @@ class View:
         """
         if not samples.size or samples[-1] < len(self._first_errors):
             return self._first_errors[samples]
-        names = ERROR.names if columns is None else columns
+        names = tuple(ERROR.names or ()) if columns is None else tuple(columns)
         found = np.empty(len(samples), [(name, ERROR[name]) for name in names])
         for first in range(0, self.n, BLOCK):
             here = np.flatnonzero((samples >= first) & (samples < first + BLOCK))

@@ -1,119 +1,48 @@
-"""Capability of a campaign against its study's limits, and its rare loads."""
+"""Capability as text: columns of its tables, and notes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import math
 
-import numpy as np
 import pandas as pd
 
-from tolstat.analysis import capability, extreme
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.display.text import align
-from tolstat.store.view import Campaign, ends, load
-
-TOGETHER = "all limits"
-BLOCK = 1 << 16
+from tolstat.display import text
+from tolstat.display.table import Column, Row
 
 
-def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Capability against each limit, and against all limits together.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        A campaign of a study with limits.
-    confidence : float
-        Confidence level of the intervals.
-
-    Returns
-    -------
-    DataFrame
-        One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above);
-        ``good`` and ``ppm`` with ``_lower`` and ``_upper``, which count unresolved joints below and above the limit;
-        ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``, ``needed``. The last row,
-        `TOGETHER`, is for the largest ratio of load to limit of each joint.
-    """
-    status, table = campaign.results["status"], campaign.results
-    columns = {name: load(campaign.results, name) for name in campaign.limits}
-    intervals = {name: ends(table, name) for name in columns}
-    asked = [(name, unit, values, intervals[name], campaign.limits[name]) for name, (values, unit) in columns.items()]
-    utilization = _utilization([values for values, _ in columns.values()], campaign)
-    least, most = (_utilization([both[k] for both in intervals.values()], campaign) for k in (0, 1))
-    asked.append((TOGETHER, "1", utilization, (least, most), 1.0))
-    rows = []
-    for name, unit, loads, interval, limit in asked:
-        c = capability.at(loads, status, limit, confidence, campaign.iid, interval)
-        row = {"load": name, "unit": unit, "limit": limit, "n": c.above.n}
-        row |= {key: getattr(c.above, key) for key in ("n_failed", "n_unsettled", "count")}
-        for key in ("good", "ppm"):
-            row |= dict(zip((key, f"{key}_lower", f"{key}_upper"), getattr(c, key), strict=True))
-        names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
-        row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
-        rows.append(row)
-    return pd.DataFrame(rows)
+def _with_ends(row: Row, key: str, form: str) -> str:
+    low, high = row[f"{key}_lower"], row[f"{key}_upper"]
+    return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
 
 
-def _utilization(columns: Sequence[FloatArray], campaign: Campaign) -> FloatArray:
-    """Largest ratio of load to limit of each joint; computed in blocks to save memory."""
-    levels, blocks = list(campaign.limits.values()), range(0, len(campaign.results), BLOCK)
-    parts = (np.column_stack([values[first : first + BLOCK] for values in columns]) for first in blocks)
-    return np.concatenate([np.empty(0), *(capability.utilization(part, levels) for part in parts)])
+def _number(value: float, form: str) -> str:
+    return "-" if math.isnan(value) else f"{value:{form}}"
 
 
-def returns(
-    campaign: Campaign, names: Sequence[str], one_in: Sequence[float], confidence: float = 0.95
-) -> pd.DataFrame:
-    """Return loads, "1 in N joints", and the median of the largest of a fleet of N, from generalised Pareto tails.
+LIMITS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("limit", lambda row: text.value(row["limit"], row["unit"])),
+    Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
+    Column("yield", lambda row: text.percent(row["good"])),
+    Column("95 % interval", lambda row: text.span(row["good_lower"], row["good_upper"])),
+    Column("ppm", lambda row: text.number(row["ppm"])),
+    Column("95 % interval", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1")),
+    Column("Cpk", lambda row: _number(row["cpk"], ".2f")),
+    Column("95 % interval", lambda row: _with_ends(row, "cpk", ".2f")),
+    Column("Cpk if normal", lambda row: _number(row["cpk_normal"], ".2f")),
+)
+"""Columns of the table `query.limits`."""
 
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign.
-    names : sequence of str
-        Loads.
-    one_in : sequence of float
-        Numbers of joints N, so large that the load exceeded by one joint in N lies in the fitted tail.
-    confidence : float
-        Confidence level of the intervals.
-
-    Returns
-    -------
-    DataFrame
-        One row per load and N: ``load``, ``unit``, ``one_in``, ``estimate``, ``lower``, ``upper``, ``bound_lower`` and
-        ``bound_upper`` (unresolved joints counted below, above), ``fleet``, ``fleet_lower``, ``fleet_upper``,
-        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``. SI units.
-
-    Raises
-    ------
-    ValueError
-        When the tail has too few joints (`TooThinError`), or N is too small to lie in it.
-    """
-    rows = []
-    for name in names:
-        values, unit = load(campaign.results, name)
-        tail = extreme.fit(values, campaign.results["status"], None, confidence, campaign.iid)
-        for number in one_in:
-            row: dict[str, object] = {"load": name, "unit": unit, "one_in": number}
-            row |= tail.level(1.0 / number)._asdict()
-            row["bound_lower"], row["bound_upper"] = tail.bounds(1.0 / number)
-            row |= dict(zip(("fleet", "fleet_lower", "fleet_upper"), tail.largest(int(number)), strict=True))
-            row |= dict(zip(("shape", "shape_lower", "shape_upper"), tail.shape, strict=True))
-            rows.append({**row, "p": tail.p, "n_above": tail.n_above})
-    return pd.DataFrame(rows)
-
-
-def text(table: pd.DataFrame) -> str:
-    """Text of `limits`: one line per limit."""
-    rows = [["load", "limit", "joints", "above", "ppm", "95 % interval", "Cpk", "95 % interval", "if normal"]]
-    for row in table.to_dict("records"):
-        unit = "" if row["unit"] == "1" else f" {row['unit'].replace('*', ' ')}"
-        line = [row["load"], f"{row['limit']:g}{unit}", str(row["n"]), str(row["count"])]
-        line += [_number(row["ppm"], ".4g"), _ends(row, "ppm", ".4g")]
-        line += [_number(row["cpk"], ".2f"), _ends(row, "cpk", ".2f"), _number(row["cpk_normal"], ".2f")]
-        rows.append(line)
-    return align(rows)
+RETURNS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("one joint in", lambda row: f"{row['one_in']:,.0f}".replace(",", " ")),
+    Column("exceeds", lambda row: text.value(row["estimate"], row["unit"])),
+    Column("95 % interval", lambda row: text.span_of(row["lower"], row["upper"], row["unit"])),
+    Column("median of the largest of so many", lambda row: text.value(row["fleet"], row["unit"])),
+    Column("95 % interval", lambda row: text.span_of(row["fleet_lower"], row["fleet_upper"], row["unit"])),
+    Column("fit, p", lambda row: f"{row['p']:.2g}"),
+)
+"""Columns of the table `query.returns`."""
 
 
 def note(table: pd.DataFrame) -> str:
@@ -129,12 +58,3 @@ def note(table: pd.DataFrame) -> str:
     if table["ppm_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only; run replicates of other seeds")
     return "\n".join(lines)
-
-
-def _number(value: float, form: str) -> str:
-    return "-" if np.isnan(value) else f"{value:{form}}"
-
-
-def _ends(row: Mapping[Any, Any], name: str, form: str) -> str:
-    low, high = row[f"{name}_lower"], row[f"{name}_upper"]
-    return "-" if np.isnan(low) else f"{low:{form}} .. {high:{form}}"

@@ -17,7 +17,8 @@ from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import BUSHINGS, Status
 from tolstat.questions.causes.query import scattering
-from tolstat.store.revolutions import FloatArray, Revolutions, read
+from tolstat.store import revolutions
+from tolstat.store.revolutions import FloatArray, Revolutions
 from tolstat.store.view import View
 
 JOINTS = 1000
@@ -117,31 +118,31 @@ def against_angle(
     view.check_drawn()
     view.check_sample(weighted=False)
     if view.study.groups:
-        found, remedy = "holds a pick-freeze design", 'give the file of a study with sampling.method "random"'
-        raise StoreError(str(Fault(str(view.path), found, remedy)))
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
     samples = np.flatnonzero(view.status == Status.OK)[:joints]
     if len(samples) < MIN_JOINTS:
-        found = f"has {len(samples)} settled joints to evaluate"
-        raise StoreError(str(Fault(str(view.path), found, f"{MIN_JOINTS} are needed: run more joints")))
+        too_few = f"has {len(samples)} settled joints to evaluate"
+        raise StoreError(str(Fault(str(view.path), too_few, f"{MIN_JOINTS} are needed: run more joints")))
     nominal = view.nominal_slots[view.nominal["status"] == Status.OK]
-    revolutions = read(view.store, np.concatenate([nominal, view.slots(samples)]))
+    found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]))
     errors = view.errors(samples, sampling.columns(view.study))
     x = {name: sampling.values(errors, name) for name in scattering(view.study, errors)}
-    return [_of_load(x, revolutions, len(nominal), name, view.iid, name in logarithmic) for name in loads]
+    return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
 
 
-def modulus(revolutions: Revolutions, load: str) -> FloatArray:
+def modulus(found: Revolutions, load: str) -> FloatArray:
     """Modulus of one bushing load over the revolution, (m, k), N or N m."""
     bushing, _, letter = load.partition(".")
-    moduli = revolutions.F if letter == "F" else revolutions.T
+    moduli = found.F if letter == "F" else found.T
     return moduli[:, :, BUSHINGS.index(bushing)]
 
 
 def _of_load(
-    errors: dict[str, FloatArray], revolutions: Revolutions, nominal: int, name: str, iid: bool, log: bool
+    errors: dict[str, FloatArray], found: Revolutions, nominal: int, name: str, iid: bool, log: bool
 ) -> AgainstAngle:
-    """Indices of one load; the first `nominal` (0 or 1) joints of `revolutions` are the nominal joint."""
-    values = modulus(revolutions, name)
+    """Indices of one load; the first `nominal` (0 or 1) joints of `found` are the nominal joint."""
+    values = modulus(found, name)
     y = values[nominal:]
     names = list(errors)
     first, overall = sensitivity.over_revolution(
@@ -152,10 +153,10 @@ def _of_load(
         load=name,
         unit=UNIT_OF_LOAD[name],
         joints=len(y),
-        origin=revolutions.origin,
-        apart=revolutions.apart,
-        angles=revolutions.angles,
-        nominal=values[0] if nominal else np.full(len(revolutions.angles), np.nan),
+        origin=found.origin,
+        apart=found.apart,
+        angles=found.angles,
+        nominal=values[0] if nominal else np.full(len(found.angles), np.nan),
         spread=np.quantile(y, SPREAD, axis=0, method="inverted_cdf"),
         names=tuple(names[i] for i in order),
         first=_sorted(first, order),

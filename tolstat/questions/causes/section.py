@@ -15,6 +15,7 @@ from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
+from tolstat.display.table import as_block
 from tolstat.questions.causes import angles_figure, rendering, tail_section
 from tolstat.questions.causes.angles import AgainstAngle, against_angle
 from tolstat.questions.causes.query import Causes, causes_of
@@ -69,9 +70,8 @@ def _section(causes: Sequence[Causes], against: Sequence[AgainstAngle], logarith
         blocks.append(Text(_introduction(causes, logarithmic)))
         blocks.append(Panels([_tornado_panel(found, _quantity(found.load, logarithmic)) for found in causes]))
     for found in causes:
-        rows = rendering.rows(found, SHOWN)
         title = f"{_quantity(found.load, logarithmic)}: share of the variance, direction, and part in the tail"
-        blocks.append(Table(title, rows[0], rows[1:]))
+        blocks.append(as_block(title, rendering.columns(found), rendering.largest(found, SHOWN)))
         notes = rendering.note(found, found.load in logarithmic).splitlines()
         blocks += [Text(text.sentence(line), small=True) for line in notes]
     if against:

@@ -16,7 +16,7 @@ from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.questions.causes import angles_figure
 from tolstat.questions.causes.angles import AgainstAngle, modulus
 from tolstat.questions.causes.tail import Tail, worst_joints
-from tolstat.store.revolutions import read
+from tolstat.store import revolutions
 from tolstat.store.view import View
 
 JOINTS, DRAWN = 8, 3
@@ -86,7 +86,7 @@ def _table(tail: Tail) -> Table:
 
 def _histories(view: View, tail: Tail, against: Sequence[AgainstAngle]) -> _Histories:
     ascending, place = np.unique(tail.samples[:DRAWN], return_inverse=True)
-    found = read(view.store, view.slots(ascending), ANGLES)
+    found = revolutions.read(view.store, view.slots(ascending), ANGLES)
     all_joints = next((angle for angle in against if angle.load == tail.by), None)
     return _Histories(tail, found.angles, modulus(found, tail.by)[place], all_joints, view.limits.get(tail.by))
 

@@ -1,9 +1,8 @@
-"""Load exceedance of a random campaign: the table at the limits, the curves, and their picture."""
+"""Load exceedance as text and pictures: tables of limits and quantiles, curves with their bands."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict
+import math
 
 import numpy as np
 import pandas as pd
@@ -15,145 +14,128 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance, weighted
-from tolstat.analysis.accuracy import size
-from tolstat.common.loads import LOADS
+from tolstat.analysis import exceedance
 from tolstat.common.tables import VALID, Status
-from tolstat.display import style
-from tolstat.questions.exceedance import accuracy
-from tolstat.store.view import Campaign, ends, load
+from tolstat.display import style, text
+from tolstat.display.table import Column, Row
+from tolstat.questions.exceedance.query import SHARES, curve
+from tolstat.store.view import View
 
-SHARES = (0.5, 0.9, 0.95, 0.99)
-BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
-MAX_LEVELS, DRAWN_LEVELS = 600, 200
-"""Maximum number of points of a curve in the CSV and in the picture."""
+DRAWN_LEVELS = 200
+"""Maximum number of points of a curve in the picture."""
 LIMIT_DASH, ZERO_DASH = (0.0, (8.0, 3.0)), (0.0, (1.0, 2.0))
 
 
-def limits(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Share of the joints above each of the study's limits.
+def _has_unresolved(table: pd.DataFrame) -> bool:
+    return bool((table["n_failed"] + table["n_unsettled"]).any())
 
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign.
-    confidence : float
-        Confidence level of the intervals.
 
-    Returns
-    -------
-    DataFrame
-        One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
-        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
-        `_budget`. Loads in SI units.
-    """
+def _has_error(table: pd.DataFrame) -> bool:
+    return bool(table["numerical_error"].notna().any())
+
+
+def _outer(row: Row) -> str:
+    kind = "bound" if math.isnan(row["outer_lower"]) else "outer"
+    return text.span(row[f"{kind}_lower"], row[f"{kind}_upper"])
+
+
+LIMITS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("limit", lambda row: text.value(row["level"], row["unit"])),
+    Column("nominal", lambda row: text.value(row["nominal"], row["unit"])),
+    Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
+    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("with failed, unsettled", _outer, shown=_has_unresolved),
+    Column("and numerical error", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=_has_error),
+)
+"""Columns of the table `query.limits`. Joints above are counted among the valid ones, as the share is; the last two
+columns count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""
+
+
+def _numerical(row: Row) -> str:
+    return text.percent(max(abs(row[f"numerical_{end}"] - row["estimate"]) for end in ("lower", "upper")))
+
+
+BUDGET = (
+    Column("limit", lambda row: f"{row['load']} > {text.value(row['level'], row['unit'])}"),
+    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("sampling, ±", lambda row: text.percent(0.5 * (row["upper"] - row["lower"]))),
+    Column("numerical error, up to", _numerical),
+    Column("failed and unsettled, width", lambda row: text.percent(row["bound_upper"] - row["bound_lower"])),
+)
+"""Contributions to the uncertainty of each share above a limit, from the table `query.limits`."""
+
+
+def quantile_columns(tolerance: dict[str, float] | None = None) -> tuple[Column, ...]:
+    """Columns of the table `by_load`: quantiles with intervals and, if given, tolerance limits by load."""
+
+    def limit(row: Row) -> str:
+        upper = (tolerance or {})[row["load"]]
+        return "needs more joints" if math.isinf(upper) else text.value(upper, row["unit"])
+
+    def quantile(share: float) -> Column:
+        def cell(row: Row) -> str:
+            own, lower, upper = row[share]
+            ends = f" ({text.number(lower)} .. {text.number(upper)})" if tolerance and not math.isnan(lower) else ""
+            return text.value(own, row["unit"]) + ends
+
+        return Column(f"{100 * share:g} %" + (" stay below" if tolerance else ""), cell)
+
+    def interval(row: Row) -> str:
+        _, lower, upper = row[SHARES[-1]]
+        return "-" if math.isnan(lower) else f"{lower:.4g} .. {text.value(upper, row['unit'])}"
+
+    head = (
+        Column("load", lambda row: str(row["load"])),
+        Column("nominal", lambda r: text.value(r["nominal"], r["unit"])),
+    )
+    last = Column(f"95 % interval of {100 * SHARES[-1]:g} %", interval) if tolerance is None else None
+    last = last or Column("tolerance limit 99 % / 95 %", limit)
+    return (*head, *(quantile(share) for share in SHARES), last)
+
+
+def by_load(quantiles: pd.DataFrame) -> pd.DataFrame:
+    """One row per load of the table `query.quantiles`: for each share (estimate, lower, upper)."""
     rows = []
-    numerical = accuracy.usual(campaign.verification) if campaign.verification else {}
-    for name, level in campaign.limits.items():
-        values, unit = load(campaign.results, name)
-        share = campaign.above(values, level, confidence, ends(campaign.results, name))
-        head = {"load": name, "unit": unit, "nominal": nominal(campaign, name)}
-        budget = _budget(campaign, name, level, confidence, numerical)
-        rows.append({**head, **asdict(share), "confidence": confidence, **budget})
+    for name, part in quantiles.groupby("load", sort=False):
+        ends = {row["share"]: (row["estimate"], row["lower"], row["upper"]) for row in part.to_dict("records")}
+        rows.append({"load": str(name), "unit": part["unit"].iloc[0], "nominal": part["nominal"].iloc[0], **ends})
     return pd.DataFrame(rows)
 
 
-def _budget(
-    campaign: Campaign, name: str, level: float, confidence: float, numerical: Mapping[str, float]
-) -> dict[str, float]:
-    """Bounds of a share with every load shifted down and up by the numerical error.
-
-    Returns
-    -------
-    dict
-        ``numerical_error``, relative to the largest load of the kind in the joint, NaN if unknown; ``numerical_lower``
-        and ``numerical_upper``, the estimates with loads shifted down and up; ``total_lower`` and ``total_upper``,
-        their ends ``outer_lower`` and ``outer_upper``: cover numerical error, sampling and unresolved joints.
-    """
-    kind = LOADS[name].kind
-    error = numerical.get(kind, np.nan)
-    values = load(campaign.results, name)[0]
-    shift = error * size(campaign.results, name)
-    if np.isnan(error):
-        return {"numerical_error": error} | dict.fromkeys(BUDGET, np.nan)
-    least, most = ends(campaign.results, name)
-    low, high = (campaign.above(values + s, level, confidence, (least + s, most + s)) for s in (-shift, shift))
-    bounds = (low.estimate, high.estimate, low.outer_lower, high.outer_upper)
-    return {"numerical_error": error, **dict(zip(BUDGET, bounds, strict=True))}
-
-
-def quantiles(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Quantiles of every bushing load kept or, if there are none, of the other loads kept.
-
-    Returns
-    -------
-    DataFrame
-        One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.quantile.Quantile`,
-        ``confidence``. Loads in SI units.
-    """
-    rows = []
-    for name in campaign.listed:
-        values, unit = load(campaign.results, name)
-        for share in SHARES:
-            q = campaign.quantile(values, share, confidence)
-            head = {"load": name, "unit": unit, "nominal": nominal(campaign, name)}
-            rows.append({**head, **q._asdict(), "confidence": confidence})
-    return pd.DataFrame(rows)
-
-
-def curves(campaign: Campaign, confidence: float = 0.95) -> pd.DataFrame:
-    """Exceedance curves of the loads of `quantiles`, as one table.
-
-    Returns
-    -------
-    DataFrame
-        ``load``, ``unit``, then the fields of `analysis.exceedance.Exceedance`; SI units, at most
-        `MAX_LEVELS` levels per load.
-    """
-    parts = []
-    for name in campaign.listed:
-        table, unit = curve(campaign, name, confidence, MAX_LEVELS)
-        part = pd.DataFrame({field: table[field] for field in exceedance.CURVE.names or ()})
-        part.insert(0, "load", name)
-        part.insert(1, "unit", unit)
-        parts.append(part)
-    return pd.concat(parts, ignore_index=True)
-
-
-def note(campaign: Campaign) -> str:
+def note(view: View) -> str:
     """Sentence on what the intervals cover."""
-    if campaign.weights is not None:
+    if view.weighted:
         text = (
             "joints counted by their weights; bands: pointwise 95 % Clopper–Pearson intervals of as many equal joints "
-            f"as would be as sure{_distrust(campaign)}"
+            f"as would be as sure{_distrust(view)}"
         )
-    elif campaign.iid:
+    elif view.iid:
         text = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
     else:
         text = "no intervals: Clopper–Pearson holds for independent samples only"
-    if campaign.count(*VALID) + campaign.count(Status.PENDING) < len(campaign.results):
+    if view.count(*VALID, Status.PENDING) < view.n:
         text += "; light bands: with the others counted below and above every x"
     return text
 
 
-def _distrust(campaign: Campaign) -> str:
+def _distrust(view: View) -> str:
     """Words on limits whose share is unreliable, because too few effective joints are above them."""
     poor = []
-    weights = np.ones(len(campaign.results)) if campaign.weights is None else campaign.weights
-    for name, level in campaign.limits.items():
-        values, status = load(campaign.results, name)[0], campaign.results["status"]
-        found = weighted.trust(values, status, weights, level)
+    for name, level in view.limits.items():
+        found = view.load(name).trust(level)
         if not found.usable:
             poor.append(f"{name} ({found.effective:.0f} effective joints above, Pareto k {found.k:.2f})")
     return f"; not to be trusted, needs more joints or other proposals: {', '.join(poor)}" if poor else ""
 
 
-def figure(campaign: Campaign, confidence: float = 0.95) -> Figure:
+def figure(view: View, confidence: float = 0.95) -> Figure:
     """Draw the exceedance curves of all bushing loads that the study keeps.
 
     Parameters
     ----------
-    campaign : Campaign
+    view : View
         The campaign; without a valid joint, the panels say so.
     confidence : float
         Confidence level of the bands.
@@ -164,36 +146,21 @@ def figure(campaign: Campaign, confidence: float = 0.95) -> Figure:
         Four panels, empty where no load is kept; share of the joints on a logarithmic axis down to half a joint.
     """
     with style.settings():
-        title = f"{campaign.name}: share of joints whose largest load exceeds x"
-        page, panels = style.panels(title, f"{campaign.head()}\n{note(campaign)}")
+        title = f"{view.name}: share of joints whose largest load exceeds x"
+        page, panels = style.panels(title, f"{view.head()}\n{note(view)}")
         for group, letter, ax in panels:
-            panel(ax, campaign, group, letter, confidence)
-        _legend(page, campaign)
+            panel(ax, view, group, letter, confidence)
+        _legend(page, view)
     return page
 
 
-def nominal(campaign: Campaign, name: str) -> float:
-    """Load of the nominal joint, SI; NaN if there is none."""
-    return float(load(campaign.nominal, name)[0][0]) if len(campaign.nominal) else np.nan
-
-
-def curve(campaign: Campaign, name: str, confidence: float, most: int) -> tuple[NDArray[np.void], str]:
-    """Exceedance curve of a load and its unit, thinned to `most` levels: denser at the largest loads."""
-    values, unit = load(campaign.results, name)
-    levels = np.unique(exceedance.sort_out(values, campaign.results["status"]).valid)
-    if levels.size > most:
-        top = levels.size - np.geomspace(1, levels.size, most // 2).round().astype(int)
-        even = np.linspace(0, levels.size - 1, most // 2).round().astype(int)
-        levels = levels[np.union1d(top, even)]
-    below = np.nextafter(levels[:1], -np.inf)  # a level that every valid joint exceeds
-    return campaign.curve(values, np.concatenate([below, levels]), confidence, ends(campaign.results, name)), unit
-
-
-def panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: float = 0.95) -> None:
+def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.95) -> None:
     """Draw the curves of four bushings: ``cross`` or ``fork``, ``F`` or ``T``."""
     names = [f"{group}{i}.{letter}" for i in (1, 2, 3, 4)]
     tables = [
-        curve(campaign, name, confidence, DRAWN_LEVELS)[0] if name in campaign.drawn else np.empty(0, exceedance.CURVE)
+        curve(view.load(name), confidence, DRAWN_LEVELS)
+        if name in view.bushing_loads
+        else np.empty(0, exceedance.CURVE)
         for name in names
     ]
     unit = "N" if letter == "F" else "N m"
@@ -202,32 +169,32 @@ def panel(ax: Axes, campaign: Campaign, group: str, letter: str, confidence: flo
         ax.set_ylabel("share of joints above x")
     levels = np.concatenate([table["level"] for table in tables])
     if not levels.size:
-        held = any(name in campaign.drawn for name in names)
+        held = any(name in view.bushing_loads for name in names)
         found = "no joint with a valid result" if held else "not kept by the study"
         ax.text(0.5, 0.5, found, ha="center", transform=ax.transAxes)
         ax.set(xticks=[], yticks=[])
         return
-    marked = _limit_levels(campaign, group, letter)
+    marked = _limit_levels(view, group, letter)
     low, high = axis_range(levels, list(marked))
     ax.set_xlim(low, high)
-    floor = 0.5 * min(least(campaign, table) for table in tables if table.size)
+    floor = 0.5 * min(least(view, table) for table in tables if table.size)
     style.share_axis(ax, floor)
     for i, table in enumerate(tables):
         if table.size:
             steps(ax, table, i, low, floor)
-        ideal = nominal(campaign, names[i])
-        if low <= ideal <= high:
-            style.mark(ax, ideal, 1.0, style.COLOURS[i])
-    if campaign.iid:
+            nominal = view.load(names[i]).nominal
+            if low <= nominal <= high:
+                style.mark(ax, nominal, 1.0, style.COLOURS[i])
+    if view.iid:
         ends = [table["outer_upper"][-1] for table in tables if table.size]
         ax.axhline(max(ends), color=style.FAINT, lw=1.1, ls=ZERO_DASH, zorder=1.5)
     limit_lines(ax, marked, unit)
 
 
-def least(campaign: Campaign, table: NDArray[np.void]) -> float:
+def least(view: View, table: NDArray[np.void]) -> float:
     """Smallest share that a curve shows: that of one joint or, with weights, the smallest positive estimate."""
     shares = table["estimate"][table["estimate"] > 0]
-    return 1.0 / float(table["n"][0]) if campaign.weights is None else float(shares.min(initial=1.0))
+    return 1.0 / float(table["n"][0]) if not view.weighted else float(shares.min(initial=1.0))
 
 
 def axis_range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, float]:
@@ -262,13 +229,13 @@ def steps(ax: Axes, table: NDArray[np.void], i: int, low: float, floor: float) -
     ax.step(x, shown("estimate"), where="post", color=colour, ls=style.DASHES[i], zorder=3)
 
 
-def _limit_levels(campaign: Campaign, group: str, letter: str) -> dict[float, list[int]]:
+def _limit_levels(view: View, group: str, letter: str) -> dict[float, list[int]]:
     """Limits of a panel: level -> numbers of the bushings that have it."""
     found: dict[float, list[int]] = {}
     for i in (1, 2, 3, 4):
         name = f"{group}{i}.{letter}"
-        if name in campaign.limits:
-            found.setdefault(campaign.limits[name], []).append(i)
+        if name in view.limits:
+            found.setdefault(view.limits[name], []).append(i)
     return dict(sorted(found.items()))
 
 
@@ -310,16 +277,16 @@ def _without_overlap(labels: list[tuple[float, str, str]], new: tuple[float, str
     return _without_overlap(labels[:-1], joined)
 
 
-def _legend(page: Figure, campaign: Campaign) -> None:
+def _legend(page: Figure, view: View) -> None:
     handles: list[Artist] = [
         Line2D([], [], color=c, ls=dash) for c, dash in zip(style.COLOURS, style.DASHES, strict=True)
     ]
     labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
-    if campaign.iid:
+    if view.iid:
         handles += [Patch(color=style.FAINT, alpha=0.4, lw=0)]
         handles += [Line2D([], [], color=style.FAINT, lw=1.1, ls=ZERO_DASH)]
         labels += ["95 % band", "upper end where none exceeds x"]
-    if len(campaign.nominal):
+    if len(view.nominal):
         handles.append(Line2D([], [], marker="v", color=style.FAINT, ls="", ms=7.5))
         labels.append("nominal joint")
     style.legend(page, handles, labels)

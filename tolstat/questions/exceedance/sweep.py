@@ -13,23 +13,23 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.display import style
-from tolstat.store.view import Axis, Campaign, load, swept_axes
+from tolstat.questions.exceedance.swept_axes import Axis, swept_axes
+from tolstat.store.view import View
 
 Mask = NDArray[np.bool_]
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""
 
 
-def table(campaign: Campaign) -> pd.DataFrame:
+def table(view: View) -> pd.DataFrame:
     """Largest loads of every joint of a sweep.
 
     Parameters
     ----------
-    campaign : Campaign
+    view : View
         A campaign of the method ``sweep``.
 
     Returns
@@ -39,20 +39,18 @@ def table(campaign: Campaign) -> pd.DataFrame:
         for the reader (``pin*.diameter [mm]``); ``status``; force and torque of each bushing, SI, headed likewise;
         ``psi``. Loads that the study does not keep have no column.
     """
-    columns: dict[str, object] = {_head(axis): axis.values for axis in swept_axes(campaign)}
-    columns["status"] = [Status(int(code)).label for code in campaign.results["status"]]
-    for name in campaign.listed:
-        values, unit = load(campaign.results, name)
-        columns[name if unit == "1" else f"{name} [{unit}]"] = values
-    if selected_results.holds(campaign.columns, "psi"):
-        columns["psi"] = load(campaign.results, "psi")[0]
+    columns: dict[str, object] = {_head(axis): axis.values for axis in swept_axes(view)}
+    columns["status"] = [Status(int(code)).label for code in view.status]
+    names = dict.fromkeys([*view.shown_loads, *(name for name in view.kept_loads if name == "psi")])
+    for load in view.loads(list(names)):
+        columns[load.name if load.unit == "1" else f"{load.name} [{load.unit}]"] = load.values
     return pd.DataFrame(columns)
 
 
-def worst(campaign: Campaign) -> pd.DataFrame:
+def worst(view: View) -> pd.DataFrame:
     """Short form of `table`: largest force and torque of the cross bushings and of the fork bushings."""
-    full = table(campaign)
-    loads = [c for c in full.columns if str(c).partition(" ")[0] in UNIT_OF_LOAD] if campaign.drawn else []
+    full = table(view)
+    loads = [c for c in full.columns if str(c).partition(" ")[0] in UNIT_OF_LOAD] if view.bushing_loads else []
     short = full[[c for c in full.columns if c not in loads]].copy()
     for group in ("cross", "fork"):
         for unit in ("N", "N*m"):
@@ -63,7 +61,7 @@ def worst(campaign: Campaign) -> pd.DataFrame:
     return short
 
 
-def figure(campaign: Campaign) -> Figure:
+def figure(view: View) -> Figure:
     """Draw the loads against the first swept quantity.
 
     One swept quantity gives a line for each bushing. Several give a line for each combination of the others,
@@ -71,7 +69,7 @@ def figure(campaign: Campaign) -> Figure:
 
     Parameters
     ----------
-    campaign : Campaign
+    view : View
         A campaign of the method ``sweep``.
 
     Returns
@@ -79,24 +77,24 @@ def figure(campaign: Campaign) -> Figure:
     Figure
         Four panels; joints that did not settle are hollow, those without a result are crosses at the foot.
     """
-    axes = swept_axes(campaign)
+    axes = swept_axes(view)
     with style.settings():
-        title = f"{campaign.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
-        page, panels = style.panels(title, f"{campaign.head()}\n{_note(axes)}")
+        title = f"{view.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
+        page, panels = style.panels(title, f"{view.head()}\n{_note(axes)}")
         for group, letter, ax in panels:
-            panel(ax, campaign, group, letter)
-        style.legend(page, *key(campaign))
+            panel(ax, view, group, letter)
+        style.legend(page, *key(view))
     return page
 
 
-def panel(ax: Axes, campaign: Campaign, group: str, letter: str) -> None:
+def panel(ax: Axes, view: View, group: str, letter: str) -> None:
     """Draw the loads of four bushings: ``cross`` or ``fork``, ``F`` or ``T``."""
-    axes = swept_axes(campaign)
-    first = axes[0] if axes else Axis("joint", "", np.arange(1, len(campaign.results) + 1, dtype=np.float64))
+    axes = swept_axes(view)
+    first = axes[0] if axes else Axis("joint", "", np.arange(1, view.n + 1, dtype=np.float64))
     ax.set_xlabel(_head(first))
     ax.xaxis.set_major_locator(MaxNLocator(6))
     ax.set_ylabel(f"largest |{letter}| [{'N' if letter == 'F' else 'N m'}]")
-    _lines(ax, campaign, [first, *axes[1:]], group, letter)
+    _lines(ax, view, [first, *axes[1:]], group, letter)
 
 
 def _head(axis: Axis) -> str:
@@ -111,25 +109,25 @@ def _note(axes: list[Axis]) -> str:
     return text + (f"; one line for each {others}" if others else "")
 
 
-def _lines(ax: Axes, campaign: Campaign, axes: list[Axis], group: str, letter: str) -> None:
-    names = [name for i in (1, 2, 3, 4) if (name := f"{group}{i}.{letter}") in campaign.drawn]
+def _lines(ax: Axes, view: View, axes: list[Axis], group: str, letter: str) -> None:
+    names = [name for i in (1, 2, 3, 4) if (name := f"{group}{i}.{letter}") in view.bushing_loads]
     if not names:
         ax.text(0.5, 0.5, "not kept by the study", ha="center", transform=ax.transAxes)
         ax.set(xticks=[], yticks=[])
         return
-    loads = [load(campaign.results, name)[0] for name in names]
+    loads = [load.values for load in view.loads(names)]
     if len(axes) == 1:
         for name, values in zip(names, loads, strict=True):
             i = int(name.partition(".")[0][-1]) - 1
             every = np.ones(values.size, dtype=bool)
-            _line(ax, campaign, axes[0].values, values, every, style.COLOURS[i], style.DASHES[i])
+            _line(ax, view, axes[0].values, values, every, style.COLOURS[i], style.DASHES[i])
     else:
         for colour, rows in _combinations(axes):
-            _line(ax, campaign, axes[0].values, np.max(loads, axis=0), rows, colour, "-")
-    if len(campaign.nominal):
-        nominal = max(load(campaign.nominal, name)[0][0] for name in names)
+            _line(ax, view, axes[0].values, np.max(loads, axis=0), rows, colour, "-")
+    if len(view.nominal):
+        nominal = max(load.nominal for load in view.loads(names))
         ax.axhline(nominal, color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0)), zorder=1.5)
-    limits = {campaign.limits[name] for name in names if name in campaign.limits}
+    limits = {view.limits[name] for name in names if name in view.limits}
     bottom, top = ax.get_ylim()
     for limit in sorted(limits):
         if limit < top + 0.5 * (top - bottom):
@@ -140,7 +138,7 @@ def _lines(ax: Axes, campaign: Campaign, axes: list[Axis], group: str, letter: s
 
 def _line(
     ax: Axes,
-    campaign: Campaign,
+    view: View,
     x: NDArray[np.float64],
     values: NDArray[np.float64],
     rows: Mask,
@@ -149,7 +147,7 @@ def _line(
 ) -> None:
     """Draw one line over the joints `rows`; it is broken where a joint has no result."""
     order = np.flatnonzero(rows)[np.argsort(x[rows], kind="stable")]
-    status = campaign.results["status"][order]
+    status = view.status[order]
     shown = np.where(np.isin(status, SIMULATED), values[order], np.nan)
     ax.plot(x[order], shown, color=colour, ls=dash, marker="o", ms=3.2, zorder=3)
     loose = np.isin(status, UNSETTLED)
@@ -172,9 +170,9 @@ def _shades(count: int) -> list[str]:
     return [to_hex(colormaps["viridis"](x)) for x in np.linspace(0.0, 0.88, count)]
 
 
-def key(campaign: Campaign) -> tuple[list[Artist], list[str]]:
+def key(view: View) -> tuple[list[Artist], list[str]]:
     """Handles and labels of a panel's legend."""
-    axes = swept_axes(campaign)
+    axes = swept_axes(view)
     handles: list[Artist]
     if len(axes) < 2:
         handles = [
@@ -187,13 +185,13 @@ def key(campaign: Campaign) -> tuple[list[Artist], list[str]]:
         shades = _shades(second.size)
         handles = [Line2D([], [], color=shades[i], marker="o", ms=3.2) for i in named]
         labels = [f"{second[i]:.4g} {axes[1].unit}".strip() for i in named]
-    if len(campaign.nominal):
+    if len(view.nominal):
         handles.append(Line2D([], [], color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0))))
         labels.append("nominal joint, largest")
-    if campaign.count(*UNSETTLED):
+    if view.count(*UNSETTLED):
         handles.append(Line2D([], [], ls="", marker="o", ms=6.5, mfc="white", mec=style.INK))
         labels.append("not settled")
-    if campaign.count(*FAILED):
+    if view.count(*FAILED):
         handles.append(Line2D([], [], ls="", marker="x", color=style.INK))
         labels.append("no result")
     return handles, labels

@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tolstat.common.tables import CHANNELS
-from tolstat.questions.fatigue import query as fatigue
+from tolstat.questions.fatigue.counting import cycles_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tolstat.analysis.cycles import FloatArray
-    from tolstat.store import ResultStore
+    from tolstat.store.view import View
 
 INTERVALS = ("range", "mean")
 
 
-def series(
-    store: ResultStore, channels: Sequence[str] | None = None, bins: int = 100, revolutions: float = 1.0
+def pylife_series(
+    view: View, channels: Sequence[str] | None = None, bins: int = 100, revolutions: float = 1.0
 ) -> pd.Series[float]:
-    """Rainflow cycles of every joint as a pyLife load collective.
+    """Rainflow cycles of every joint of a file, the nominal joint included, as a pyLife load collective.
 
     Parameters
     ----------
-    store : ResultStore
-        A campaign that keeps load histories.
+    view : View
+        A campaign that keeps cycles or load histories.
     channels : sequence of str, optional
         Channels to keep, keys of `tables.CHANNELS`.
     bins : int
@@ -39,8 +39,8 @@ def series(
     Returns
     -------
     pandas.Series
-        Name ``cycles``; index levels ``range`` and ``mean`` (intervals closed on the left, N or N m), ``joint`` (file
-        slot) and ``channel``. Classes without cycles, and joints without results, are left out.
+        Name ``cycles``; index levels ``range`` and ``mean`` (intervals closed on the left, N or N m), ``joint`` (row
+        of the campaign) and ``channel``. Classes without cycles, and joints without results, are left out.
 
     Raises
     ------
@@ -53,11 +53,12 @@ def series(
 
     if bins < 1:
         raise ValueError(f"{bins} classes: at least 1 expected")
-    cycles = fatigue.cycles(store, channels)
-    joint, channel, slot = np.nonzero(cycles.ranges > 0)  # leaves out NaN
-    values = {"range": cycles.ranges[joint, channel, slot], "mean": cycles.means[joint, channel, slot]}
+    cycles = cycles_of(view.store, np.arange(view.store.n), channels)
+    joint, channel, place = np.nonzero(cycles.ranges > 0)  # leaves out NaN
+    values = {"range": cycles.ranges[joint, channel, place], "mean": cycles.means[joint, channel, place]}
     torque = np.array([CHANNELS[name] != "N" for name in cycles.channels], bool)[channel]
-    frame = pd.DataFrame({"joint": joint, "channel": channel, "cycles": cycles.weights[slot] * revolutions})
+    rows = np.array(view.store.rows)[joint]
+    frame = pd.DataFrame({"joint": rows, "channel": channel, "cycles": cycles.weights[place] * revolutions})
     for name in INTERVALS:
         frame[f"{name}_left"], frame[f"{name}_right"] = np.zeros((2, len(frame)))
         for kind in (torque, ~torque):
@@ -71,7 +72,7 @@ def series(
 
 
 def table(collectives: pd.Series[float]) -> pd.DataFrame:
-    """Flat table of `series`: ``joint``, ``channel``, ``unit``, left and right end of range and mean, ``cycles``."""
+    """Flat table of `pylife_series`: ``joint``, ``channel``, ``unit``, ends of range and mean, ``cycles``."""
     import pandas as pd
 
     index = collectives.index

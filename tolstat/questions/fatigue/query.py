@@ -1,25 +1,26 @@
-"""Load cycles of the joints of one campaign, or of several campaigns that make up a duty cycle."""
+"""Fatigue of a campaign or of a duty cycle: load cycles, damage-equivalent loads, damage sums and load spectra."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis.cycles import Cycles, duty_cycle
-from tolstat.common.draw_records import check_equal_weights
-from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import CHANNELS, ERROR_FIELDS, SIMULATED, Status
-from tolstat.solver import rainflow
-from tolstat.store import ResultStore
-from tolstat.store.revolutions import JOINTS_PER_READ, loads
+from tolstat.analysis import cycles, damage, exceedance, quantile
+from tolstat.analysis.cycles import Cycles, FloatArray
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.tables import CHANNELS, ERROR_FIELDS, Status
+from tolstat.questions.fatigue.counting import cycles_of
+from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
-from tolstat.study.selection import select
+
+SHARES = (0.5, 0.9, 0.99)
+"""Shares of the joints at which quantiles are given."""
+MAX_NUMBERS = 40
+"""Maximum number of points of a spectrum."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +32,14 @@ class Loading:
     name : str
         Name of the study, or of the studies.
     cycles : Cycles
-        Cycles of the n joints, without the nominal joint.
+        Cycles of the n samples.
     status : ndarray, shape (n,)
         `tables.Status`; with several operating points the first that is not ``OK``.
     nominal : Cycles
         Cycles of the nominal joint; no rows if there is none that settled.
     iid : bool
         Whether the joints are independent samples.
-    judged : Fatigue
+    settings : Fatigue
         Section ``[fatigue]`` of the study; of the first study if there are several.
     """
 
@@ -47,144 +48,233 @@ class Loading:
     status: NDArray[np.uint8]
     nominal: Cycles
     iid: bool
-    judged: Fatigue
+    settings: Fatigue
+
+    @property
+    def settled(self) -> int:
+        """Number of joints that settled at all operating points."""
+        return int((self.status == Status.OK).sum())
 
 
-def channels(patterns: Sequence[str] = ("*.*",)) -> tuple[str, ...]:
-    """Names of the channels that any of the patterns selects, in the order of `tables.CHANNELS`.
-
-    Raises
-    ------
-    InputError
-        With every pattern that selects nothing.
-    """
-    found = {pattern: select(pattern, CHANNELS) for pattern in patterns}
-    faults = [
-        Fault(f"channel {pattern!r}", "selects nothing", did_you_mean(pattern, list(CHANNELS)[:8]))
-        for pattern, names in found.items()
-        if not names
-    ]
-    if faults:
-        raise InputError(faults)
-    return tuple(name for name in CHANNELS if any(name in names for names in found.values()))
-
-
-def cycles(store: ResultStore, names: Sequence[str] | None = None, most: int | None = None) -> Cycles:
-    """Rainflow cycles of every joint of a campaign.
-
-    Cycles stored by the workers (``histories = "cycles"``) are read. Otherwise they are counted now from the load
-    histories, or from the loads restored from harmonics.
-
-    Parameters
-    ----------
-    store : ResultStore
-        The campaign.
-    names : sequence of str, optional
-        Channels to keep; by default all 64: some 8 kB per joint.
-    most : int, optional
-        Number of rows to read, from the first; by default all.
-
-    Returns
-    -------
-    Cycles
-        Row i is file slot i; NaN for joints without results.
-
-    Raises
-    ------
-    StoreError
-        When the file holds no histories.
-    """
-    names = tuple(CHANNELS) if names is None else tuple(names)
-    place = [list(CHANNELS).index(name) for name in names]
-    n = store.n if most is None else min(most, store.n)
-    table = np.empty((n, len(names), rainflow.KEPT, 2), np.float32)
-    number = np.empty((n, len(names)))
-    simulated = np.isin(store.status(slice(n)), SIMULATED)
-    for rows, counted in _counted(store, n):
-        table[rows], number[rows] = counted["cycles"][:, place], counted["cycle_count"][:, place]
-    table[~simulated], number[~simulated] = np.nan, np.nan
-    used = max(1, int(np.max(number, initial=0.0, where=np.isfinite(number))))
-    table = table[..., :used, :]
-    return Cycles(names, table[..., 0], table[..., 1], number, np.ones(table.shape[2]))
-
-
-def read(
-    paths: Sequence[str | Path],
+def load_cycles(
+    views: Sequence[View],
     shares: Sequence[float] = (1.0,),
     names: Sequence[str] | None = None,
-    most: int | None = None,
+    samples: int | None = None,
 ) -> Loading:
-    """Read the cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
+    """Rainflow cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
 
     Parameters
     ----------
-    paths : sequence of str or Path
-        Result files, one for each operating point; their joints differ in ``operation.*`` only.
+    views : sequence of View
+        The campaign at each operating point; the joints of the campaigns differ in ``operation.*`` only.
     shares : sequence of float
         Share of the revolutions at each operating point; the sum is 1.
     names : sequence of str, optional
-        Channels to keep.
-    most : int, optional
-        Number of rows of each file to read, from the first; by default all.
+        Channels to keep, keys of `tables.CHANNELS`; by default all 64: some 8 kB per joint.
+    samples : int, optional
+        Number of samples, from the first; by default all.
 
     Raises
     ------
     InputError
-        When the shares are not shares, or the files hold different joints.
+        When the shares are not shares, or the campaigns have different joints.
     StoreError
-        When a file cannot be read, holds no histories, or lists its joints.
+        When a file holds no histories, or joints that are no sample of a production.
     """
-    if len(shares) != len(paths) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
-        found = f"{list(shares)} for {len(paths)} files"
+    if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
+        found = f"{list(shares)} for {len(views)} files"
         raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
     total = sum(shares)
-    parts: list[Cycles] = []
-    status = np.zeros(0, np.uint8)
-    for path in paths:
-        with ResultStore.open(path) as store:
-            check_equal_weights(store.sampling, store.path)
-            if store.sampling["method"] in ("cases", "sweep"):
-                remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-                raise StoreError(str(Fault(str(path), "holds joints that are no sample of a production", remedy)))
-            errors, own = store.errors(slice(most)), store.status(slice(most))
-            if not parts:
-                first, status, sampling = errors, own, store.sampling
-                name, judged = store.study_name, of_text(store.study_text, str(path))
-            else:
-                _check_same_joints(path, errors, paths[0], first)
-                status = np.where(status == Status.OK, own, status)
-                name += f" + {store.study_name}"
-            parts.append(cycles(store, names, most))
-    whole = duty_cycle(parts, [share / total for share in shares])
-    skip = int(sampling["nominal_first"])
-    has_nominal = skip and status[0] == Status.OK
-    nominal = _rows(whole, slice(0, 1 if has_nominal else 0))
+    shares = [share / total for share in shares]
+    first = views[0]
+    for view in views:
+        view.check_sample(weighted=False)
+        if view is not first:
+            _check_same_joints(view, first)
+    parts = [_cycles_of(view, names, samples) for view in views]
+    # the nominal joint of a duty cycle has settled at all operating points, or it has no row
+    rows = slice(min(len(nominal.number) for _, nominal in parts))
+    status = first.status[:samples]
+    for view in views[1:]:
+        status = np.where(status == Status.OK, view.status[:samples], status)
     return Loading(
-        name, _rows(whole, slice(skip, None)), status[skip:], nominal, sampling["method"] == "random", judged
+        name=" + ".join(view.name for view in views),
+        cycles=cycles.duty_cycle([own for own, _ in parts], shares),
+        status=status,
+        nominal=cycles.duty_cycle([_rows(nominal, rows) for _, nominal in parts], shares),
+        iid=first.iid,
+        # the section alone, like limits: it is at hand even where the study refers to files that are not
+        settings=of_text(first.store.study_text, str(first.path)),
     )
+
+
+def _cycles_of(view: View, names: Sequence[str] | None, samples: int | None) -> tuple[Cycles, Cycles]:
+    """Cycles of the first samples, and of the nominal joint (no rows if there is none that settled)."""
+    n = view.n if samples is None else min(samples, view.n)
+    first, end = map(int, view.slots([0, n]))
+    whole = cycles_of(view.store, np.arange(end), names)  # the nominal joint, if the file has it, is before the samples
+    settled = int((view.nominal["status"] == Status.OK).sum())
+    return _rows(whole, slice(first, None)), _rows(whole, slice(settled))
 
 
 def _rows(whole: Cycles, rows: slice) -> Cycles:
     return whole._replace(ranges=whole.ranges[rows], means=whole.means[rows], number=whole.number[rows])
 
 
-def _check_same_joints(path: str | Path, errors: NDArray[np.void], other: str | Path, held: NDArray[np.void]) -> None:
+def _check_same_joints(view: View, first: View) -> None:
     names = [f.name for f in ERROR_FIELDS if not f.name.startswith("operation.")]
-    if len(errors) != len(held) or any(not np.array_equal(errors[name], held[name]) for name in names):
-        remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
-        raise InputError([Fault(str(path), f"does not hold the joints of {other}", remedy)])
+    if view.n == first.n and all(
+        np.array_equal(own[name], other[name])
+        for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
+        for name in names
+    ):
+        return
+    remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
+    raise InputError([Fault(str(view.path), f"does not hold the joints of {first.path}", remedy)])
 
 
-def _counted(store: ResultStore, n: int) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
-    """Yield blocks of file slots below `n` and their cycles, by name of `rainflow.SPECS`."""
-    held = store.history_specs
-    if not held:
-        remedy = 'set histories = "cycles" in [output] of the study and run it anew'
-        raise StoreError(str(Fault(str(store.path), "holds neither cycles nor load histories", remedy)))
-    for first in range(0, n, JOINTS_PER_READ):
-        rows = np.arange(first, min(first + JOINTS_PER_READ, n))
-        if "cycles" in held:
-            yield rows, {name: store.histories(name, rows) for name in rainflow.SPECS}
+def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confidence: float = 0.95) -> pd.DataFrame:
+    """Quantiles over the joints of the damage-equivalent loads.
+
+    Parameters
+    ----------
+    loading : Loading
+        Cycles of the joints.
+    shares : sequence of float
+        Shares of the joints at or below the quantile.
+    confidence : float
+        Confidence level of the intervals.
+
+    Returns
+    -------
+    DataFrame
+        One row per channel, exponent and share: ``channel``, ``unit``, ``m``, ``nominal``, ``lacking`` (upper bound of
+        the relative increase of the sum of S^m by cycles that the file does not hold, maximum over the joints), the
+        fields of `analysis.quantile.Quantile`, ``confidence``. Loads are ranges in SI units.
+    """
+    settings, rows = loading.settings, []
+    for m in settings.exponents:
+        values = damage.equivalent_load(loading.cycles, m, settings.revolutions, settings.reference_cycles)
+        nominal = damage.equivalent_load(loading.nominal, m, settings.revolutions, settings.reference_cycles)
+        lacking = damage.truncation_bound(loading.cycles, m)
+        for c, channel in enumerate(loading.cycles.channels):
+            head = {"channel": channel, "unit": CHANNELS[channel], "m": m, "nominal": _only(nominal[:, c])}
+            head["lacking"] = float(lacking[:, c].max(initial=0.0))
+            sample = exceedance.sort_out(values[:, c], loading.status)
+            for share in shares:
+                found = quantile.of_sample(sample, share, confidence, loading.iid)
+                rows.append({**head, **found._asdict(), "confidence": confidence})
+    return pd.DataFrame(rows)
+
+
+def damages(loading: Loading, confidence: float = 0.95) -> pd.DataFrame:
+    """Share of the joints whose damage sum in the service life exceeds 1, for each channel that has an S–N line.
+
+    Returns
+    -------
+    DataFrame
+        ``channel``, ``m``, ``S0`` (N or N m), ``N0``, ``nominal`` (damage of the nominal joint), ``median`` (of the
+        joints), the fields of `analysis.exceedance.Exceedance` for the level 1, ``confidence``.
+    """
+    rows = []
+    for channel, values in loading.settings.lines.items():
+        if channel not in loading.cycles.channels:
             continue
-        joints = [rainflow.count(load) for load in loads(store, rows)]
-        yield rows, {name: np.stack([joint[name] for joint in joints]) for name in rainflow.SPECS}
+        line = damage.Line(*values)
+        sums, nominal = (
+            damage.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
+            for part in (loading.cycles, loading.nominal)
+        )
+        head = {"channel": channel, **line._asdict(), "nominal": _only(nominal)}
+        head["median"] = quantile.at(sums, loading.status, 0.5).estimate
+        above = exceedance.at(sums, loading.status, 1.0, confidence, loading.iid)
+        rows.append({**head, **asdict(above), "confidence": confidence})
+    return pd.DataFrame(rows)
+
+
+def spectra(
+    loading: Loading,
+    channels: Sequence[str] | None = None,
+    shares: Sequence[float] = SHARES,
+    confidence: float = 0.95,
+) -> pd.DataFrame:
+    """Cumulative load spectra: quantiles over the joints of the range that a number of cycles reaches or exceeds.
+
+    Parameters
+    ----------
+    loading : Loading
+        Cycles of the joints.
+    channels : sequence of str, optional
+        Channels of ``loading.cycles``; by default all.
+    shares, confidence
+        As in `equivalent_loads`; the intervals are pointwise.
+
+    Returns
+    -------
+    DataFrame
+        One row per channel, share and number: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``, the
+        fields of `analysis.quantile.Quantile`, ``confidence``. Ranges in SI units, ascending numbers.
+    """
+    rows = []
+    for channel in loading.cycles.channels if channels is None else channels:
+        part = loading.cycles.of(channel)
+        numbers = _numbers(part)
+        values = cycles.spectrum(part, numbers)[:, 0]
+        nominal = cycles.spectrum(loading.nominal.of(channel), numbers)[:, 0]
+        samples = [exceedance.sort_out(own, loading.status) for own in values.T]
+        for share in shares:
+            for number, sample, own in zip(numbers, samples, nominal.T, strict=True):
+                head = {"channel": channel, "unit": CHANNELS[channel], "cycles": number * loading.settings.revolutions}
+                found = quantile.of_sample(sample, share, confidence, loading.iid)
+                rows.append({**head, "nominal": _only(own), **found._asdict(), "confidence": confidence})
+    return pd.DataFrame(rows)
+
+
+def most_loaded(table: pd.DataFrame) -> list[str]:
+    """Channel with the largest equivalent load for each bushing's force and torque, from `equivalent_loads`.
+
+    Evaluated at the middle exponent and the highest share. Moduli, whose cycles are not those of a component, are used
+    only if the table has nothing else. Empty if no joint has a valid result.
+    """
+    exponents = sorted(table["m"].unique())
+    part = _highest(table)
+    part = part[part["m"] == exponents[len(exponents) // 2]].dropna(subset="estimate")
+    components = part[part["channel"].str.contains("_")]
+    part = components if len(components) else part
+    kinds = part["channel"].str.split("_").str[0]
+    return [str(name) for name in part.loc[part.groupby(kinds, sort=False)["estimate"].idxmax(), "channel"]]
+
+
+def leading(table: pd.DataFrame) -> list[str]:
+    """Channel with the largest equivalent load for force and torque of the cross bushings and of the fork bushings.
+
+    Candidates are the channels `most_loaded` of the table; all exponents count.
+    """
+    part = _highest(table)
+    candidates = part[part["channel"].isin(most_loaded(table))].sort_values("estimate")
+    found = []
+    for group in ("cross", "fork"):
+        for letter in "FT":
+            here = candidates[candidates["channel"].str.match(rf"{group}\d\.{letter}")]
+            found += [str(here["channel"].iloc[-1])] if len(here) else []
+    return found
+
+
+def _highest(table: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the highest share of the joints."""
+    part: pd.DataFrame = table[table["share"] == table["share"].max()]
+    return part
+
+
+def _numbers(part: Cycles) -> FloatArray:
+    """Cycles per revolution at which the spectra of the joints have steps, thinned to `MAX_NUMBERS`."""
+    order = np.argsort(-part.ranges[:, 0], axis=1)
+    steps = np.cumsum(part.weights[order], axis=1)[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
+    numbers = np.unique(np.append(steps.round(9), 1.0))
+    thinned = np.linspace(0, numbers.size - 1, min(numbers.size, MAX_NUMBERS)).round().astype(int)
+    return np.asarray(numbers[thinned])
+
+
+def _only(values: FloatArray) -> float:
+    return float(values[0]) if values.size else np.nan

@@ -12,18 +12,17 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, exceedance, quantile
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import BUSHINGS, CHANNELS, Status
-from tolstat.store import ResultStore, revolutions
+from tolstat.common.tables import CHANNELS, Status
+from tolstat.store import revolutions
+from tolstat.store.view import View
 from tolstat.study.selection import Entry, quantity
 
 SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints at which quantiles of the time above are given."""
 POINTS = 60
 """Number of levels of a curve."""
-_COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 
 class TimeAbove(NamedTuple):
@@ -33,8 +32,8 @@ class TimeAbove(NamedTuple):
     ----------
     name : str
         Name of the study.
-    joints, lost : int
-        Joints with and without a valid revolution, those pending not counted.
+    joints, left_out : int
+        Joints with and without a settled revolution, those pending not counted.
     table : DataFrame
         One row per load and level, SI: ``load``, ``unit``, ``level``; ``joints_above`` (share of the joints that are
         above the level at any time), with ``_lower`` and ``_upper``; ``time`` (mean share of the revolution over the
@@ -46,13 +45,13 @@ class TimeAbove(NamedTuple):
 
     name: str
     joints: int
-    lost: int
+    left_out: int
     table: pd.DataFrame
     curves: pd.DataFrame
 
 
-def of_store(
-    store: ResultStore,
+def time_above(
+    view: View,
     by: Sequence[str] = (),
     levels: Sequence[str] = (),
     curves: bool = False,
@@ -62,8 +61,8 @@ def of_store(
 
     Parameters
     ----------
-    store : ResultStore
-        File of a campaign with histories, in full or as harmonics.
+    view : View
+        A campaign with load histories, in full or as harmonics.
     by : sequence of str
         Loads of bushings, `tables.CHANNELS`: ``cross1.F``, ``fork2.T_e``; by default those that have a limit.
     levels : sequence of str
@@ -75,64 +74,34 @@ def of_store(
 
     Returns
     -------
-    Duration
-        Table and curves.
+    TimeAbove
 
     Raises
     ------
     InputError
         With every fault of loads and levels.
     StoreError
-        When the file holds no histories, or no sample of a production, or no valid joint.
+        When the file holds no histories, joints that are no sample of a production, or no settled joint.
     """
-    check_equal_weights(store.sampling, store.path)
-    if store.sampling["method"] in ("cases", "sweep"):
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(store.path), "holds joints that are no sample of a production", remedy)))
-    asked = _asked(store, by, levels)
-    status = store.status()
-    if store.sampling["nominal_first"] and store.rows.start == 0:
-        status[0] = Status.PENDING  # the nominal joint is not part of the sample
-    counted = np.flatnonzero(status == Status.OK)
-    lost = int(np.sum(status != Status.PENDING)) - counted.size
-    if not counted.size:
-        raise StoreError(str(Fault(str(store.path), "has no joint with a valid revolution", "run the campaign on")))
-    iid = store.sampling["method"] == "random"
-    shares, ends = _shares(store, counted, asked)
-    rows = list(_rows(asked, shares, iid, confidence))
+    view.check_sample(weighted=False)
+    asked = _levels(view, by, levels)
+    settled = np.flatnonzero(view.status == Status.OK)
+    if not settled.size:
+        raise StoreError(str(Fault(str(view.path), "has no settled joint", "resume the campaign")))
+    shares, ends = _shares(view, settled, asked)
+    rows = list(_rows(asked, shares, view.iid, confidence))
     more: list[dict[str, Any]] = []
     if curves:
         spread = {name: np.linspace(*ends[name], POINTS) for name in asked}
-        more = list(_rows(spread, _shares(store, counted, spread)[0], iid, confidence))
-    return TimeAbove(store.study_name, counted.size, lost, pd.DataFrame(rows), pd.DataFrame(more))
+        more = list(_rows(spread, _shares(view, settled, spread)[0], view.iid, confidence))
+    left_out = view.counts.done - settled.size
+    return TimeAbove(view.name, settled.size, left_out, pd.DataFrame(rows), pd.DataFrame(more))
 
 
-def channel(loads: NDArray[Any], name: str) -> FloatArray:
-    """One load of joints over a revolution.
-
-    Parameters
-    ----------
-    loads : ndarray, shape (n, samples, 8, 6)
-        As `revolutions.loads` returns them.
-    name : str
-        One of `tables.CHANNELS`.
-
-    Returns
-    -------
-    ndarray, shape (n, samples)
-        A component, or the modulus of force or torque; N or N m.
-    """
-    bushing, _, load = name.partition(".")
-    own = loads[:, :, BUSHINGS.index(bushing)].astype(float)
-    if load in _COMPONENTS:
-        return np.asarray(own[..., _COMPONENTS.index(load)])
-    return np.asarray(np.linalg.norm(own[..., :3] if load == "F" else own[..., 3:], axis=-1))
-
-
-def _asked(store: ResultStore, by: Sequence[str], levels: Sequence[str]) -> dict[str, FloatArray]:
-    """Levels of each load, SI."""
+def _levels(view: View, by: Sequence[str], levels: Sequence[str]) -> dict[str, FloatArray]:
+    """Levels of each load that is asked for, SI."""
     faults: list[Fault] = []
-    names = list(by) or [name for name in store.limits if name in CHANNELS]
+    names = list(by) or [name for name in view.limits if name in CHANNELS]
     if not names:
         faults.append(Fault("--by", "the study limits no load of a bushing", "name one: --by cross1.F"))
     faults += [
@@ -148,7 +117,7 @@ def _asked(store: ResultStore, by: Sequence[str], levels: Sequence[str]) -> dict
             given[unit].append(value)
     found = {}
     for name in (name for name in names if name in CHANNELS):
-        own = given[CHANNELS[name]] or ([] if levels or name not in store.limits else [store.limits[name]])
+        own = given[CHANNELS[name]] or ([] if levels or name not in view.limits else [view.limits[name]])
         if not own and not faults:
             faults.append(Fault("--level", f"{name} has neither a level nor a limit", 'give one: --level "700 N"'))
         found[name] = np.array(own, dtype=float)
@@ -167,18 +136,19 @@ def _level(text: str, units: Sequence[str]) -> tuple[str, float]:
 
 
 def _shares(
-    store: ResultStore, rows: NDArray[np.intp], levels: Mapping[str, FloatArray]
+    view: View, samples: NDArray[np.intp], levels: Mapping[str, FloatArray]
 ) -> tuple[dict[str, FloatArray], dict[str, tuple[float, float]]]:
-    """Share of the revolution above each level, (n, levels), and least and largest value, of each load."""
-    shares = {name: np.empty((len(rows), len(own))) for name, own in levels.items()}
+    """Share of the revolution above each level, (m, levels), and smallest and largest value, of each load."""
+    shares = {name: np.empty((len(samples), len(own))) for name, own in levels.items()}
     ends = dict.fromkeys(levels, (np.inf, -np.inf))
-    for begin in range(0, len(rows), revolutions.JOINTS_PER_READ):
-        block = revolutions.loads(store, rows[begin : begin + revolutions.JOINTS_PER_READ])
+    slots = view.slots(samples)
+    for part in revolutions.blocks(len(slots)):
+        loads = revolutions.loads(view.store, slots[part])
         for name, own in levels.items():
-            load = channel(block, name)
+            load = revolutions.channel(loads, name)
             ends[name] = min(ends[name][0], float(load.min())), max(ends[name][1], float(load.max()))
             for k, level in enumerate(own):
-                shares[name][begin : begin + len(load), k] = cycles.share_of_revolution_above(load, float(level))
+                shares[name][part, k] = cycles.share_of_revolution_above(load, float(level))
     return shares, ends
 
 
@@ -188,15 +158,15 @@ def _rows(
     """One row per load and level, as in `TimeAbove`."""
     for name, own in levels.items():
         for level, time in zip(own, shares[name].T, strict=True):
-            every = np.full(time.size, int(Status.OK))
-            above = exceedance.at(time, every, 0.0, confidence, iid)
+            sample = exceedance.sort_out(time, np.full(time.size, int(Status.OK)))
+            above = exceedance.curve_of(sample, [0.0], confidence, iid)[0]
             row = {"load": name, "unit": CHANNELS[name], "level": float(level)}
-            row |= _ends("joints_above", above.estimate, above.lower, above.upper)
+            row |= _ends("joints_above", *(float(above[name]) for name in ("estimate", "lower", "upper")))
             # a variable in [0, 1] has at most the variance of a Bernoulli variable with the same mean
             mean = exceedance.clopper_pearson(time.sum(), time.size, confidence) if iid else (np.nan, np.nan)
             row |= _ends("time", float(time.mean()), *map(float, mean))
             for share in SHARES:
-                q = quantile.at(time, every, share, confidence, iid)
+                q = quantile.of_sample(sample, share, confidence, iid)
                 lower, upper = np.clip([q.lower, q.upper], 0.0, 1.0)
                 row |= _ends(f"time_{100 * share:g}", q.estimate, lower, upper)
             yield row

@@ -1,11 +1,11 @@
-"""Time above levels within a revolution: text, CSV and picture."""
+"""Time above levels within a revolution: table, CSV and picture."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -13,14 +13,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tolstat.display import style
-from tolstat.display.text import UNITS, align, csv
+from tolstat.display.table import Column, Row
+from tolstat.display.text import UNITS, csv
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tolstat.questions.time_above.query import TimeAbove
 
-COLUMNS = 4
+MAX_LOADS = 4
 """Maximum number of loads in the picture."""
 _LINES = {
     "time": "mean joint",
@@ -30,20 +31,29 @@ _LINES = {
 }
 
 
-def text(found: TimeAbove) -> str:
-    """Table of `Duration.table`, shares in per cent."""
-    rows = [
-        ["load > level", "joints above it at any time", "time above it: mean", "median", "90 % below", "99 % below"]
-    ]
-    for row in found.table.to_dict("records"):
-        level = f"{row['load']} > {row['level']:g} {UNITS.get(row['unit'], row['unit'])}"
-        rows.append([level, _share(row, "joints_above"), *(_share(row, name) for name in _LINES)])
-    return align(rows)
+def _share(name: str) -> Callable[[Row], str]:
+    def cell(row: Row) -> str:
+        own, low, high = (100.0 * row[name + end] for end in ("", "_lower", "_upper"))
+        return f"{own:.3g}" if math.isnan(low) else f"{own:.3g} ({low:.3g} .. {high:.3g}) %"
+
+    return cell
+
+
+LEVELS = (
+    Column("load > level", lambda row: f"{row['load']} > {row['level']:g} {UNITS.get(row['unit'], row['unit'])}"),
+    Column("joints above it at any time", _share("joints_above")),
+    Column("time above it: mean", _share("time")),
+    Column("median", _share("time_50")),
+    Column("90 % below", _share("time_90")),
+    Column("99 % below", _share("time_99")),
+)
+"""Columns of the table `TimeAbove.table`; shares in per cent."""
 
 
 def note(found: TimeAbove) -> str:
     """Notes to the table: number of joints, restrictions."""
-    lines = [f"{found.joints} joints, {found.lost} without a valid revolution left out; time: share of a revolution"]
+    counts = f"{found.joints} joints, {found.left_out} without a settled revolution left out"
+    lines = [f"{counts}; time: share of a revolution"]
     if found.table["time_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only")
     return "\n".join(lines)
@@ -54,7 +64,7 @@ def write(found: TimeAbove, stem: Path) -> list[Path]:
 
     Parameters
     ----------
-    found : Duration
+    found : TimeAbove
         Result with curves.
     stem : Path
         Folder, and beginning of all file names.
@@ -69,8 +79,8 @@ def write(found: TimeAbove, stem: Path) -> list[Path]:
 
 
 def figure(found: TimeAbove) -> Figure:
-    """Draw the curves of at most `COLUMNS` loads: share of the joints (upper row), share of the revolution (lower)."""
-    loads = list(dict.fromkeys(found.curves["load"]))[:COLUMNS]
+    """Draw the curves of at most `MAX_LOADS` loads: share of the joints (upper row), of the revolution (lower)."""
+    loads = list(dict.fromkeys(found.curves["load"]))[:MAX_LOADS]
     with style.settings():
         page = Figure(figsize=(max(4.2 * len(loads), 6.5), 6.6))
         axes = page.subplots(2, len(loads), squeeze=False, sharex="col", sharey="row")
@@ -102,8 +112,3 @@ def _curve(ax: Axes, part: pd.DataFrame, name: str, colour: str, dash: style.Das
         ax.fill_between(
             part["level"], 100.0 * part[f"{name}_lower"], 100.0 * part[f"{name}_upper"], color=colour, alpha=0.2, lw=0
         )
-
-
-def _share(row: Mapping[Any, Any], name: str) -> str:
-    own, low, high = (100.0 * row[name + end] for end in ("", "_lower", "_upper"))
-    return f"{own:.3g}" if math.isnan(low) else f"{own:.3g} ({low:.3g} .. {high:.3g}) %"

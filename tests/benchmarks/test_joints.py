@@ -1,0 +1,43 @@
+"""Joints that are measured are those of the study."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.conftest import REFERENCE
+from tolstat import joint, sampling, study
+from tolstat.benchmarks.joints import choose, parameters
+
+STUDIES = REFERENCE.parents[1] / "studies"
+
+
+@pytest.mark.parametrize("method", ["random", "lhs"])
+def test_any_rows_are_those_of_the_campaign(method, tmp_path):
+    text = (STUDIES / "iso2768_f.toml").read_text(encoding="utf-8")
+    path = tmp_path / "study.toml"
+    path.write_text(text.replace('method = "random"', f'method = "{method}"'), encoding="utf-8")
+    base = study.load(path)
+    assert base.sampling.method == method
+    rows = np.array([7, 0, 3])
+    expected = joint.perturb(base.joint, sampling.draw(base)[rows])
+    assert parameters(base, rows).tobytes() == expected.tobytes()
+
+
+def test_each_joint_of_a_family_has_its_own_variant():
+    base = study.load(STUDIES / "cirelli2021" / "cirelli2021.toml")
+    rows = np.arange(0, base.rows, base.rows // 50)
+    assert len(base.joints) > 1
+    assert len(np.unique(parameters(base, rows)["alpha"])) > 1
+
+
+def test_chosen_joints_are_nominal_and_random_ones_then_a_block():
+    base = study.load(STUDIES / "iso2768_f.toml")
+    params, count = choose(base, 6, 4, 64)
+    assert (len(params), count) == (64, 7)
+    nominal = joint.perturb(base.joint, joint.nominal_errors(1, base.operation))
+    assert params[:1].tobytes() == nominal.tobytes()
+    assert len(np.unique(params["pin_axis"], axis=0)) == len(params)
+    few, count = choose(base, 6, 4, 1)
+    assert (len(few), count) == (7, 7)
+    assert few.tobytes() == params[:7].tobytes()

@@ -1,0 +1,117 @@
+"""Speed against error: jobs of a comparison, faults of its file, files of the command."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from tests.benchmarks.test_points import RUNS
+from tests.conftest import REFERENCE
+from tests.report.test_report import overlapping, texts
+from tolstat import cli
+from tolstat.benchmarks import points, runs
+from tolstat.benchmarks.joints import choose
+from tolstat.benchmarks.precision import page, setup
+from tolstat.benchmarks.precision.jobs import jobs
+from tolstat.common.errors import InputError
+
+STUDY = REFERENCE.parents[1] / "studies" / "precision.toml"
+
+
+@pytest.fixture(autouse=True)
+def _setups_may_name_cvode(monkeypatch):
+    """Setups can be read and drawn where scikit-sundae is not installed."""
+    monkeypatch.setattr(setup, "has_cvode", lambda: True)
+
+
+def test_jobs_cover_every_contender_joint_and_setting():
+    asked, base = setup.load(STUDY)
+    params, count = choose(base, asked.joints, asked.seed, asked.tolstat.block)
+    todo = list(jobs(asked, base))
+    assert len(todo) == count * (1 + 8 + 5) + 1
+    by_name = {job.contender: job for job in todo}
+    assert list(by_name)[-6:] == [
+        *("BDF2", "generalised-α", "TR-BDF2", "quasistatic", "ideal joint", "BDF2, 64 joints at once")
+    ]
+    assert len(by_name["quasistatic"].options) == len(asked.tolstat.steps_per_rev)
+    assert {o.fidelity for o in by_name["quasistatic"].options} == {1}
+    assert {o.method for o in by_name["TR-BDF2"].options} == {2}
+    assert len(by_name["BDF2, 64 joints at once"].params) == 64
+    assert by_name["Radau"].params.tobytes() == params[count - 1 : count].tobytes()
+
+
+def test_every_fault_of_a_setup_is_told(tmp_path):
+    text = STUDY.read_text(encoding="utf-8").replace('"iso2768_f.toml"', f'"{STUDY.parent / "iso2768_f.toml"}"')
+    path = tmp_path / "setup.toml"
+    path.write_text(text.replace('"bdf2"', '"bdf3"').replace("limit = 10.0", "limit = -1").replace("seed", "sed"))
+    with pytest.raises(InputError) as caught:
+        setup.load(path)
+    told = str(caught.value)
+    for place in ("tolstat.methods[0]", "others.limit", "sed: unknown key", "seed: missing key"):
+        assert place in told
+    path.write_text(text.replace("joints = 6 ", "joints = 39").replace("iso2768_f.toml", "clearance.toml"))
+    with pytest.raises(InputError, match="39 of the 38 joints"):
+        setup.load(path)
+    path.write_text(text.replace("iso2768_f.toml", "cirelli2021/cirelli2021.toml"))
+    with pytest.raises(InputError, match="lists its joints"):
+        setup.load(path)
+
+
+def test_cvode_that_is_not_installed_is_an_input_fault(monkeypatch):
+    monkeypatch.setattr(setup, "has_cvode", lambda: False)
+    with pytest.raises(InputError, match=r"scikit-sundae(.|\n)*bench"):
+        setup.load(STUDY)
+
+
+def command(monkeypatch, *arguments):
+    monkeypatch.setattr(runs, "run", lambda jobs, say: RUNS)
+    return CliRunner().invoke(cli.app, ["bench", "precision", str(STUDY), "--quick", *map(str, arguments)])
+
+
+def test_command_writes_page_table_and_figure(tmp_path, monkeypatch):
+    readme = tmp_path / "README.md"
+    readme.write_text("before\n<!-- precision -->old<!-- end of precision -->\nafter\n", encoding="utf-8")
+    done = command(monkeypatch, "--out", tmp_path / "new", "--into", readme)
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.splitlines()[1].split() == ["0.01", "A", "2", "Radau,", "our", "Jacobian", "50", "25"]
+    names = {path.name for path in (tmp_path / "new").iterdir()}
+    assert names == {f"precision.{ending}" for ending in ("md", "csv", "png", "svg")}
+    assert len(pd.read_csv(tmp_path / "new" / "precision.csv")) == 4
+    text = (tmp_path / "new" / "precision.md").read_text(encoding="utf-8")
+    assert "| A | 36 | 0 | 0 | 2 | 2e-03 |" in text
+    assert "| 1e-04 | – | – | – | – | – |" in text
+    assert "1e-06" not in text.partition("## All points")[0]  # the truth itself is no better than 1e-5
+    short = readme.read_text(encoding="utf-8")
+    assert "| 0.01 | A | 2 | Radau, our Jacobian | 50 | 25 | – |" in short
+    assert "old" not in short
+    assert short.startswith("before\n<!-- precision")
+    assert short.endswith("-->\nafter\n")
+
+
+def test_nothing_is_measured_for_a_page_without_a_place(tmp_path, monkeypatch):
+    bare = tmp_path / "bare.md"
+    bare.write_text("no marks", encoding="utf-8")
+    for path in (bare, tmp_path / "none.md"):
+        done = command(monkeypatch, "--out", tmp_path / "new", "--into", path)
+        assert done.exit_code == 2
+        assert "hint" in done.stderr
+    assert not (tmp_path / "new").exists()
+
+
+def test_figure_marks_failures_and_halvings_and_says_units():
+    figure = page.figure(*points.build(RUNS), "made up")
+    assert len(figure.axes) == 3
+    assert {ax.get_xscale() for ax in figure.axes} | {ax.get_yscale() for ax in figure.axes} == {"log"}
+    said = texts(figure)
+    assert said.count("core time a joint [ms]") == 3
+    assert {"tolstat A", "the truth's own error", "36", "180"} <= set(said)
+    assert overlapping(figure) == []
+    main = figure.axes[0]
+    rings = [line for line in main.lines if line.get_marker() == "o" and line.get_markerfacecolor() == "none"]
+    assert [list(line.get_xdata()) for line in rings if len(line.get_xdata())] == [[2.0]]
+    crosses = [line for line in main.lines if line.get_marker() == "x" and len(line.get_xdata())]
+    assert [(list(line.get_xdata()), list(line.get_ydata())) for line in crosses] == [
+        ([50.0], [pytest.approx(1e-4)]),
+        ([900.0], [2.0]),
+    ]

@@ -1,0 +1,138 @@
+"""The documents: links and anchors resolve, every page is in the index, every question has a page, examples run."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+import tolstat
+from tests.support.environment import ROOT
+
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
+QUESTIONS = sorted(
+    folder.name for folder in (ROOT / "tolstat" / "questions").iterdir() if (folder / "__init__.py").exists()
+)
+PARTS = ["Intervals", "From Python", "On the page", "Limits of validity"]
+"""Headings that each page of a question has, after its commands."""
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\]\(([^()\s]+)\)")
+SMALL = 'histories = "harmonics+cycles"\n\n[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 36\n\n[sampling]'
+
+
+def name(path: Path) -> str:
+    """Path of a page from the root of the checkout."""
+    return path.relative_to(ROOT).as_posix()
+
+
+def plain(text: str) -> str:
+    """Text of a page without blocks of code and code within lines."""
+    return re.sub(r"`[^`\n]*`", "", FENCE.sub("", text))
+
+
+def anchors(text: str) -> set[str]:
+    """Anchors of the headings of a page, as GitHub makes them."""
+    found: dict[str, int] = {}
+    for heading in re.findall(r"^#+ (.*)$", FENCE.sub("", text), flags=re.MULTILINE):
+        title = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading)
+        slug = re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-")
+        found[slug] = found.get(slug, -1) + 1
+        if found[slug]:
+            found[f"{slug}-{found[slug]}"] = 0
+    return set(found)
+
+
+def blocks(path: Path, language: str) -> list[str]:
+    """Blocks of code of a page in one language."""
+    return [code for kind, code in FENCE.findall(path.read_text(encoding="utf-8")) if kind == language]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name)
+def test_links_resolve(path: Path) -> None:
+    missing = []
+    for link in LINK.findall(plain(path.read_text(encoding="utf-8"))):
+        if re.match(r"\w+:", link):
+            continue
+        file, _, anchor = link.partition("#")
+        target = (path.parent / file).resolve() if file else path
+        if not target.exists() or (anchor and anchor not in anchors(target.read_text(encoding="utf-8"))):
+            missing.append(link)
+    assert missing == []
+
+
+def test_anchors_are_those_of_headings() -> None:
+    page = "# One `two` – (three)\n\n```sh\n# no heading\n```\n\n## A [link](b.md)\n## A link\n"
+    assert anchors(page) == {"one-two--three", "a-link", "a-link-1"}
+
+
+def test_pages_that_code_and_studies_name_are_there() -> None:
+    files = [path for folder in ("tolstat", "tests", "studies") for path in (ROOT / folder).rglob("*.*")]
+    texts = {path: path.read_text(encoding="utf-8") for path in files if path.suffix in (".py", ".toml")}
+    named = {(path, page) for path, text in texts.items() for page in re.findall(r"docs/[\w/]+\.md", text)}
+    assert [f"{name(path)}: {page}" for path, page in named if not (ROOT / page).exists()] == []
+
+
+def test_every_page_is_in_the_index() -> None:
+    listed = {
+        (DOCS / link.partition("#")[0]).resolve() for link in LINK.findall((DOCS / "index.md").read_text("utf-8"))
+    }
+    assert [name(path) for path in DOCS.rglob("*.md") if path.name != "index.md" and path not in listed] == []
+
+
+def test_every_question_has_a_page() -> None:
+    assert sorted(path.stem for path in (DOCS / "questions").glob("*.md")) == QUESTIONS
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_page_of_a_question_has_all_parts(question: str) -> None:
+    text = FENCE.sub("", (DOCS / "questions" / f"{question}.md").read_text(encoding="utf-8"))
+    headings = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
+    assert headings[0].startswith("Command")
+    assert [heading for heading in headings if heading in PARTS] == PARTS
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "notes").glob("*.md")), ids=name)
+def test_a_note_says_that_it_is_a_record(path: Path) -> None:
+    assert path.read_text(encoding="utf-8").startswith("Record of ")
+
+
+def test_blocks_of_the_study_make_a_study(tmp_path: Path) -> None:
+    study = tmp_path / "study.toml"
+    joint = '[joint]\nbase = "cirelli2021"\n\n[operation]\nalpha = "15 deg"\nspeed = "500 rpm"\ntorque = "100 N*m"\n'
+    study.write_text("\n".join([joint, *blocks(DOCS / "tolerances.md", "toml")]), encoding="utf-8")
+    assert tolstat.load(study).limits["cross1.F"] == 1500.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the study and the files that the examples name, of few joints at each fidelity's cheapest."""
+    made = tmp_path_factory.mktemp("examples")
+    text = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8").replace("n = 1024", "n = 600")
+    text = text.replace("[sampling]", f"[output]\n{SMALL}")
+    (made / "studies").mkdir()
+    (made / "studies" / "iso2768_f.toml").write_text(text, encoding="utf-8")
+    (made / "narrow.toml").write_text(
+        text.replace(
+            'upper = "0.030 mm", distribution = "normal", cpk = 1.0', 'upper = "0.030 mm", distribution = "uniform"'
+        )
+    )
+    tolstat.run(tolstat.load(made / "studies" / "iso2768_f.toml"), made / "iso2768_f.h5", workers=1)
+    tolstat.run(tolstat.load(made / "narrow.toml"), made / "narrow.h5", workers=1)
+    shutil.copy(made / "iso2768_f.h5", made / "histories.h5")
+    return made
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "path", [ROOT / "README.md", DOCS / "python.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name
+)
+def test_examples_run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    names: dict[str, object] = {}
+    ran = [code for code in blocks(path, "python") if "pylife." not in code]  # pyLife is an optional package
+    for code in ran:
+        exec(code, names)
+    assert ran

@@ -1,0 +1,177 @@
+"""Integrators of scipy and SUNDIALS on the compiled right-hand side of a joint.
+
+The task is that of tolstat's solver: from its initial equilibrium, which these integrators get at no cost, over a given
+number of revolutions to the largest loads of the last one. A call of the right-hand side from Python costs little more
+than its arithmetic (`kernel.simd.jit.compiled_entry`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.solver.reference import SAMPLES_PER_REV, FirstOrder, Largest
+
+FloatArray = NDArray[np.float64]
+Code = Literal["Radau", "BDF", "LSODA", "CVODE"]
+Outcome = Literal["ok", "failed", "over_time"]
+
+MAX_STEPS = 10**9
+"""Step limit of CVODE, whose default is 500; here the CPU time limits its work."""
+
+
+class Integrator(NamedTuple):
+    """An integrator and how it is used.
+
+    Attributes
+    ----------
+    code : {"Radau", "BDF", "LSODA", "CVODE"}
+        The first three from scipy, CVODE (BDF, dense linear algebra) from SUNDIALS through scikit-sundae.
+    jacobian : bool
+        Whether it gets the compiled Jacobian; else it uses finite differences.
+    """
+
+    code: Code
+    jacobian: bool
+
+    def __str__(self) -> str:
+        return f"{self.code}, our Jacobian" if self.jacobian else self.code
+
+
+class Solution(NamedTuple):
+    """Outcome of a run.
+
+    Attributes
+    ----------
+    outcome : {"ok", "failed", "over_time"}
+        ``failed``: the integrator gave up; ``over_time``: it was stopped at the limit.
+    largest : Largest or None
+        Largest loads of the last revolution.
+    seconds : float
+        CPU time.
+    rates, jacobians : int
+        Calls of the right-hand side and of the compiled Jacobian.
+    """
+
+    outcome: Outcome
+    largest: Largest | None
+    seconds: float
+    rates: int
+    jacobians: int
+
+
+class _OverTimeError(Exception):
+    """Raised in a right-hand side to stop the integrator that called it."""
+
+
+class _Counted:
+    """Right-hand side and Jacobian that count their calls and end a run that takes too long."""
+
+    def __init__(self, system: FirstOrder, limit: float) -> None:
+        self._system = system
+        self._end = time.process_time() + limit
+        self.rates = self.jacobians = 0
+
+    def rate(self, t: float, y: FloatArray) -> FloatArray:
+        self.rates += 1
+        if self.rates % 256 == 0 and time.process_time() > self._end:
+            raise _OverTimeError
+        return self._system.rate(t, y)
+
+    def jacobian(self, t: float, y: FloatArray) -> FloatArray:
+        self.jacobians += 1
+        return self._system.jacobian(t, y)
+
+
+def both_ways(codes: Sequence[Code]) -> list[Integrator]:
+    """Each of `codes` with a Jacobian from finite differences, and with the compiled one."""
+    return [Integrator(code, jacobian) for code in codes for jacobian in (False, True)]
+
+
+def has_cvode() -> bool:
+    """Whether scikit-sundae, which CVODE needs, is installed."""
+    return find_spec("sksundae") is not None
+
+
+def solve(
+    system: FirstOrder,
+    integrator: Integrator,
+    rtol: float,
+    revolutions: int,
+    limit: float,
+    angles: int = SAMPLES_PER_REV,
+) -> Solution:
+    """Integrate a joint and find the largest loads of the last revolution.
+
+    Parameters
+    ----------
+    system : FirstOrder
+        The joint and the state to begin from, see `reference.first_order`.
+    integrator : Integrator
+        The integrator.
+    rtol : float
+        Relative tolerance; the absolute one is `rtol` times ``system.scale``.
+    revolutions : int
+        Number of revolutions to integrate.
+    limit : float
+        CPU time (s) after which the run is stopped.
+    angles : int
+        Number of angles of the last revolution at which loads are evaluated, by the integrator's own interpolation.
+
+    Returns
+    -------
+    Solution
+    """
+    run: Callable[..., FloatArray | None] = _cvode if integrator.code == "CVODE" else _scipy
+    last = revolutions - 1 + np.arange(1, angles + 1) / angles
+    times = system.t0 + system.period * last
+    counted = _Counted(system, limit)
+    settings = {"rtol": rtol, "atol": rtol * system.scale}
+    begin = time.process_time()
+    outcome: Outcome = "failed"
+    largest = None
+    try:
+        states = run(system, integrator, counted, times, settings)
+    except _OverTimeError:
+        outcome = "over_time"
+    else:
+        if states is not None and np.isfinite(states).all():
+            outcome, largest = "ok", system.largest(times, states)
+    return Solution(outcome, largest, time.process_time() - begin, counted.rates, counted.jacobians)
+
+
+def _scipy(
+    system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
+) -> FloatArray | None:
+    """States at `times`, (m, 110); None where the integrator gives up."""
+    from scipy.integrate import solve_ivp
+
+    if integrator.jacobian:
+        settings = settings | {"jac": counted.jacobian}
+    span = (system.t0, times[-1])
+    method: Any = integrator.code
+    found = solve_ivp(counted.rate, span, system.y0, method, t_eval=times, **settings)
+    return np.ascontiguousarray(found.y.T) if found.success else None
+
+
+def _cvode(
+    system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
+) -> FloatArray | None:
+    """As `_scipy`."""
+    from sksundae.cvode import CVODE
+
+    def rate(t: float, y: FloatArray, out: FloatArray) -> None:
+        out[:] = counted.rate(t, y)
+
+    def jacobian(t: float, y: FloatArray, _: FloatArray, out: FloatArray) -> None:
+        out[:] = counted.jacobian(t, y)
+
+    if integrator.jacobian:
+        settings = settings | {"jacfn": jacobian}
+    found = CVODE(rate, max_num_steps=MAX_STEPS, **settings).solve(np.concatenate([[system.t0], times]), system.y0)
+    return np.ascontiguousarray(found.y[1:]) if found.success else None

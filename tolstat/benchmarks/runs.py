@@ -1,0 +1,197 @@
+"""Jobs that measure integrators on joints in worker processes, and the runs that they return.
+
+A job is one contender (tolstat with one method and fidelity, or another integrator) with all its settings, on one joint
+or one block of joints. Times are CPU times of a process with one thread, without compilation, loading and preparation.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from tolstat.benchmarks.integrators import Integrator, Outcome, solve
+from tolstat.benchmarks.joints import Params
+from tolstat.benchmarks.timing import in_turn
+from tolstat.campaign.executors import Lost, Work, available_workers, map_in_processes
+from tolstat.common.tables import SIMULATED, Options, Status
+from tolstat.solver.reference import FirstOrder, Largest, first_order, reference_rows
+from tolstat.solver.simulation import simulate_rows, warm_up
+
+TRUTH = "truth"
+"""Name of the reference solution among the contenders."""
+
+
+class Run(NamedTuple):
+    """One contender at one setting on one joint.
+
+    Attributes
+    ----------
+    contender : str
+        Its name; `TRUTH` with a setting of 0 for the reference solution, and of 1 for one with a looser tolerance.
+    ours : bool
+        Whether it is tolstat.
+    setting : float
+        Steps a revolution, or relative tolerance.
+    joint : int
+        Place among the joints that are compared.
+    outcome : {"ok", "failed", "over_time"}
+        ``over_time`` also for a run that was skipped because a looser tolerance took too long.
+    seconds : float
+        CPU time of the joint.
+    largest : Largest or None
+        Largest loads computed.
+    halvings, rates : int
+        Steps that tolstat halved; calls of the right-hand side by another integrator.
+    """
+
+    contender: str
+    ours: bool
+    setting: float
+    joint: int
+    outcome: Outcome
+    seconds: float
+    largest: Largest | None
+    halvings: int = 0
+    rates: int = 0
+
+
+class OwnJob(NamedTuple):
+    """Tolstat at several settings on a joint or a block of joints, of which the first `measured` are compared."""
+
+    contender: str
+    options: tuple[Options, ...]
+    params: Params
+    joint: int
+    repeats: int
+    measured: int
+
+    def runs(self) -> list[Run]:
+        """Time all settings in turn, `repeats` times each; the median counts."""
+        tasks = {str(k): partial(simulate_rows, self.params, options) for k, options in enumerate(self.options)}
+        times = in_turn(tasks, self.repeats)
+        runs = []
+        for name, options in zip(tasks, self.options, strict=True):
+            seconds, setting = times.typical(name) / len(self.params), float(options.steps_per_rev)
+            for i, row in enumerate(times.returned[name].results[: self.measured]):
+                largest = largest_of(row)
+                outcome: Outcome = "failed" if largest is None else "ok"
+                halvings = int(row["halvings"])
+                runs.append(Run(self.contender, True, setting, self.joint + i, outcome, seconds, largest, halvings))
+        return runs
+
+
+class OtherJob(NamedTuple):
+    """Another integrator at several tolerances, loosest first."""
+
+    contender: str
+    integrator: Integrator
+    rtols: tuple[float, ...]
+    params: Params
+    options: Options
+    joint: int
+    revolutions: int
+    limit: float
+
+    def runs(self) -> list[Run]:
+        """Integrate at each tolerance; after a run that takes too long, skip the tighter ones."""
+        system = first_order(self.params, self.options, from_start=True)
+        prepare(system)
+        solve(system, self.integrator, 0.1, 1, 1e-3)  # loads the integrator
+        runs = []
+        outcome: Outcome = "ok"
+        for rtol in self.rtols:
+            seconds, largest, rates = self.limit, None, 0
+            if outcome != "over_time":
+                outcome, largest, seconds, rates, _ = solve(system, self.integrator, rtol, self.revolutions, self.limit)
+            runs.append(Run(self.contender, False, rtol, self.joint, outcome, seconds, largest, rates=rates))
+        return runs
+
+
+class TruthJob(NamedTuple):
+    """The reference solution at two tolerances; the tighter one has no result where the largest loads do not repeat."""
+
+    contender: str
+    rtols: tuple[float, float]
+    params: Params
+    options: Options
+    joint: int
+
+    def runs(self) -> list[Run]:
+        """Integrate at both tolerances."""
+        runs = []
+        for k, rtol in enumerate(self.rtols):
+            begin = time.process_time()
+            row = reference_rows(self.params, self.options, rtol)[0]
+            largest = None if k == 0 and not row["settled"] else largest_of(row)
+            outcome: Outcome = "failed" if largest is None else "ok"
+            runs.append(Run(self.contender, False, float(k), self.joint, outcome, time.process_time() - begin, largest))
+        return runs
+
+
+Job = OwnJob | OtherJob | TruthJob
+
+
+def largest_of(row: np.void) -> Largest | None:
+    """Largest loads of a row of RESULT; None where it has none."""
+    if Status(row["status"]) not in SIMULATED:
+        return None
+    return Largest(row["F_max"].copy(), row["T_max"].copy(), row["contact_max"].copy(), float(row["psi_max"]))
+
+
+def prepare(system: FirstOrder) -> None:
+    """Call a system's functions once, so that no run includes the cost of first calls."""
+    system.rate(system.t0, system.y0)
+    system.jacobian(system.t0, system.y0)
+    system.largest(np.full(1, system.t0), system.y0[None])
+
+
+def run(jobs: Sequence[Job], say: Callable[[str], None]) -> list[Run]:
+    """Run all jobs in worker processes, one a core.
+
+    The kernels are compiled beforehand in this process: two processes that compile at once could corrupt the cache.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+        The jobs, those that take longest first, with a `TruthJob` for each joint.
+    say : callable
+        Called with progress messages, and with each job whose process died.
+
+    Returns
+    -------
+    list of Run
+        Those of tolstat first; each contender's in the order of its settings.
+    """
+    warm_up()
+    truth = next(job for job in jobs if isinstance(job, TruthJob))
+    prepare(first_order(truth.params, truth.options, from_start=True))
+    places = {job.contender: place for place, job in enumerate(jobs)}
+    runs: list[Run] = []
+    with closing(map_in_processes(Work(_work), jobs, available_workers())) as finished:
+        for done, (job, found) in enumerate(finished, 1):
+            if isinstance(found, Lost):
+                say(f"{job.contender} on joint {job.joint}: {found.reason}")
+            runs += failures(job) if isinstance(found, Lost) else found
+            if done % max(1, len(jobs) // 10) == 0:
+                say(f"{done} of {len(jobs)} jobs done")
+    return sorted(runs, key=lambda r: (not r.ours, places[r.contender], r.joint))
+
+
+def _work(job: Job) -> list[Run]:
+    return job.runs()
+
+
+def failures(job: Job) -> list[Run]:
+    """Runs of a job whose process died."""
+    settings: Sequence[float]
+    if isinstance(job, OwnJob):
+        settings = [float(options.steps_per_rev) for options in job.options]
+    else:
+        settings = job.rtols if isinstance(job, OtherJob) else (0.0, 1.0)
+    ours = isinstance(job, OwnJob)
+    return [Run(job.contender, ours, setting, job.joint, "failed", np.nan, None) for setting in settings]

@@ -1,1 +1,0 @@
-"""Work and precision: core time against error of the solver and of what else could solve the same joints."""

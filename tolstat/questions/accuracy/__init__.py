@@ -1,0 +1,1 @@
+"""Numerical error of the loads."""

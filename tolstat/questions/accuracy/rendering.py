@@ -1,0 +1,63 @@
+"""Numerical error of the loads as text: the table of errors, and sentences on how they were determined."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tolstat.analysis.accuracy import FIDELITY, REFERENCE
+from tolstat.common.tables import Status
+from tolstat.display.table import Column
+from tolstat.questions.accuracy.query import TOTAL, distribution
+from tolstat.store.verification import Verification
+
+
+def _small(x: float) -> str:
+    return "-" if np.isnan(x) else f"{x:.1e}"
+
+
+ERRORS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("error", lambda row: str(row["error"]), words=True),
+    Column("joints", lambda row: str(row["joints"])),
+    Column("median", lambda row: _small(row["median"])),
+    Column("95 % below", lambda row: _small(row["usual"])),
+    Column("worst", lambda row: _small(row["worst"])),
+)
+"""Columns of the table `query.distribution`."""
+
+
+def basis(verification: Verification) -> str:
+    """Words on how the numerical error was determined."""
+    m = len(verification.rows)
+    if REFERENCE in verification.checks:
+        settled = int((verification.checks[REFERENCE].results["status"] == Status.OK).sum())
+        return f"measured on {settled} of {m} joints against a tight reference"
+    noun = "joint" if m == 1 else "joints"
+    return f"estimated on {m} {noun} from half the step, tighter Newton and longer settling"
+
+
+def note(verification: Verification) -> str:
+    """Sentence on the numerical error of the largest loads."""
+    table = distribution(verification)
+    total = table[table["error"] == TOTAL]
+    shown = total["load"].isin(["F", "T"])
+    total = total[shown] if shown.any() else total
+    words = [
+        f"{kind} {_small(median)}, at worst {_small(worst)}"
+        for kind, median, worst in zip(total["load"], total["median"], total["worst"], strict=True)
+        if not np.isnan(worst)
+    ]
+    noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
+    text = f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}"
+    unknown = joints_without_error(verification)
+    return f"{text}; {unknown}" if unknown else text
+
+
+def joints_without_error(verification: Verification) -> str:
+    """Words on joints that failed or did not settle in the campaign or in a check; empty if there are none."""
+    base = verification.base["status"] == Status.OK
+    words = [f"{int((~base).sum())} not settled"] if not base.all() else []
+    for name, check in verification.checks.items():
+        bad = int((base & (check.results["status"] != Status.OK)).sum())
+        words += [f"{bad} not settled in {name}"] if bad else []
+    return ", ".join(words)

@@ -1,0 +1,48 @@
+"""Capability on the page: yield, ppm and Cpk against the limits; rare loads."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from tolstat.common.tables import VALID
+from tolstat.display import text
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Block, Section, Text
+from tolstat.display.table import as_block
+from tolstat.questions.capability import query, rendering
+from tolstat.store.view import View
+
+ONE_IN = (1e3, 1e4, 1e5)
+
+
+def sections(view: View, asked: Asked) -> list[Section]:
+    """Capability against each limit and all together, and rare loads; for samples of joints of equal weight."""
+    if not (view.sampled and view.count(*VALID)) or view.weighted:
+        return []
+    blocks: list[Block] = []
+    if view.limits:
+        table = query.limits(view)
+        blocks.append(as_block("Against each limit, and all of them together", rendering.LIMITS, table))
+        blocks += [Text(text.sentence(line), small=True) for line in rendering.note(table).splitlines()]
+    blocks += _rare(view)
+    title = "Capability and rare loads" if view.limits else "Rare loads"
+    return [Section("capability", title, blocks)] if blocks else []
+
+
+def _rare(view: View) -> list[Block]:
+    tables, said = [], dict[str, list[str]]()
+    for name in view.leading:
+        try:
+            table = query.returns(view, [name], ONE_IN)
+        except ValueError as error:
+            said.setdefault(str(error), []).append(name)
+            continue
+        tables.append(table)
+        if (table["p"] < 0.05).any():
+            said.setdefault("the tail is not generalised Pareto (p < 0.05): do not extrapolate it", []).append(name)
+    title = "Rare loads, from a generalised Pareto tail"
+    blocks: list[Block] = [as_block(title, rendering.RETURNS, pd.concat(tables))] if tables else []
+    if said:
+        words = [f"{', '.join(names)}: {reason}" for reason, names in said.items()]
+        blocks.append(Text(f"Rare loads. {'; '.join(words)}.", small=True))
+    return blocks

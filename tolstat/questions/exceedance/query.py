@@ -1,0 +1,177 @@
+"""Which load is exceeded by which share of the joints: shares above limits, quantiles, curves."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from tolstat.analysis import exceedance
+from tolstat.analysis.accuracy import size
+from tolstat.common.loads import LOADS
+from tolstat.display import text
+from tolstat.store.sample_load import SampleLoad
+from tolstat.store.view import View
+
+SHARES = (0.5, 0.9, 0.95, 0.99)
+COVERED = 0.99
+"""Share of the joints that the tolerance limit covers."""
+ERROR_BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
+MAX_LEVELS = 600
+"""Maximum number of points of a curve."""
+READER_LEVELS = 240
+"""Approximate number of levels at which the reader tool of the page has values; the levels are round numbers."""
+
+
+def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
+    """Share of the joints above each of the study's limits.
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+    confidence : float
+        Confidence level of the intervals.
+
+    Returns
+    -------
+    DataFrame
+        One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
+        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
+        `_error_budget`. Loads in SI units.
+    """
+    rows = []
+    for name, level in view.limits.items():
+        load = view.load(name)
+        head = {"load": name, "unit": load.unit, "nominal": load.nominal}
+        budget = _error_budget(view, load, level, confidence)
+        rows.append({**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget})
+    return pd.DataFrame(rows)
+
+
+def _error_budget(view: View, load: SampleLoad, level: float, confidence: float) -> dict[str, float]:
+    """Bounds of a share with every load shifted down and up by the numerical error.
+
+    Returns
+    -------
+    dict
+        ``numerical_error``, relative to the largest load of the kind in the joint, NaN if unknown; ``numerical_lower``
+        and ``numerical_upper``, the estimates with loads shifted down and up; ``total_lower`` and ``total_upper``,
+        their ends ``outer_lower`` and ``outer_upper``: cover numerical error, sampling and unresolved joints.
+    """
+    error = view.numerical_error.get(LOADS[load.name].kind, np.nan)
+    if np.isnan(error):
+        return {"numerical_error": error} | dict.fromkeys(ERROR_BUDGET, np.nan)
+    shift = error * size(view.results, load.name)
+    low, high = (load.shifted(by).above(level, confidence) for by in (-shift, shift))
+    bounds = (low.estimate, high.estimate, low.outer_lower, high.outer_upper)
+    return {"numerical_error": error, **dict(zip(ERROR_BUDGET, bounds, strict=True))}
+
+
+def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
+    """Quantiles of the loads that tables show, see `View.shown_loads`.
+
+    Returns
+    -------
+    DataFrame
+        One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.quantile.Quantile`,
+        ``confidence``. Loads in SI units.
+    """
+    rows = []
+    for load in view.loads(view.shown_loads):
+        head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
+        for share in SHARES:
+            rows.append({**head, **load.quantile(share, confidence)._asdict(), "confidence": confidence})
+    return pd.DataFrame(rows)
+
+
+def tolerance_limits(view: View) -> dict[str, float]:
+    """One-sided tolerance limit of each load shown: covers the share `COVERED` of the joints with 95 % confidence.
+
+    Wilks (1941): the upper end of the two-sided 90 % interval of the quantile; infinite with too few joints, NaN for
+    dependent samples.
+    """
+    return {load.name: load.quantile(COVERED, 0.9).upper for load in view.loads(view.shown_loads)}
+
+
+def curves(view: View, confidence: float = 0.95) -> pd.DataFrame:
+    """Exceedance curves of the loads that tables show, as one table.
+
+    Returns
+    -------
+    DataFrame
+        ``load``, ``unit``, then the fields of `analysis.exceedance.Exceedance`; SI units, at most
+        `MAX_LEVELS` levels per load.
+    """
+    parts = []
+    for load in view.loads(view.shown_loads):
+        table = curve(load, confidence, MAX_LEVELS)
+        part = pd.DataFrame({field: table[field] for field in exceedance.CURVE.names or ()})
+        part.insert(0, "load", load.name)
+        part.insert(1, "unit", load.unit)
+        parts.append(part)
+    return pd.concat(parts, ignore_index=True)
+
+
+def curve(load: SampleLoad, confidence: float, max_levels: int) -> NDArray[np.void]:
+    """Exceedance curve of a load, thinned to `max_levels` levels: denser at the largest loads."""
+    levels = np.unique(load.valid)
+    if levels.size > max_levels:
+        top = levels.size - np.geomspace(1, levels.size, max_levels // 2).round().astype(int)
+        even = np.linspace(0, levels.size - 1, max_levels // 2).round().astype(int)
+        levels = levels[np.union1d(top, even)]
+    below = np.nextafter(levels[:1], -np.inf)  # a level that every valid joint exceeds
+    return load.curve(np.concatenate([below, levels]), confidence)
+
+
+def readings(view: View) -> dict[str, Any]:
+    """Exceedance of every load at round levels, for the reader tool: exact there, not interpolated between them.
+
+    Returns
+    -------
+    dict
+        By load: ``unit``; ``n``, ``failed``, ``unsettled``; ``start``, index of the level shown first (nearest to the
+        limit or, without one, to the 90 % quantile); lists of equal length ``x``, ``count``, ``share`` and, for
+        independent samples, ``lower``, ``upper``, ``outer_lower``, ``outer_upper``, otherwise ``bound_lower``,
+        ``bound_upper``.
+    """
+    found = {}
+    ends = ("lower", "upper", "outer_lower", "outer_upper") if view.iid else ("bound_lower", "bound_upper")
+    for load in view.loads(view.shown_loads):
+        if not load.valid.size:
+            continue
+        x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)
+        start = load.limit if load.limit is not None else load.quantile(0.9).estimate
+        table = load.curve(x)
+        found[load.name] = {
+            "unit": text.UNITS.get(load.unit, load.unit),
+            "n": int(table["n"][0]),
+            "failed": int(table["n_failed"][0]),
+            "unsettled": int(table["n_unsettled"][0]),
+            "start": int(np.argmin(np.abs(x - start))),
+            "x": [float(f"{v:.9g}") for v in x],
+            "count": table["count"].tolist(),
+            "share": [float(f"{v:.3g}") for v in table["estimate"]],
+            **{end: [float(f"{v:.3g}") for v in table[end]] for end in ends},
+        }
+    return found
+
+
+def _round_levels(low: float, high: float, limit: float | None) -> NDArray[np.float64]:
+    low, high = (low, high) if limit is None else (min(low, limit), max(high, limit))
+    raw = max(high - low, 1e-3 * abs(high), 1e-12) / READER_LEVELS
+    power = 10.0 ** np.floor(np.log10(raw))
+    step = power * next(m for m in (1, 2, 5, 10) if m * power >= raw)
+    marks = step * np.arange(np.floor(low / step), np.ceil(high / step) + 1)
+    return np.unique(marks if limit is None else np.append(marks, limit))
+
+
+def summary(view: View, confidence: float) -> dict[str, Any]:
+    """JSON values: ``limits`` and ``quantiles``, the rows of the tables of these names."""
+    return {
+        "limits": text.records(limits(view, confidence)) if view.limits else [],
+        "quantiles": text.records(quantiles(view, confidence)) if view.shown_loads else [],
+    }

@@ -1,0 +1,1 @@
+"""Contact modes, and joints without a valid load."""

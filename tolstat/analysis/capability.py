@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tolstat.analysis import exceedance, quantile
 from tolstat.analysis.exceedance import Ends, Exceedance, FloatArray, Sample

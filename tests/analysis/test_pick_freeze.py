@@ -19,7 +19,6 @@ from tolstat.common.errors import InputError
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.questions.causes.query import causes_of
 from tolstat.store import ResultStore
-from tolstat.study.rewriting import with_keys
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
@@ -186,5 +185,3 @@ def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):
     done = CliRunner().invoke(cli.app, ["allocate", str(path), "--limit", "P(cross1.F > 700 N) < 0.1"])
     assert done.exit_code == 2
     assert "share their errors" in done.stderr
-    with pytest.raises(InputError, match="cannot be changed in place"):
-        with_keys("sampling = { n = 3 }\n", "sampling", {"n": 4}, "study.toml")

@@ -96,7 +96,7 @@ def _run_design(path: Path, points: int, groups: Groups, out: Path | None, worke
     from tolstat.study.rewriting import with_keys
 
     keys = {"method": "pick_freeze", "n": points, "groups": groups.value}
-    plan = study.load(path, text=with_keys(study.load(path).text, "sampling", keys, str(path)))
+    plan = study.load(path, text=with_keys(study.load(path).text, {("sampling",): keys}, str(path)))
     target = out if out is not None else Path(f"{path.stem}_causes.h5")
     carry_out(plan, target, False, execution=Execution("processes", workers))
     return target

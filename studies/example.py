@@ -49,7 +49,7 @@ print(f"99 % of the joints stay below {low.estimate:.0f} N, 95 % interval {low.l
 
 # %%
 with tolstat.open(first) as store:
-    causes = tolstat.causes_of(store, "cross1.F", log=True)
+    causes = tolstat.causes_of(store.view(), "cross1.F", log=True)
 print(causes.table[["error", "first", "first_lower", "first_upper", "size", "size_p"]].head(6).round(3))
 
 # %% [markdown]

@@ -23,19 +23,25 @@ if TYPE_CHECKING:
     from tolstat.analysis.exceedance import at as exceedance
     from tolstat.analysis.quantile import at as quantile
     from tolstat.analysis.weighted import at as weighted_exceedance
-    from tolstat.campaign.run import run
-    from tolstat.campaign.trace import simulate_case
-    from tolstat.common.errors import InputError, StoreError, TolstatError
-    from tolstat.common.tables import Status
-    from tolstat.joint import perturb
+    from tolstat.campaign.run import run as run
+    from tolstat.campaign.trace import simulate_case as simulate_case
+    from tolstat.common.errors import InputError as InputError
+    from tolstat.common.errors import StoreError as StoreError
+    from tolstat.common.errors import TolstatError as TolstatError
+    from tolstat.common.tables import Status as Status
+    from tolstat.joint import perturb as perturb
     from tolstat.questions import *
     from tolstat.report import write as write_report
     from tolstat.report.page import write as write_page
-    from tolstat.report.summary import statistics
-    from tolstat.sampling import draw
-    from tolstat.solver.integrate import integrate
-    from tolstat.solver.simulation import simulate_rows
-    from tolstat.study import load, load_case
+    from tolstat.report.summary import statistics as statistics
+    from tolstat.sampling import draw as draw
+    from tolstat.solver.integrate import integrate as integrate
+    from tolstat.solver.simulation import simulate_rows as simulate_rows
+    from tolstat.store import ResultStore
+    from tolstat.study import load as load
+    from tolstat.study import load_case as load_case
+
+    open = ResultStore.open
 
 __version__ = "0.1.0"
 

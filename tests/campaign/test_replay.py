@@ -18,10 +18,11 @@ from tolstat import cli, sampling, study
 from tolstat.campaign import replay
 from tolstat.campaign import run as campaign
 from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.errors import InputError
+from tolstat.common.draw_records import SUBSET
+from tolstat.common.errors import InputError, StoreError
 from tolstat.common.files import data_dir
-from tolstat.common.tables import RESULT, Status
-from tolstat.questions.causes import tail
+from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.questions.causes.tail import worst_joints
 from tolstat.store import ResultStore, integrity, recorded
 from tolstat.study.tolerances import distributions
 
@@ -187,12 +188,12 @@ def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
     )
     path = synthetic.store(tmp_path, text, failed=2, unsettled=3)
     with ResultStore.open(path) as store:
-        found = tail.worst(store, "cross1.F", 4)
+        found = worst_joints(store.view(), "cross1.F", 4)
         errors, results = store.errors(), store.results()
-        contact = tail.worst(store, "pin1.contact", 100)
-        assert tail.worst(store, "steps", 1).unit == "1"
+        contact = worst_joints(store.view(), "pin1.contact", 100)
+        assert worst_joints(store.view(), "steps", 1).unit == "1"
         with pytest.raises(InputError, match="did you mean 'cross1\\.F'"):
-            tail.worst(store, "cros1.F")
+            worst_joints(store.view(), "cros1.F")
     largest = results["F_max"][1:, 0]
     order = np.argsort(-np.nan_to_num(largest, nan=0.0))[:4] + 1
     assert [joint.row for joint in found.joints] == order.tolist()
@@ -207,6 +208,20 @@ def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
         assert joint.scores["hole2.offset_radial"] == pytest.approx(stats.norm.ppf(share), abs=1e-8)
         sizes = [abs(score) for score in joint.scores.values()]
         assert sizes == sorted(sizes, reverse=True)
+
+
+def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(synthetic.STUDY, encoding="utf-8")
+    plan = study.load(tmp_path / "plan.toml")
+    subset = study.subset_of(plan, {"load": "cross1.F", "above": 700.0, "per_level": 60, "p0": 0.1})
+    results, origin = synthetic.results(61), np.zeros(61, SUBSET)
+    with ResultStore.create(tmp_path / "subset.h5", subset, sampling.draw(plan), origin=[origin]) as store:
+        store.write(np.arange(61), Simulation(results, None))
+    with ResultStore.open(tmp_path / "subset.h5") as store:
+        view = store.view()
+        assert [joint.row for joint in worst_joints(view, "cross1.F", 1).joints] == [np.argmax(results["F_max"][:, 0])]
+        with pytest.raises(StoreError, match="no sample"):
+            view.load("cross1.F")
 
 
 def test_worst_command(tmp_path: Path) -> None:

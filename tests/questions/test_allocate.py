@@ -149,8 +149,8 @@ def test_entries_are_scaled_about_the_middle_and_texts_keep_their_comments(tmp_p
     assert changed == {*hole.names, *radial.names}
     table = text.replace('"pin*.offset_t" = {', '[tolerances."pin*.offset_t"]\n')
     table = table.replace('", distribution = "normal", cpk = 1.0 }', '"\ndistribution = "normal"')
-    with pytest.raises(InputError, match="not one line"):
-        scaling.rewritten(load(tmp_path, table, "table"), {offset.pattern: offset.scaled(0.5)}, 1)
+    new = scaling.rewritten(load(tmp_path, table, "table"), {offset.pattern: offset.scaled(0.5)}, 1)
+    assert load(tmp_path, new, "new").tolerances["pin1.offset_t"].sigma == pytest.approx(0.5e-4 / 3)
 
 
 def test_faults_of_limits_costs_and_names_are_told_together(path, tmp_path):

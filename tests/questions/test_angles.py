@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from tests.support import synthetic
@@ -10,9 +11,12 @@ from tolstat import study
 from tolstat.campaign import run as campaign
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
-from tolstat.questions.causes import angles
+from tolstat.common.loads import BUSHING_LOADS
+from tolstat.display.asked import Asked
+from tolstat.questions.causes.angles import against_angle
+from tolstat.questions.causes.section import sections
+from tolstat.questions.causes.tail import worst_joints
 from tolstat.store import ResultStore, revolutions
-from tolstat.store.recall import recall
 from tolstat.store.revolutions import Revolutions
 
 TEXT = synthetic.STUDY.replace("n = 60", "n = 900").replace("offset_t", "offset_[tz]")
@@ -56,21 +60,21 @@ def test_loads_are_the_same_wherever_they_are_from(stores):
 def known(tmp_path, monkeypatch):
     """Campaign whose load cross2.F is made by one error at 0 and by another one at 90 degrees."""
 
-    def invented(store, rows):
+    def invented(store, slots, most_angles=60):
         theta = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-        errors = store.errors()[rows]
+        errors = store.errors()[slots]
         one, other = (errors[name][:, None] / SIGMA for name in ("pin1.offset_t", "pin3.offset_z"))
         load = 600.0 + 20.0 * one * np.cos(theta) + 10.0 * other * np.sin(theta)
         moduli = np.repeat(load[:, :, None], 8, axis=2)
-        return Revolutions(rows, theta, moduli, 0.1 * moduli, "stored", 0.0)
+        return Revolutions(theta, moduli, 0.1 * moduli, "stored", 0.0)
 
-    monkeypatch.setattr(angles, "read", invented)
+    monkeypatch.setattr(revolutions, "read", invented)
     return synthetic.store(tmp_path, TEXT, "known", failed=5)
 
 
 def test_each_error_has_its_share_where_it_acts(known):
     with ResultStore.open(known) as store:
-        found = angles.of_store(store, recall(store), ["cross2.F"], 800)[0]
+        found = against_angle(store.view(), ["cross2.F"], 800)[0]
     assert (found.joints, found.names[:2]) == (800, ("pin1.offset_t", "pin3.offset_z"))
     assert found.nominal == pytest.approx(np.full(12, 600.0))
     square = np.stack([400.0 * np.cos(found.angles) ** 2, 100.0 * np.sin(found.angles) ** 2])
@@ -96,12 +100,39 @@ def test_command_writes_shares_and_picture(known, tmp_path):
     assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_page_draws_loads_over_the_revolution(known):
+    asked = Asked(known, replay=800)
+    with ResultStore.open(known) as store:
+        view = store.view()
+        found = sections(view, asked)
+        bushings = [name for name in view.leading if name in BUSHING_LOADS]
+        worst = worst_joints(view, bushings[0], 3)
+        errors = view.errors(np.sort(worst.samples))["pin1.offset_t"][np.argsort(np.argsort(worst.samples))]
+    assert [section.key for section in found] == ["causes", "worst"]
+    assert asked.notes == []
+    panels = {
+        panel.key: panel
+        for section in found
+        for block in section.blocks
+        if block.kind == "panels"
+        for panel in block.panels
+    }
+    keys = [name.replace(".", "-") for name in bushings]
+    drawn = [key for key in panels if not key.startswith("tornado")]
+    assert drawn == [f"angle{part}-{key}" for key in keys for part in ("", "-shares")] + [
+        f"worst-{key}" for key in keys
+    ]
+    ax = Figure().subplots()
+    panels[f"worst-{keys[0]}"].draw(ax)
+    lines = ax.get_lines()[:3]
+    assert [line.get_label() for line in lines] == [f"row {joint.row}" for joint in worst.joints]
+    assert [line.get_ydata()[0] for line in lines] == pytest.approx(600.0 + 20.0 * errors / SIGMA)
+
+
 def test_what_has_no_shares_is_refused(known, tmp_path):
     few, sweep = synthetic.store(tmp_path), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
-    with ResultStore.open(known) as store:
-        plan = recall(store)
-        with pytest.raises(InputError, match="no load over the shaft angle"):
-            angles.of_store(store, plan, ["pin1.contact"])
+    with ResultStore.open(known) as store, pytest.raises(InputError, match="is not a load over the shaft angle"):
+        against_angle(store.view(), ["pin1.contact"])
     for path, text in ((few, "100 are needed"), (sweep, "not drawn from tolerances")):
         with ResultStore.open(path) as store, pytest.raises(StoreError, match=text):
-            angles.of_store(store, recall(store), ["cross1.F"])
+            against_angle(store.view(), ["cross1.F"])

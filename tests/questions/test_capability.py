@@ -5,8 +5,10 @@ import pytest
 from scipy.special import nctdtr
 from scipy.stats import lognorm, norm
 
+from tests.support.views import view
 from tolstat.analysis import capability, exceedance
 from tolstat.common.tables import Status
+from tolstat.questions.capability import query
 
 SEEDS = 2000
 LIMIT = 3.0
@@ -103,6 +105,10 @@ def test_limit_below_the_median_is_a_negative_index():
 
 
 def test_a_joint_is_good_when_no_load_is_above_its_limit():
-    part = capability.utilization([[600.0, 10.0], [400.0, 21.0], [np.nan, 1.0]], [700.0, 20.0])
-    assert part[:2] == pytest.approx([600 / 700, 21 / 20])
-    assert np.isnan(part[2])
+    made = view(limits={"cross1.F": 700.0, "fork3.T": 26.0}, failed=7, unsettled=5)
+    together = query.limits(made).iloc[-1]
+    above = (made.load("cross1.F").values > 700.0) | (made.load("fork3.T").values > 26.0)
+    assert together["load"] == query.TOGETHER
+    assert 0 < above[:188].sum() < 188
+    assert (together["count"], together["n"], together["n_failed"]) == (above[:188].sum(), 200, 7)
+    assert together["good"] == pytest.approx(1.0 - above[:188].mean())

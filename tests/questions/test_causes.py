@@ -10,10 +10,13 @@ from typer.testing import CliRunner
 from tests.support import synthetic
 from tolstat.analysis import exceedance, sensitivity
 from tolstat.cli import app
-from tolstat.common.tables import Simulation, Status
-from tolstat.questions.capability import rendering as capability
-from tolstat.questions.causes import query as causes
-from tolstat.questions.causes import rendering as report
+from tolstat.common.tables import SIMULATED, Simulation, Status
+from tolstat.display.asked import Asked
+from tolstat.display.text import value
+from tolstat.questions.capability import query as capability
+from tolstat.questions.causes import query, rendering, tail_section
+from tolstat.questions.causes.query import causes_of
+from tolstat.questions.causes.section import sections
 from tolstat.store import ResultStore, view
 
 N = 3000
@@ -43,8 +46,8 @@ def run(*arguments):
 
 def test_known_causes_are_found_with_their_shares(path):
     with ResultStore.open(path) as store:
-        found = causes.of_store(store, "cross1.F")
-    assert (found.joints, found.lost, found.level) == (N - 5, 5, 700.0)
+        found = causes_of(store.view(), "cross1.F")
+    assert (found.joints, found.without_load, found.level) == (N - 5, 5, 700.0)
     table = found.table.set_index("error")
     assert set(found.table["error"][:2]) == {"pin1.offset_t", "pin2.offset_z"}
     # variances 20² and 2 · 10²
@@ -56,7 +59,7 @@ def test_known_causes_are_found_with_their_shares(path):
     assert table.loc["pin1.offset_t", "direction_p"] < 1e-6 < 0.05 < table.loc["pin2.offset_z", "direction_p"]
     assert table.loc["pin2.offset_z", "size_p"] < 1e-6
     with ResultStore.open(path) as store:
-        relative = causes.of_store(store, "cross1.F", log=True)
+        relative = causes_of(store.view(), "cross1.F", log=True)
     assert relative.std == pytest.approx(found.std / 650, rel=0.05)
     others = table.drop(["pin1.offset_t", "pin2.offset_z"])
     assert others[["direction_p", "size_p"]].min(axis=None) > 0.05
@@ -64,10 +67,10 @@ def test_known_causes_are_found_with_their_shares(path):
 
 
 def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):
-    monkeypatch.setattr(causes, "MOST", 1000)
+    monkeypatch.setattr(query, "MAX_JOINTS", 1000)
     monkeypatch.setattr(view, "BLOCK", 700)
     with ResultStore.open(path) as store:
-        found = causes.of_store(store, "cross1.F")
+        found = causes_of(store.view(), "cross1.F")
         errors, loads = store.errors()[1:1001], store.results()["F_max"][1:-5, 0]
     assert (found.joints, found.used) == (N - 5, 1000)
     row = found.table.set_index("error").loc["pin1.offset_t"]
@@ -76,7 +79,7 @@ def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeyp
     assert row["first"] == pytest.approx(sensitivity.first_order(x, loads[:1000]).estimate[here])
     assert found.above == np.sum(found.level < loads)
     assert row["direction_p"] < 1e-6
-    assert "first 1000 joints" in report.note(found)
+    assert "first 1000 joints" in rendering.note(found)
 
 
 def test_command_prints_the_first_errors_and_json_has_all(path):
@@ -116,18 +119,79 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
         assert "hint:" in done.stderr
 
 
+def test_of_the_first_samples_only_these_count(path):
+    with ResultStore.open(path) as store:
+        found = causes_of(store.view(), "cross1.F", joints=1000)
+        errors, loads = store.errors()[1:1001], store.results()["F_max"][1:1001, 0]
+    assert (found.joints, found.used, found.without_load) == (1000, 1000, 0)
+    assert found.above == np.sum(loads > found.level)
+    x = np.column_stack([errors[name] for name in found.table["error"]])
+    np.testing.assert_allclose(found.table["first"], sensitivity.first_order(x, loads).estimate)
+
+
+PAGE = synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace("offset_t", "offset_[tz]")
+
+
+def shown(path):
+    """Sections of the page by key, the notes, and the leading loads of a result file."""
+    asked = Asked(path)
+    with ResultStore.open(path) as store:
+        view = store.view()
+        found = {section.key: section.blocks for section in sections(view, asked)}
+        return found, asked.notes, view.loads(view.leading)
+
+
+def tables(blocks):
+    return [block for block in blocks if block.kind == "table"]
+
+
+def test_page_has_causes_and_worst_joints_of_the_leading_loads(tmp_path):
+    found, notes, leading = shown(synthetic.store(tmp_path, PAGE, failed=15, unsettled=12))
+    assert (list(found), notes) == (["causes", "worst"], [])
+    assert leading[0].name == "cross1.F"
+    assert [table.title.partition(":")[0] for table in tables(found["causes"])] == [load.name for load in leading]
+    assert [len(table.rows) for table in tables(found["causes"])] == [8] * len(leading)
+    said = [block.text for block in found["causes"] if block.kind == "text"]
+    assert sum(": 373 joints, 27 without a valid load left out" in line for line in said) == len(leading)
+    assert [panel.key for panel in found["causes"][1].panels] == [
+        f"tornado-{load.name.replace('.', '-')}" for load in leading
+    ]
+    assert [table.head[1] for table in tables(found["worst"])] == [load.name for load in leading]
+    for load, table in zip(leading, tables(found["worst"]), strict=True):
+        values = np.sort(load.values[np.isin(load.status, SIMULATED) & np.isfinite(load.values)])[::-1]
+        assert [row[1] for row in table.rows] == [value(x, load.unit) for x in values[: tail_section.JOINTS]]
+
+
+def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
+    proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
+    importance = synthetic.STUDY.replace("n = 60", 'method = "importance"\nn = 300') + proposal
+    found, notes, _ = shown(synthetic.store(tmp_path, importance, "importance", failed=3))
+    assert list(found) == ["worst"]
+    assert [note.partition(":")[0] for note in notes] == ["causes are left out"]
+    found, notes, leading = shown(synthetic.store(tmp_path))
+    assert list(found) == ["worst"]
+    assert [note.partition(":")[0] for note in notes] == [f"no causes of {load.name}" for load in leading]
+    design = synthetic.STUDY.replace("n = 60", 'method = "pick_freeze"\ngroups = "error"\nn = 100')
+    found, notes, _ = shown(synthetic.store(tmp_path, design, "design"))
+    assert (list(found), notes) == (["causes", "worst"], [])
+    assert {row[0] for row in tables(found["causes"])[0].rows} == {f"pin{k}.offset_t" for k in (1, 2, 3, 4)}
+    for path in (
+        synthetic.store(tmp_path, synthetic.SWEEP, "sweep"),
+        synthetic.store(tmp_path, name="no_valid_joint", failed=40, unsettled=20),
+    ):
+        assert shown(path)[:2] == ({}, [])
+
+
 def test_capability_of_each_limit_and_of_all_together(path):
     with ResultStore.open(path) as store:
-        campaign = view.read(store)
-    table = capability.limits(campaign).set_index("load")
-    assert list(table.index) == [*campaign.limits, capability.TOGETHER]
-    status = campaign.results["status"]
-    shares = {
-        name: exceedance.at(view.load(campaign.results, name)[0], status, x) for name, x in campaign.limits.items()
-    }
-    assert table.loc["cross1.F", "ppm"] == pytest.approx(1e6 * shares["cross1.F"].estimate)
-    above = pd.DataFrame({n: view.load(campaign.results, n)[0] > x for n, x in campaign.limits.items()})
-    assert table.loc[capability.TOGETHER, "count"] == above[status == Status.OK].any(axis=1).sum()
+        known = store.view()
+        table = capability.limits(known).set_index("load")
+        loads = known.loads(list(known.limits))
+    assert list(table.index) == [*known.limits, capability.TOGETHER]
+    share = exceedance.at(known.load("cross1.F").values, known.status, known.limits["cross1.F"])
+    assert table.loc["cross1.F", "ppm"] == pytest.approx(1e6 * share.estimate)
+    above = pd.DataFrame({load.name: load.values > load.limit for load in loads})
+    assert table.loc[capability.TOGETHER, "count"] == above[known.status == Status.OK].any(axis=1).sum()
     assert table.loc[capability.TOGETHER, "good"] <= table["good"].min()
     assert (table["ppm_lower"] <= table["ppm"]).all()
     assert (table["ppm"] < table["ppm_upper"]).all()

@@ -269,7 +269,7 @@ def test_spectra_fall_and_the_figure_shows_four_panels(campaign):
 
 
 def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
-    asked = Asked()
+    asked = Asked(tmp_path / "c.h5")
     with ResultStore.open(campaign()) as store:
         found = sections(store.view(), asked)
         store.study_text = store.study_text.replace("exponents = [4]", "exponents = [0]")

@@ -111,7 +111,7 @@ def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypa
     page.write(path, tmp_path / "page.html", accepted=0.05, replay=replay)
     tables = {name: rows for name, rows in read.items() if name.startswith(("results/", "errors/"))}
     assert len(tables) > 150
-    assert set(tables.values()) == {401}
+    assert {name: rows for name, rows in tables.items() if rows != (400 if name.startswith("errors/") else 401)} == {}
     assert (opened.call_count, recalled.call_count) == (1, 1)
 
 
@@ -119,7 +119,7 @@ def drawn(store, slots, most_angles=60):
     """Stands for `revolutions.read`: moduli without a simulation."""
     moduli = 600.0 + np.random.default_rng(5).normal(size=(2, len(slots), most_angles, 8))
     angles = 2.0 * np.pi * np.arange(most_angles) / most_angles
-    return revolutions.Revolutions(slots, angles, *moduli, "simulated again", 0.0)
+    return revolutions.Revolutions(angles, *moduli, "simulated again", 0.0)
 
 
 def test_text_of_the_study_is_shown_and_not_run(html):
@@ -132,7 +132,7 @@ def test_same_file_same_bytes(path, tmp_path):
     contents = []
     for k in (0, 1):
         with ResultStore.open(path) as store:
-            made = page.compose(store.view(), Asked(0.05))
+            made = page.compose(store.view(), Asked(path, 0.05))
         some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
         writer.write(replace(made, sections=some), tmp_path / f"{k}.html")
         contents.append((tmp_path / f"{k}.html").read_bytes())
@@ -194,7 +194,7 @@ def test_leading_load_is_the_one_whose_limit_most_joints_exceed(view):
 def words(path, accepted=np.nan):
     """Sections of a page, and its paragraphs and cells, without drawing it."""
     with ResultStore.open(path) as store:
-        made = page.compose(store.view(), Asked(accepted))
+        made = page.compose(store.view(), Asked(path, accepted))
     found = [made.subtitle]
     for block in (block for section in made.sections for block in section.blocks):
         found += [block.text] if block.kind == "text" else []

@@ -25,7 +25,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Status
 from tolstat.questions.accuracy import query as accuracy_tables
 from tolstat.questions.accuracy import rendering
-from tolstat.questions.causes import tail
+from tolstat.questions.causes.tail import worst_joints
 from tolstat.questions.exceedance import query, sweep
 from tolstat.questions.exceedance import rendering as exceedance
 from tolstat.store import ResultStore, integrity, result_file, verification
@@ -279,11 +279,11 @@ def test_reports_of_cases(tmp_path: Path) -> None:
 def test_what_is_not_kept_cannot_be_asked_for(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, text("cross*.F_max", body=PLAIN))
     with ResultStore.open(path) as store:
-        assert len(tail.worst(store, "cross1.F", 3).joints) == 3
-        assert len(tail.worst(store, "closure", 3).joints) == 3
+        assert len(worst_joints(store.view(), "cross1.F", 3).joints) == 3
+        assert len(worst_joints(store.view(), "closure", 3).joints) == 3
         for by in ("fork1.T", "fork1.T_max", "psi"):
-            with pytest.raises(InputError, match=r"does not keep .*\n.*give one of: cross1\.F, "):
-                tail.worst(store, by)
+            with pytest.raises(InputError, match=r"is not kept in .*\n.*give one of: cross1\.F, "):
+                worst_joints(store.view(), by)
     until = stop_rule.parse("P(pin1.contact > 1 N) width < 0.1")
     with pytest.raises(InputError, match=r"leaves out pin1\.contact of --until\n.*add pin1\.contact_outer_max, pin1"):
         stop_rule.run_until(study.load(tmp_path / "small.toml"), tmp_path / "b.h5", until, lambda row: None)

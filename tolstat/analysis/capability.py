@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tolstat.analysis import exceedance, quantile
 from tolstat.analysis.exceedance import Ends, Exceedance, FloatArray, Sample
@@ -105,8 +105,13 @@ def at(
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    above = exceedance.at(values, status, limit, confidence, iid, ends)
-    valid = exceedance.sort_out(values, status).valid
+    return of_sample(exceedance.sort_out(values, status, ends), limit, confidence, iid)
+
+
+def of_sample(sample: Sample, limit: float, confidence: float = 0.95, iid: bool = True) -> Capability:
+    """Capability of one load from loads that are sorted already; other parameters as in `at`."""
+    valid = sample.valid
+    above = Exceedance(*exceedance.curve_of(sample, [limit], confidence, iid)[0].tolist())
     blank = (np.nan, np.nan, np.nan)
     scatters = valid.size > 1 and np.ptp(valid) > 0
     normal = _normal(valid, limit, confidence, iid) if scatters else blank
@@ -114,25 +119,6 @@ def at(
     # Bonferroni over two quantiles with two ends each: a quarter of the error probability for this upper end
     needed = quantile.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
     return Capability(above, *normal, _normality(valid) if scatters else np.nan, *general, needed)
-
-
-def utilization(values: ArrayLike, limits: ArrayLike) -> FloatArray:
-    """Largest ratio of load to limit in each joint: the joint meets all limits if it is at most 1.
-
-    Parameters
-    ----------
-    values : array_like, shape (n, m)
-        m loads of each joint.
-    limits : array_like, shape (m,)
-        Limit of each load, in its unit.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        NaN where a load is not finite.
-    """
-    part: NDArray[np.float64] = (np.asarray(values, dtype=float) / np.asarray(limits, dtype=float)).max(axis=1)
-    return part
 
 
 def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:

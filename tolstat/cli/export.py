@@ -105,14 +105,13 @@ def _collectives(view: View) -> tuple[Callable[[TextIO], None], str]:
 
 
 def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
-    from tolstat.display import text
-    from tolstat.questions.causes import query as causes
+    from tolstat.questions.causes import rendering
+    from tolstat.questions.causes.query import causes_of
     from tolstat.report import summary
 
     view = store.view()
     found = summary.statistics(view)
-    asked = {load: causes.causes_of(view, load) for load in by}
-    found["causes"] = {load: own._asdict() | {"table": text.records(own.table)} for load, own in asked.items()}
+    found["causes"] = {load: rendering.values(causes_of(view, load)) for load in by}
     return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"
 
 

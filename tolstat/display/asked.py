@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from tolstat.common.errors import TolstatError
 
@@ -16,6 +17,8 @@ class Asked:
 
     Attributes
     ----------
+    path : Path
+        The result file.
     accepted : float
         Accepted share: share of the joints that may be above a limit; NaN if none is given.
     replay : int
@@ -25,6 +28,7 @@ class Asked:
         Remarks that concern the whole page; sections append to it.
     """
 
+    path: Path
     accepted: float = math.nan
     replay: int = 0
     notes: list[str] = field(default_factory=list)
@@ -36,8 +40,11 @@ class Asked:
 
     @contextmanager
     def noting(self, what: str) -> Iterator[None]:
-        """Turn a `TolstatError` into a note that begins with `what`, so that the rest of the page is still made."""
+        """Turn a `TolstatError` into a note that begins with `what`, so that the rest of the page is still made.
+
+        The note names the file without its folder, so that the page does not depend on the folder.
+        """
         try:
             yield
         except TolstatError as error:
-            self.notes.append(f"{what}: {str(error).splitlines()[0]}")
+            self.notes.append(f"{what}: {str(error).splitlines()[0].replace(str(self.path), self.path.name)}")

@@ -63,7 +63,9 @@ def write(path: str | Path, out: str | Path, accepted: float = np.nan, replay: i
         if store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
             raise StoreError(str(Fault(str(path), "lists its joints one by one", remedy)))
-        html.write(compose(store.view(), Asked(accepted, replay)), Path(out))  # pictures are drawn from the view
+        html.write(
+            compose(store.view(), Asked(store.path, accepted, replay)), Path(out)
+        )  # pictures are drawn from the view
     return Path(out)
 
 

@@ -32,8 +32,6 @@ class Revolutions(NamedTuple):
 
     Attributes
     ----------
-    rows : ndarray of int, shape (m,)
-        File slots.
     angles : ndarray, shape (k,)
         Input angles, rad.
     F, T : ndarray, shape (m, k, 8)
@@ -45,7 +43,6 @@ class Revolutions(NamedTuple):
         machine and with the versions that made the file. 0 for loads from histories.
     """
 
-    rows: NDArray[np.intp]
     angles: FloatArray
     F: FloatArray
     T: FloatArray
@@ -108,7 +105,7 @@ def read(store: Reader, slots: NDArray[np.intp], most_angles: int = ANGLES) -> R
         kept = found[:, ::every].astype(float)
         for k in (0, 1):
             moduli[k, part] = np.linalg.norm(kept[..., 3 * k : 3 * k + 3], axis=-1)
-    return Revolutions(slots, angles, moduli[0], moduli[1], origin, apart)
+    return Revolutions(angles, moduli[0], moduli[1], origin, apart)
 
 
 def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
+from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
@@ -21,7 +22,7 @@ from tolstat.store import verification
 from tolstat.store.counts import Counts
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
-from tolstat.store.sample_load import FloatArray, SampleLoad
+from tolstat.store.sample_load import SampleLoad
 from tolstat.store.verification import Verification
 
 if TYPE_CHECKING:
@@ -124,6 +125,10 @@ class View:
         """Fields `LOAD_FIELDS` of the results, (n,)."""
         return self._tables.results
 
+    def read_results(self, fields: Sequence[str]) -> NDArray[np.void]:
+        """Read other fields of the results, (n,) table; they are not kept."""
+        return self.store.results(slice(self.store.first_sample, None), fields)
+
     @property
     def status(self) -> NDArray[np.uint8]:
         """Status of the joints, (n,)."""
@@ -133,6 +138,11 @@ class View:
     def nominal(self) -> NDArray[np.void]:
         """The nominal joint, RESULT (1,); (0,) if the file has none or its results are not valid."""
         return self._tables.nominal
+
+    @property
+    def nominal_slots(self) -> NDArray[np.intp]:
+        """File slots of `nominal`, (1,) or (0,)."""
+        return np.zeros(len(self.nominal), dtype=np.intp)
 
     @property
     def without_load(self) -> NDArray[np.void]:
@@ -146,7 +156,6 @@ class View:
 
     @cached_property
     def _tables(self) -> _Tables:
-        check_equal_weights(self.store.sampling, self.path, weighted=True)
         skip, store = self.store.first_sample, self.store
         nominal = np.empty(0, RESULT)
         results = np.empty(self.n, [(name, RESULT[name]) for name in LOAD_FIELDS])
@@ -174,8 +183,11 @@ class View:
         ------
         InputError
             When there is no such load, or the study does not keep it.
+        StoreError
+            When the file holds levels of a subset simulation, which are not a sample.
         """
         if name not in self._loads:
+            check_equal_weights(self.store.sampling, self.path, weighted=True)
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
             if not selected_results.holds(self.columns, name):
@@ -292,7 +304,7 @@ class View:
         """
         if not samples.size or samples[-1] < len(self._first_errors):
             return self._first_errors[samples]
-        names = ERROR.names if columns is None else columns
+        names = tuple(ERROR.names or ()) if columns is None else tuple(columns)
         found = np.empty(len(samples), [(name, ERROR[name]) for name in names])
         for first in range(0, self.n, BLOCK):
             here = np.flatnonzero((samples >= first) & (samples < first + BLOCK))

@@ -1,36 +1,29 @@
-"""Change keys in the text of a study, keeping its comments."""
+"""Change keys in the text of a study; comments, order and all other values stay as they are written."""
 
 from __future__ import annotations
 
-import json
-import re
-import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from functools import reduce
+from operator import getitem
 from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable, Table
 
 from tolstat.common.errors import Fault, InputError
 
 
-def by_section(text: str) -> Iterator[tuple[str, str]]:
-    """Lines of a TOML text, each with the dotted name of the table that it is in."""
-    section = ""
-    for line in text.splitlines():
-        header = re.match(r"\s*\[+\s*([^\]]+?)\s*\]", line)
-        section = header[1] if header else section
-        yield section, line
-
-
-def with_keys(text: str, section: str, values: Mapping[str, Any], place: str) -> str:
-    """Set keys of one table of a study.
+def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, Any]], place: str) -> str:
+    """Set keys of tables of a study.
 
     Parameters
     ----------
     text : str
         TOML.
-    section : str
-        The table, which has a header of its own and one line per key.
-    values : mapping
-        Key to JSON value; keys that the table lacks are added.
+    changes : mapping
+        Key path of a table that the text has, to key and value; a value of None removes the key and the
+        comment in its line. Values that are equal to those of the text keep their form.
     place : str
         File name shown in faults.
 
@@ -42,25 +35,37 @@ def with_keys(text: str, section: str, values: Mapping[str, Any], place: str) ->
     Raises
     ------
     InputError
-        When the table is written in another way.
+        When tomlkit would move tables, or cannot read them.
     """
-    left, lines, header = dict(values), [], -1
-    for number, (within, line) in enumerate(by_section(text)):
-        key = line.partition("=")[0].strip()
-        if within == section and line.lstrip().startswith("["):
-            header = number
-        if within == section and key in left:
-            line = f"{key} = {json.dumps(left.pop(key))}"
-        lines.append(line)
-    lines[header + 1 : header + 1] = [f"{key} = {json.dumps(value)}" for key, value in left.items()]
-    found = "\n".join(lines) + "\n"
-    wanted = tomllib.loads(text)
-    wanted[section] = wanted.get(section, {}) | dict(values)
     try:
-        same = tomllib.loads(found) == wanted
-    except tomllib.TOMLDecodeError:
-        same = False
-    if not same:
-        remedy = f"write [{section}] on a line of its own, and below it one line a key"
-        raise InputError([Fault(f"{place}: {section}", "cannot be changed in place", remedy)])
-    return found
+        document: Any = tomlkit.parse(text)
+    except TOMLKitError:
+        document = None
+    if document is None or document.as_string() != text:
+        remedy = "write tables such as [a.b] and [a.c], or two [[a]], below each other, with no other table between"
+        raise InputError([Fault(place, "cannot be changed in place: its tables are interlaced", remedy)])
+    for path, values in changes.items():
+        for key, value in values.items():
+            _put(reduce(getitem, path, document), key, value)
+        table = reduce(getitem, path, document)
+        if isinstance(table, InlineTable):  # where keys were added or removed, tomlkit leaves uneven blanks
+            reduce(getitem, path[:-1], document)[path[-1]] = tomlkit.value(inline(table))
+    return str(document.as_string())
+
+
+def inline(table: Mapping[str, Any]) -> str:
+    """Table in one line."""
+    return f"{{ {', '.join(f'{key} = {tomlkit.item(value).as_string()}' for key, value in table.items())} }}"
+
+
+def _put(table: Any, key: str, value: Any) -> None:
+    """Set a key; a new one goes before comments at the end of the table, which may be about the next table."""
+    if value is None:
+        table.pop(key, None)
+    elif table.get(key) != value:
+        body = table.value.body if isinstance(table, Table) and key not in table else []
+        comments = []
+        while body and body[-1][0] is None:
+            comments.append(body.pop())
+        table[key] = value
+        body.extend(reversed(comments))

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError
 from tolstat.study import rewriting, selection
 from tolstat.study.study import Study
 from tolstat.study.tolerances.density_ratio import unbounded
@@ -19,7 +18,6 @@ from tolstat.study.tolerances.kinds import KINDS, RADIAL_KINDS, distribution
 SCALED = ("normal", "uniform", "triangular", "beta", "rayleigh")
 """Distributions that can be scaled; those of measured parts and lognormal ones cannot."""
 _WIDTHS = ("plus_minus", "std", "sigma")
-_EXAMPLE = 'write it in one line: "pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal" }'
 
 
 class Tolerance(NamedTuple):
@@ -117,8 +115,7 @@ def width(entry: Mapping[str, Any], site: Site) -> float:
 
 def line(pattern: str, entry: Mapping[str, Any]) -> str:
     """Entry as a line of a study file."""
-    keys = ", ".join(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entry.items())
-    return f"{json.dumps(pattern)} = {{ {keys} }}"
+    return f"{json.dumps(pattern)} = {rewriting.inline(entry)}"
 
 
 def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int) -> str:
@@ -141,21 +138,12 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     Raises
     ------
     InputError
-        When the text has an entry that is not one line.
+        See `rewriting.with_keys`.
     """
-    lines = []
-    for section, text in rewriting.by_section(study.text):
-        key, equals, _ = text.partition("=")
-        pattern = key.strip().strip("\"'")
-        changes = section == "tolerances" and equals and pattern in entries
-        lines.append(line(pattern, entries[pattern]) if changes else text)
-    found = rewriting.with_keys("\n".join(lines), "sampling", {"seed": seed}, f"{study.name}.toml")
-    wanted = tomllib.loads(study.text)
-    wanted["sampling"]["seed"] = seed
-    wanted["tolerances"] = {e.pattern: entries.get(e.pattern, e.value) for e in selection.entries(wanted["tolerances"])}
-    got = tomllib.loads(found)
-    got["tolerances"] = {e.pattern: e.value for e in selection.entries(got["tolerances"])}
-    if got != wanted:
-        place = f"{study.name}.toml: tolerances"
-        raise InputError([Fault(place, "has an entry that is not one line: it cannot be changed in place", _EXAMPLE)])
-    return found
+    table = tomllib.loads(study.text)["tolerances"]
+    changes = {
+        entry.path: dict.fromkeys(entry.value) | dict(entries[entry.pattern])
+        for entry in selection.entries(table, "tolerances")
+        if entry.pattern in entries
+    }
+    return rewriting.with_keys(study.text, {("sampling",): {"seed": seed}, **changes}, f"{study.name}.toml")

@@ -1,7 +1,10 @@
 """Executor in worker processes that may die or hang: such workers are replaced, and their blocks are repeated.
 
 Neither pool of the standard library does this: `multiprocessing.Pool` waits for ever for the task of a killed worker,
-and `ProcessPoolExecutor` fails every task once one worker is gone. Here each worker has a pipe and one block at a time.
+and `ProcessPoolExecutor` fails every task once one worker is gone. Workers of pebble's `ProcessPool` (5.2) share two
+pipes and their locks: one that is killed while it sends a result keeps the lock, and all others wait until it times
+out, after 60 s; one that is killed before it has a task breaks the pool. Here each worker has a pipe and one block at a
+time.
 
 A block whose worker died, hung or raised is split, and its pieces are processed one by one after all other blocks. A
 piece that fails twice alone is given up as `Lost`, but only after another block has succeeded since; if none is left, a

@@ -12,20 +12,19 @@ from numpy.typing import NDArray
 from tolstat import sampling
 from tolstat.analysis import sensitivity
 from tolstat.analysis.sensitivity import FirstOrder
-from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import BUSHINGS, Status
 from tolstat.questions.causes.query import scattering
-from tolstat.store import ResultStore
-from tolstat.store.revolutions import FloatArray, Revolutions, read
-from tolstat.study import Study
+from tolstat.store import revolutions
+from tolstat.store.revolutions import FloatArray, Revolutions
+from tolstat.store.view import View
 
 JOINTS = 1000
-"""Default number of joints evaluated, the first valid ones: some 2 s if they are simulated again."""
-FEWEST = 100
+"""Default number of joints evaluated, the first settled ones: some 2 s if they are simulated again."""
+MIN_JOINTS = 100
 """Minimum number of joints for shares to be given."""
-DRAWN = ("random", "sobol", "lhs")
 SPREAD = (0.05, 0.5, 0.95)
 """Shares of the joints at which quantiles of the load are shown."""
 
@@ -84,25 +83,19 @@ class AgainstAngle(NamedTuple):
         )
 
 
-def of_store(
-    store: ResultStore,
-    study: Study,
-    loads: Sequence[str],
-    joints: int = JOINTS,
-    logarithmic: Container[str] = (),
+def against_angle(
+    view: View, loads: Sequence[str], joints: int = JOINTS, logarithmic: Container[str] = ()
 ) -> list[AgainstAngle]:
     """Find which errors make bushing loads scatter at which shaft angle.
 
     Parameters
     ----------
-    store : ResultStore
-        The result file of a campaign of joints drawn from tolerances.
-    study : Study
-        Its study.
+    view : View
+        A campaign whose joints are drawn from tolerances, all of the same weight.
     loads : sequence of str
         ``cross1.F`` to ``fork4.T``.
     joints : int
-        Number of joints evaluated, the first valid ones. Without stored histories they are simulated again.
+        Number of joints evaluated, the first settled ones. Without stored histories they are simulated again.
     logarithmic : container of str
         Loads for which the variance of the logarithm is decomposed.
 
@@ -116,36 +109,41 @@ def of_store(
     InputError
         When a name is not the load of a bushing.
     StoreError
-        When the joints are not drawn from tolerances, or fewer than `FEWEST` are valid.
+        When the joints are not drawn from tolerances, differ in weight or form a pick-freeze design, or fewer than
+        `MIN_JOINTS` have settled.
     """
-    known = [f"{bushing}.{letter}" for bushing in BUSHINGS for letter in "FT"]
     for name in loads:
-        if name not in known:
-            raise InputError([Fault(name, "is no load over the shaft angle", did_you_mean(name, known))])
-    check_equal_weights(store.sampling, store.path)
-    if store.sampling["method"] not in DRAWN or not study.tolerances:
+        if name not in BUSHING_LOADS:
+            raise InputError([Fault(name, "is not a load over the shaft angle", did_you_mean(name, BUSHING_LOADS))])
+    view.check_drawn()
+    view.check_sample(weighted=False)
+    if view.study.groups:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(store.path), "holds joints that are not drawn from tolerances", remedy)))
-    skip = int(bool(store.sampling["nominal_first"]) and store.rows.start == 0)
-    status = store.status()
-    rows = skip + np.flatnonzero(status[skip:] == Status.OK)[:joints]
-    if len(rows) < FEWEST:
-        found = f"{len(rows)} valid joints are looked at"
-        raise StoreError(str(Fault(str(store.path), found, f"{FEWEST} are needed: run more joints")))
-    nominal = np.zeros(int(skip and status[0] == Status.OK), np.intp)
-    both = read(store, np.concatenate([nominal, rows]))
-    errors = store.errors(slice(int(rows[-1]) + 1))[rows]
-    iid = store.sampling["method"] == "random"
-    x = {name: sampling.values(errors, name) for name in scattering(study, errors)}
-    return [_of_load(x, both, len(nominal), name, iid, name in logarithmic) for name in loads]
+        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
+    samples = np.flatnonzero(view.status == Status.OK)[:joints]
+    if len(samples) < MIN_JOINTS:
+        too_few = f"has {len(samples)} settled joints to evaluate"
+        raise StoreError(str(Fault(str(view.path), too_few, f"{MIN_JOINTS} are needed: run more joints")))
+    nominal = view.nominal_slots[view.nominal["status"] == Status.OK]
+    found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]))
+    errors = view.errors(samples, sampling.columns(view.study))
+    x = {name: sampling.values(errors, name) for name in scattering(view.study, errors)}
+    return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
+
+
+def modulus(found: Revolutions, load: str) -> FloatArray:
+    """Modulus of one bushing load over the revolution, (m, k), N or N m."""
+    bushing, _, letter = load.partition(".")
+    moduli = found.F if letter == "F" else found.T
+    return moduli[:, :, BUSHINGS.index(bushing)]
 
 
 def _of_load(
-    errors: dict[str, FloatArray], both: Revolutions, skip: int, name: str, iid: bool, log: bool
+    errors: dict[str, FloatArray], found: Revolutions, nominal: int, name: str, iid: bool, log: bool
 ) -> AgainstAngle:
-    bushing, _, letter = name.partition(".")
-    values = (both.F if letter == "F" else both.T)[:, :, BUSHINGS.index(bushing)]
-    y = values[skip:]
+    """Indices of one load; the first `nominal` (0 or 1) joints of `found` are the nominal joint."""
+    values = modulus(found, name)
+    y = values[nominal:]
     names = list(errors)
     first, overall = sensitivity.over_revolution(
         np.column_stack(list(errors.values())), np.log(y) if log else y, iid=iid
@@ -153,12 +151,12 @@ def _of_load(
     order = np.argsort(-overall.estimate, kind="stable")
     return AgainstAngle(
         load=name,
-        unit="N" if letter == "F" else "N*m",
+        unit=UNIT_OF_LOAD[name],
         joints=len(y),
-        origin=both.origin,
-        apart=both.apart,
-        angles=both.angles,
-        nominal=values[0] if skip else np.full(len(both.angles), np.nan),
+        origin=found.origin,
+        apart=found.apart,
+        angles=found.angles,
+        nominal=values[0] if nominal else np.full(len(found.angles), np.nan),
         spread=np.quantile(y, SPREAD, axis=0, method="inverted_cdf"),
         names=tuple(names[i] for i in order),
         first=_sorted(first, order),

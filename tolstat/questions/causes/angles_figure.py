@@ -1,4 +1,4 @@
-"""Contribution of the errors to a load against the shaft angle: text and pictures."""
+"""Shares of the errors in a load against the shaft angle: text and pictures."""
 
 from __future__ import annotations
 
@@ -39,13 +39,12 @@ def text(found: AgainstAngle, shown: int = 12) -> str:
 
 def note(found: AgainstAngle, log: bool = False) -> str:
     """Notes to the shares: joints, source of the histories, bias correction."""
-    said = (
-        f"Against the angle: the first {found.joints} settled joints, {ORIGIN[found.origin]}; bands are 95 % at each "
-    )
-    said += f"angle. Shares{' of the variance of the logarithm' if log else ''} are corrected for chance: that of an "
-    said += "error without effect is 0 on the average, and may be below."
+    said = f"Against the shaft angle: the first {found.joints} settled joints, {ORIGIN[found.origin]}; bands are the "
+    said += f"95 % intervals at each angle. Shares{' of the variance of the logarithm' if log else ''} are corrected "
+    said += "for chance: an error without effect has the mean share 0, and its estimate may be negative."
     if found.apart:
-        said += f" Their largest loads are up to {found.apart:.1e} off the stored ones: another machine or version."
+        said += f" The largest loads differ by up to {found.apart:.1e} (relative) from the stored ones, which another "
+        said += "machine or version computed."
     return said
 
 

@@ -1,69 +1,112 @@
-"""Causes of a load as text."""
+"""Causes of a load and the worst joints: text and JSON."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from tolstat.display.text import UNITS, align
+from tolstat.display.table import Column, Row, as_text
+from tolstat.display.text import UNITS, align, records
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tolstat.questions.causes.query import Causes
+    from tolstat.questions.causes.tail import Tail
 
 SIGNIFICANT = 0.05
+"""p-value below which a table marks an error of the tail."""
+ERRORS = 5
+"""Number of errors of a joint that the table of the worst joints shows."""
 
 
 def text(causes: Causes, shown: int = 12) -> str:
-    """Aligned text of `rows`."""
-    return align(rows(causes, shown))
+    """Table of the causes as aligned text; see `columns` and `largest`."""
+    return as_text(columns(causes), largest(causes, shown))
 
 
-def rows(causes: Causes, shown: int = 12) -> list[list[str]]:
-    """Table of the `shown` errors with the largest first-order indices, and of those with an effect on the tail.
-
-    Returns
-    -------
-    list of list of str
-        Headings, then one row per error: shares of the variance in per cent and rank coefficients, with intervals;
-        probability that a joint of the tail has the larger error (``direction``) and the error farther from the middle
-        (``size``), where ``*`` marks p < `SIGNIFICANT`. Columns without values are left out.
-    """
+def largest(causes: Causes, shown: int) -> pd.DataFrame:
+    """Rows of the `shown` errors with the largest first-order indices, and of those with an effect on the tail."""
     table = causes.table
     marked = (table["direction_p"] < SIGNIFICANT) | (table["size_p"] < SIGNIFICANT)
-    total = _interval if math.isnan(causes.r2) else _ends  # given data yield bounds only
-    lines = [["error", "alone, %", "in all, %", "rank coefficient", "tail: larger", "tail: farther out"]]
-    for row in table[(table.index < shown) | marked].to_dict("records"):
-        line = [row["error"], _interval(row, "first", 100), total(row, "total", 100), _interval(row, "srrc")]
-        lines.append([*line, _tail(row, "direction"), _tail(row, "size")])
-    columns = [column for column in zip(*lines, strict=True) if set(column[1:]) != {"-"}]
-    return [list(row) for row in zip(*columns, strict=True)]
+    return table[(table.index < shown) | marked]
+
+
+def columns(causes: Causes) -> list[Column]:
+    """Columns of the table of the causes.
+
+    Shares of the variance in per cent and rank coefficients, with intervals; probability that a joint of the tail has
+    the larger error (``direction``) and the error farther from the middle (``size``), where ``*`` marks
+    p < `SIGNIFICANT`.
+    """
+    if causes.from_design:
+        total = Column("in all, %", partial(_interval, name="total", factor=100), shown=_has("total"))
+    else:  # given data yield bounds only
+        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=_has("total_lower"))
+    return [
+        Column("error", lambda row: str(row["error"])),
+        Column("alone, %", partial(_interval, name="first", factor=100), shown=_has("first")),
+        total,
+        Column("rank coefficient", partial(_interval, name="srrc"), shown=_has("srrc")),
+        Column("tail: larger", partial(_tail, name="direction"), shown=_has("direction")),
+        Column("tail: farther out", partial(_tail, name="size"), shown=_has("size")),
+    ]
+
+
+def _has(name: str) -> Callable[[pd.DataFrame], bool]:
+    return lambda table: bool(table[name].notna().any())
 
 
 def note(causes: Causes, log: bool = False) -> str:
     """Notes to the table: number of joints, explained variance, restrictions."""
     unit = UNITS.get(causes.unit, causes.unit)
     std = f"{causes.std:.4g}, of the logarithm" if log else f"{causes.std:.4g} {unit}".rstrip()
-    tail = f"tail: {causes.above} joints above {causes.level:.5g} {unit}".rstrip()
-    if math.isnan(causes.r2):
-        tail, ranks, alone = "from a pick-freeze design", "", "groups of errors"
+    if causes.from_design:
+        what, ranks, tail = "groups of errors", "", "from a pick-freeze design"
     else:
-        alone = "errors"
-        ranks = f", ranks {100 * causes.r2:.0f} %"
+        what, ranks = "errors", f", ranks {100 * causes.r2:.0f} %"
+        tail = f"tail: {causes.above} joints above {causes.level:.5g} {unit}".rstrip()
     lines = [
-        f"{causes.load}: {causes.joints} joints, {causes.lost} without a valid load left out; standard deviation {std}",
-        f"{alone} alone explain {100 * causes.additive:.0f} % of the variance{ranks}; {tail}",
+        f"{causes.load}: {causes.joints} joints, {causes.without_load} without a valid load left out; "
+        f"standard deviation {std}",
+        f"{what} alone explain {100 * causes.additive:.0f} % of the variance{ranks}; {tail}",
     ]
     if causes.used < causes.joints:
-        lines.append(f"shares and ranks are of the first {causes.used} joints, the tail of no more on either side")
+        lines.append(
+            f"shares and ranks are from the first {causes.used} joints, the tail from at most as many on either side"
+        )
     if causes.table["total"].isna().all():
-        lines.append("errors are correlated: shares overlap, and there is no share in all")
+        lines.append("errors are correlated: shares overlap, and shares in all are not given")
     if causes.table["first_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only")
     return "\n".join(lines)
 
 
-def _interval(row: Mapping[Any, Any], name: str, factor: float = 1.0) -> str:
+def values(causes: Causes) -> dict[str, Any]:
+    """JSON values of the causes of a load, with all errors."""
+    found = causes._asdict() | {"table": records(causes.table)}
+    return found | {"r2": None if causes.from_design else causes.r2}
+
+
+def worst_text(tail: Tail) -> str:
+    """Table of the worst joints, with the `ERRORS` largest errors of each."""
+    unit = f" [{tail.unit}]" if tail.unit != "1" else ""
+    lines = [["row", f"{tail.by}{unit}", "status", "errors in sigma, the largest first"]]
+    for joint in tail.joints:
+        errors = [f"{name} {z:+.2f}" for name, z in list(joint.scores.items())[:ERRORS]]
+        lines.append([str(joint.row), f"{joint.value:.6g}", joint.status.label, "  ".join(errors) or "-"])
+    return align(lines, text_last=True)
+
+
+def worst_values(tail: Tail) -> dict[str, Any]:
+    """JSON values of the worst joints, with all errors."""
+    joints = [joint._asdict() | {"status": joint.status.label} for joint in tail.joints]
+    return {"by": tail.by, "unit": tail.unit, "joints": joints}
+
+
+def _interval(row: Row, name: str, factor: float = 1.0) -> str:
     value = row[name]
     if math.isnan(value):
         return "-"
@@ -71,12 +114,12 @@ def _interval(row: Mapping[Any, Any], name: str, factor: float = 1.0) -> str:
     return own if math.isnan(row[f"{name}_lower"]) else f"{own} ({_ends(row, name, factor)})"
 
 
-def _ends(row: Mapping[Any, Any], name: str, factor: float = 1.0) -> str:
+def _ends(row: Row, name: str, factor: float = 1.0) -> str:
     low, high = factor * row[f"{name}_lower"], factor * row[f"{name}_upper"]
     form = ".1f" if factor > 1 else "+.2f"
     return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
 
 
-def _tail(row: Mapping[Any, Any], name: str) -> str:
+def _tail(row: Row, name: str) -> str:
     star = "*" if row[f"{name}_p"] < SIGNIFICANT else " "
     return "-" if math.isnan(row[name]) else f"{row[name]:.2f}{star}"

@@ -1,24 +1,19 @@
-"""The joints in the tail of a load, with their errors."""
+"""The joints with the largest values of a load, with their errors."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.common import selected_results
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import LOADS
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, Status
-from tolstat.store import ResultStore
-from tolstat.store.recall import recall
-from tolstat.store.view import load
-from tolstat.study import Study
+from tolstat.store.view import View
 from tolstat.study.tolerances.distributions import score
 
 
@@ -44,25 +39,35 @@ class TailJoint(NamedTuple):
 
 
 class Tail(NamedTuple):
-    """The joints with the largest values of a load, the largest first, and its SI unit."""
+    """The joints with the largest values of a load.
 
-    joints: list[TailJoint]
+    Attributes
+    ----------
+    by, unit : str
+        The load, or the column of the results; its SI unit.
+    samples : ndarray of int, shape (m,)
+        Samples, the largest value first.
+    joints : list of TailJoint
+        The same joints.
+    """
+
+    by: str
     unit: str
+    samples: NDArray[np.intp]
+    joints: list[TailJoint]
 
 
-def worst(store: ResultStore, by: str, n: int = 10, study_path: Path | None = None) -> Tail:
+def worst_joints(view: View, by: str, n: int = 10) -> Tail:
     """Find the joints with the largest load.
 
     Parameters
     ----------
-    store : ResultStore
-        The result file.
+    view : View
+        A campaign.
     by : str
         A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or a column of the results.
     n : int
         Maximum number of joints.
-    study_path : Path, optional
-        Study file to read if the text in the result file can no longer be read.
 
     Returns
     -------
@@ -73,62 +78,39 @@ def worst(store: ResultStore, by: str, n: int = 10, study_path: Path | None = No
     Raises
     ------
     InputError
-        When there is no such load, or the study cannot be read any more.
+        When there is no such load, the study does not keep it, or the study cannot be read any more.
     StoreError
         When the study is not that of the file.
     """
-    study = recall(store, path=study_path)
-    results = store.results()
-    values, unit = _values(results, by)
-    _check_kept(store, by)
-    counts = np.isin(results["status"], SIMULATED) & np.isfinite(values)
-    if study.sampling.nominal_first and store.rows.start == 0:
-        counts[0] = False
-    rows = np.flatnonzero(counts)
-    rows = rows[np.argsort(-values[rows], kind="stable")][:n]
-    return Tail(describe(store, study, rows, values[rows], results["status"][rows]), unit)
+    values, unit = _values(view, by)
+    samples = np.flatnonzero(np.isin(view.status, SIMULATED) & np.isfinite(values))
+    samples = samples[np.argsort(-values[samples], kind="stable")][:n]
+    return Tail(by, unit, samples, _with_errors(view, samples, values[samples]))
 
 
-def describe(
-    store: ResultStore, study: Study, rows: NDArray[np.intp], values: NDArray[np.float64], status: NDArray[np.uint8]
-) -> list[TailJoint]:
-    """Combine the loads of joints with their errors.
-
-    Parameters
-    ----------
-    store : ResultStore
-        The result file.
-    study : Study
-        Its study.
-    rows : ndarray of int, shape (m,)
-        File slots of the joints.
-    values, status : ndarray, shape (m,)
-        Their load and `tables.Status`.
-    """
-    errors = np.concatenate([store.errors(slice(0, 0)), *(store.errors(slice(row, row + 1)) for row in rows)])
-    scores = {name: score(d, sampling.values(errors, name)) for name, d in study.tolerances.items()}
+def _with_errors(view: View, samples: NDArray[np.intp], values: NDArray[np.float64]) -> list[TailJoint]:
+    """Combine the values of joints with their errors."""
+    ascending, place = np.unique(samples, return_inverse=True)
+    errors = view.errors(ascending, sampling.columns(view.study))[place]
+    scores = {name: score(own, sampling.values(errors, name)) for name, own in view.study.tolerances.items()}
     joints = []
-    for i, row in enumerate(rows):
+    for i, row in enumerate(view.rows(samples).tolist()):
         own = {name: float(z[i]) for name, z in scores.items()}
         ordered = dict(sorted(own.items(), key=lambda item: -abs(item[1])))
-        joints.append(TailJoint(store.rows[row], float(values[i]), Status(status[i]), ordered))
+        joints.append(TailJoint(row, float(values[i]), Status(view.status[samples[i]]), ordered))
     return joints
 
 
-def _values(results: NDArray[np.void], by: str) -> tuple[NDArray[np.float64], str]:
-    if by in UNIT_OF_LOAD:
-        return load(results, by)
-    columns = {c.name: c for c in RESULT_COLUMNS}
-    if by not in columns:
-        remedy = did_you_mean(by, [*UNIT_OF_LOAD, *columns])
-        raise InputError([Fault("--by", f"{by!r} is neither a load nor a column of the results", remedy)])
-    return columns[by].of(results).astype(np.float64), columns[by].unit
-
-
-def _check_kept(store: ResultStore, by: str) -> None:
-    """Raise `InputError` if the study does not keep the load or column."""
-    held = [c.name for c in store.columns]
-    loads = [load for load in UNIT_OF_LOAD if selected_results.holds(store.columns, load)]
-    if by not in (*loads, *held):
-        found = f"{store.path} does not keep {by}, see [output] results of its study"
-        raise InputError([Fault("--by", found, f"give one of: {', '.join([*loads, *held])}")])
+def _values(view: View, by: str) -> tuple[NDArray[np.float64], str]:
+    """Values of a load or of a column of the results, (n,), and their unit."""
+    columns = {column.name: column for column in view.columns}
+    if by in view.kept_loads:
+        return LOADS[by].of(view.results), LOADS[by].unit
+    if by in columns:
+        values = columns[by].of(view.read_results([columns[by].field]))
+        return values.astype(np.float64), columns[by].unit
+    if by in LOADS or by in [column.name for column in RESULT_COLUMNS]:
+        found = f"is not kept in {view.path}, see [output] results of its study"
+        raise InputError([Fault(by, found, f"give one of: {', '.join([*view.kept_loads, *columns])}")])
+    remedy = did_you_mean(by, [*view.kept_loads, *columns])
+    raise InputError([Fault(by, "is neither a load nor a column of the results", remedy)])

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import DISPLAY_UNITS
-from tolstat.store.sample_load import FloatArray
 from tolstat.store.view import View
 
 _ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}

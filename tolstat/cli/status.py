@@ -1,4 +1,4 @@
-"""``tolstat status``: what became of the joints."""
+"""``tolstat status``: number of joints by status."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 
 def status(
     file: ResultFile,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
-    """Print what became of the joints of a campaign.
+    """Print the number of joints by status.
 
-    One line for each status with the number of joints, and the share above each limit so far, with its 95 %
-    interval. A campaign under way can be looked at: it is not disturbed, and its rate and time to go are printed, too.
+    Prints one line per status, and the share of joints above each limit so far with its 95 % interval. During a run,
+    prints also its rate and the remaining time; reading the file does not disturb the run.
+
+    Example: tolstat status iso2768_f.h5
     """
     from tolstat.store import ResultStore
 
@@ -37,7 +39,7 @@ def status(
 
 
 def _summary(store: ResultStore) -> dict[str, Any]:
-    """What there is to say, read some rows at a time; blocks of pending ones are not read."""
+    """Collect the counts and shares, some rows at a time; blocks of pending rows are skipped."""
     import numpy as np
 
     from tolstat.common.tables import Status
@@ -60,13 +62,13 @@ def _summary(store: ResultStore) -> dict[str, Any]:
     summary |= {state.label: int(found[state]) for state in Status}
     condition = {"damaged": damaged, "simulated_again": int((store.attempt() > 0).sum())}
     summary |= {name: count for name, count in condition.items() if count} | _pace(store, summary["pending"])
-    judged = {} if store.sampling["method"] == "subset" else units  # whose joints are no sample
+    judged = {} if store.sampling["method"] == "subset" else units  # joints of its levels are no sample
     summary["exceedance"] = [_exceedance(store, states, name, loads[name], unit) for name, unit in judged.items()]
     return summary
 
 
 def _pace(store: ResultStore, pending: int) -> dict[str, Any]:
-    """Joints a second and seconds to go of a run under way, as soon as there are any."""
+    """Return rate and remaining time of the run in progress, once it has finished joints."""
     session = store.session()
     if session is None:
         return {"running": False}
@@ -80,7 +82,7 @@ def _pace(store: ResultStore, pending: int) -> dict[str, Any]:
 def _exceedance(
     store: ResultStore, states: NDArray[np.uint8], name: str, values: NDArray[np.float64], unit: str
 ) -> dict[str, Any]:
-    """Share of the joints above a limit so far; None for what cannot be said."""
+    """Return the share of joints above a limit so far; None for values that are unknown."""
     from tolstat.analysis import exceedance, weighted
 
     counting = slice(int(store.sampling["nominal_first"] and store.rows.start == 0), None)

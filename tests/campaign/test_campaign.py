@@ -306,7 +306,7 @@ def test_signals_mean_the_same_as_before_afterwards(tmp_path: Path, monkeypatch:
 def test_an_ignored_hang_up_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with signals.caught() as stop, stop.patiently():
+        with signals.caught() as stop, stop.deferred():
             signal.raise_signal(signal.SIGHUP)
             assert not stop()
             signal.raise_signal(signal.SIGTERM)
@@ -327,7 +327,7 @@ def test_workers_and_block_must_be_positive(tmp_path: Path) -> None:
 def test_default_block(n: int, workers: int) -> None:
     size = execution.default_block(n, workers)
     assert 1 <= size <= execution.MAX_BLOCK
-    assert size == 1 or n // size >= execution.BLOCKS_PER_WORKER * workers
+    assert size == 1 or n // size >= execution.MIN_BLOCKS_PER_WORKER * workers
 
 
 REAL_STUDY = (

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from tests.support.environment import environment
-from tolstat.campaign.executors import Lost, Work, WorkerDied, available_workers, map_here, map_in_processes
+from tolstat.campaign.executors import Lost, Work, WorkerDied, available_workers, map_in_processes, map_serially
 from tolstat.campaign.executors.common import THREAD_VARIABLES, never
 
 SQUARES = {i: i * i for i in range(20)}
@@ -26,7 +26,7 @@ def map_blocks(
     function: Callable[[Any], Any], blocks: Iterable[Any], workers: int, stop: Callable[[], bool] = never, **how: Any
 ) -> Generator[tuple[Any, Any], None, None]:
     if workers == 1:
-        return map_here(Work(function, **how), blocks, stop)
+        return map_serially(Work(function, **how), blocks, stop)
     return map_in_processes(Work(function, **how), blocks, workers, stop)
 
 

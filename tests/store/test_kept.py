@@ -117,7 +117,7 @@ def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
         assert checked is not None
         assert np.isnan(checked.checks["newton"].results["T_max"]).all()
         assert np.isfinite(checked.checks["newton"].results["F_max"][:, :4]).all()
-    assert path.stat().st_size < everything.stat().st_size - 60 * (result_file.OVERHEAD // 2)
+    assert path.stat().st_size < everything.stat().st_size - 60 * (result_file.COLUMN_OVERHEAD // 2)
 
 
 def test_the_checksum_covers_what_is_stored(tmp_path: Path) -> None:

@@ -170,13 +170,13 @@ def test_limits_are_replaced_whole_or_not_at_all(
 
     with ResultStore.open(path, "r+") as store, monkeypatch.context() as patch:
         patch.setattr("os.replace", full)
-        store.judge_by(study)
+        store.update_study(study)
         with pytest.raises(StoreError, match=r"cannot be replaced: No space left on device\n  hint: make room"):
-            store.judge_by(other)
+            store.update_study(other)
         assert store.limits == study.limits
     assert path.read_bytes() == before
     with ResultStore.open(path, "r+") as store:
-        store.judge_by(other)
+        store.update_study(other)
         assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
     with ResultStore.open(path) as store:
         assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")

@@ -61,6 +61,6 @@ def with_keys(text: str, section: str, values: Mapping[str, Any], place: str) ->
     except tomllib.TOMLDecodeError:
         same = False
     if not same:
-        remedy = f"write [{section}] on a line of its own, and below it one line a key"
-        raise InputError([Fault(f"{place}: {section}", "cannot be changed in place", remedy)])
+        remedy = f"write the header [{section}] on a line of its own, and each key on one line below"
+        raise InputError([Fault(f"{place}: {section}", "cannot be edited automatically", remedy)])
     return found

@@ -163,5 +163,7 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     got["tolerances"] = {e.pattern: e.value for e in selection.entries(got["tolerances"])}
     if got != wanted:
         place = f"{study.name}.toml: tolerances"
-        raise InputError([Fault(place, "has an entry that is not one line: it cannot be changed in place", _EXAMPLE)])
+        raise InputError(
+            [Fault(place, "has an entry of several lines, which cannot be edited automatically", _EXAMPLE)]
+        )
     return found

@@ -34,9 +34,9 @@ def test_a_rule_is_read() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("often", ["'often' is no rule", 'write --until "P(cross1.F > 700 N) width < 0.01"']),
-        ("P(cros1.F > 700 N) width < 2", ["did you mean 'cross1.F'?", "width 2 does not lie between 0 and 1"]),
-        ("P(cross1.F > 700 mm) width < few", ["'700 mm' cannot be a value in N", "width few does not"]),
+        ("often", ["'often' is not a rule", 'write --until "P(cross1.F > 700 N) width < 0.01"']),
+        ("P(cros1.F > 700 N) width < 2", ["did you mean 'cross1.F'?", "width 2 is not between 0 and 1"]),
+        ("P(cross1.F > 700 mm) width < few", ["'700 mm' cannot be a value in N", "width few is not"]),
         ("P(fork1.T > 40) width < 0.1", ["'40' has no unit"]),
     ],
 )
@@ -141,7 +141,7 @@ def test_too_few_joints_are_all_simulated(tmp_path: Path) -> None:
 def test_until_is_for_independent_samples(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(synthetic.STUDY.replace("n = 60", 'n = 64\nmethod = "sobol"'), encoding="utf-8")
     loaded = study.load(tmp_path / "s.toml")
-    with pytest.raises(InputError, match=r"sampling\.method is 'sobol': only independent samples, alike in weight"):
+    with pytest.raises(InputError, match=r"sampling\.method is 'sobol': .* independent samples"):
         stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE), lambda row: None)
 
 

@@ -297,10 +297,10 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
     pending = synthetic.store(tmp_path, simulated=0)
     bad = written(tmp_path, REAL.replace("[solver]", "[solver]\nstep = 3"))
     for arguments, words in (
-        ((tmp_path / "none.h5",), ["is not there"]),
+        ((tmp_path / "none.h5",), ["does not exist"]),
         ((pending,), ["has no settled joint", "tolstat run"]),
         ((pending, "--joints", 0), ["0 is less than one"]),
-        ((pending, "--joints", "most"), ["joints: 'most' is no whole number", '"all"']),
+        ((pending, "--joints", "most"), ["joints: 'most' is not a whole number", "--joints all"]),
         ((bad, "--joints", 0), ["0 is less than one", "solver.step"]),
         ((pending, "--out", tmp_path / "none" / "a.csv"), ["no such folder"]),
     ):
@@ -311,5 +311,5 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="less than one"):
         verify.check_study(study.load(written(tmp_path)), joints=-1)
     monkeypatch.setattr(verify, "versions", lambda: {"tolstat": "9.9", "sources": "0"})
-    with pytest.raises(StoreError, match="was made by other code"):
+    with pytest.raises(StoreError, match="was made by another version of the code"):
         verify.check_file(synthetic.store(tmp_path, name="other"))

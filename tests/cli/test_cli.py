@@ -249,7 +249,7 @@ def test_report_creates_its_output_folder(tmp_path):
     done = call("report", synthetic.store(tmp_path), "--out", folder)
     assert done.exit_code == 0, done.stderr
     assert (folder / "small_exceedance.csv").is_file()
-    for file, target, word in (("none.h5", "other", "is not there"), ("small.h5", "small.toml", "cannot be created")):
+    for file, target, word in (("none.h5", "other", "does not exist"), ("small.h5", "small.toml", "cannot be created")):
         done = call("report", tmp_path / file, "--out", tmp_path / target)
         assert done.exit_code == 2
         assert word in done.stderr
@@ -300,7 +300,7 @@ def test_interrupted_run_says_how_to_resume(study, monkeypatch):
     monkeypatch.setattr(campaign, "run", stopped)
     done = call("run", study)
     assert (done.exit_code, done.stdout) == (130, "")
-    assert "20 of 61 joints are kept" in done.stderr
+    assert "small.h5 holds the results of 20 of 61 joints" in done.stderr
 
 
 def test_ctrl_c_anywhere_else_is_130(study, monkeypatch):

@@ -171,7 +171,7 @@ def test_limits_are_replaced_whole_or_not_at_all(
     with ResultStore.open(path, "r+") as store, monkeypatch.context() as patch:
         patch.setattr("os.replace", full)
         store.update_study(study)
-        with pytest.raises(StoreError, match=r"cannot be replaced: No space left on device\n  hint: make room"):
+        with pytest.raises(StoreError, match=r"cannot be replaced: No space left on device\n  hint: free disk space"):
             store.update_study(other)
         assert store.limits == study.limits
     assert path.read_bytes() == before
@@ -208,9 +208,9 @@ def test_other_files_are_refused(tmp_path: Path, study: fakes.Study, change: dic
 def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> None:
     plain = tmp_path / "text.h5"
     plain.write_text("not HDF5")
-    with pytest.raises(StoreError, match=r"text.h5: is not an HDF5 file\n  hint: give a file"):
+    with pytest.raises(StoreError, match=r"text.h5: is not an HDF5 file\n  hint: give a result file"):
         ResultStore.open(plain)
-    with pytest.raises(StoreError, match=r"none.h5: is not there"):
+    with pytest.raises(StoreError, match=r"none.h5: does not exist"):
         ResultStore.open(tmp_path / "none.h5")
     with pytest.raises(StoreError, match="is a folder"):
         ResultStore.open(tmp_path)
@@ -294,9 +294,7 @@ def test_other_sources_of_the_same_version_are_refused(tmp_path: Path, monkeypat
     campaign.run(fakes.Study(), path, 1, stages=fakes.stages())  # the same code in another place
     for name in ("kernel/contact.py", "joint/material.py", "tolerance.py"):
         (package / name).write_text("# edited")
-        says = (
-            f"a.h5: was begun by other code\n    sources: hash .* in the file, {provenance.source_hash()} now\n  hint: "
-        )
+        says = f"a.h5: was begun by another version of the code\n    sources: hash .* in the file, {provenance.source_hash()} now\n  hint: "
         with pytest.raises(StoreError, match=says):
             campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
 

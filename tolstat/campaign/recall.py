@@ -47,7 +47,7 @@ def recall(store: ResultStore, n: int | None = None, path: Path | None = None) -
         study = replace(study, solver=_solver(store, study))
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     if differing:
-        lines = ["its study, or a file that the study names, has changed since the campaign was begun", *differing]
+        lines = ["does not match the study that was read for it", *differing]
         found = "\n    ".join(lines)
         raise StoreError(str(Fault(str(store.path), found, "give the study file of the campaign: --study STUDY")))
     if n is None:

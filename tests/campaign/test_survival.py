@@ -295,7 +295,7 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, h
         campaign.run(study, path, 1, 1, interrupt, stages, retry=AGAIN, tell=told.append)
     campaign.run(study, path, 2, 1, stages=stages)  # the rows to come know their settings
     assert campaign.run(study, path, 1, stages=stages, retry=AGAIN, tell=told.append).failed == 0
-    assert told == [f"{failed.size} joints once more", "0 joints once more"]
+    assert told == [f"{failed.size} joints are simulated again", "0 joints are simulated again"]
     with ResultStore.open(path) as store:
         assert store.retries == [json.loads(json.dumps(AGAIN.entry()))]
         assert np.flatnonzero(store.attempt() == 1).tolist() == failed.tolist()

@@ -77,8 +77,8 @@ def causes(
     """
     if against_angle is not None:
         if points is not None or out is not None:
-            found = "cannot be combined with --pick-freeze and --out"
-            raise InputError([Fault("--against-angle", found, "remove these two, or --against-angle")])
+            remedy = "remove these two, or --against-angle"
+            raise InputError([Fault("--against-angle", "cannot be combined with --pick-freeze or --out", remedy)])
         _against_angle(file, by, n, log, against_angle, joints, study_file)
         return
     from tolstat.display import text

@@ -58,8 +58,8 @@ def test_failed_and_unsettled_joints_are_counted_both_ways():
     row = table.iloc[0]
     assert (row["n"], row["n_failed"], row["n_unsettled"]) == (200, 7, 5)
     assert row["bound_upper"] - row["bound_lower"] == pytest.approx(12 / 200)
-    assert "failed, unsettled both ways" in text.limits(table)
-    assert "failed, unsettled both ways" not in text.limits(exceedance.limits(campaign()))
+    assert "with unresolved joints" in text.limits(table)
+    assert "with unresolved joints" not in text.limits(exceedance.limits(campaign()))
 
 
 def test_dependent_samples_have_no_interval_and_the_note_says_why():

@@ -110,10 +110,12 @@ def parse(text: str) -> Rule:
     InputError
         With every fault of it.
     """
-    said = rules.parse(text, "width", "--until", EXAMPLE)
-    if len(said.loads) > 1:
-        raise InputError([Fault("--until", f"{text!r} is a rule for {len(said.loads)} loads instead of one", EXAMPLE)])
-    return Rule(said.text, said.loads[0], said.level, said.bound)
+    statement = rules.parse(text, "width", "--until", EXAMPLE)
+    if len(statement.loads) > 1:
+        raise InputError(
+            [Fault("--until", f"{text!r} is a rule for {len(statement.loads)} loads instead of one", EXAMPLE)]
+        )
+    return Rule(statement.text, statement.loads[0], statement.level, statement.bound)
 
 
 def looks(width: float, n: int) -> list[int]:

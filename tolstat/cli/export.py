@@ -116,8 +116,8 @@ def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO
     from tolstat.report import summary
 
     found = summary.of_store(store)
-    asked = {load: causes.of_store(store, load) for load in by}
-    found["causes"] = {load: own._asdict() | {"table": text.records(own.table)} for load, own in asked.items()}
+    by_load = {load: causes.of_store(store, load) for load in by}
+    found["causes"] = {load: own._asdict() | {"table": text.records(own.table)} for load, own in by_load.items()}
     return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"
 
 

@@ -88,13 +88,13 @@ def rare(
     except WorkerDied as error:
         say(f"error: {error}")
         raise typer.Exit(1) from error
-    asked = found.sampling
-    levels = tables.table(found.levels, asked.load)
+    sampling = found.sampling
+    levels = tables.table(found.levels, sampling.load)
     if as_json:
         typer.echo(as_text(_summary(found) | {"levels": text.records(levels)}))
     else:
         typer.echo(text.plain(levels))
-        typer.echo(tables.sentence(found.estimate, asked.load, asked.above))
+        typer.echo(tables.sentence(found.estimate, sampling.load, sampling.above))
     _print_messages(found, path)
 
 
@@ -143,7 +143,7 @@ def _summary(found: Found) -> dict[str, Any]:
 def _print_messages(found: Found, path: Path) -> None:
     say(f"{path}: {found.joints} joints, {found.unresolved} of them failed or not settled")
     if found.reached:
-        say(f"precision of {found.as_sure_as:.2g} random joints")
+        say(f"the estimate is as precise as that from {found.as_sure_as:.2g} random joints")
     if found.unresolved_first and found.sampling.unresolved == "below":
         say(
             "joints without a valid load count as below the level; if all of them were above, P would be at most "

@@ -104,7 +104,7 @@ _REMEDIES = {
     "greater_than_equal": "give a value of at least {ge}",
     "less_than": "give a value below {lt}",
     "less_than_equal": "give a value of at most {le}",
-    "too_short": "give at least {min_length}",
+    "too_short": "give at least {min_length} entries",
     "int_type": "write a whole number, without quotes",
     "int_from_float": "write a whole number",
     "bool_type": "write true or false, without quotes",

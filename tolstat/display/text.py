@@ -32,9 +32,9 @@ def limits(table: pd.DataFrame) -> str:
     """
     unresolved = bool((table["n_failed"] + table["n_unsettled"]).any())
     rows = [["load", "nominal", "limit", "joints", "above", "share", "95 % interval"]]
-    rows[0] += ["failed, unsettled both ways"] if unresolved else []
+    rows[0] += ["with unresolved joints"] if unresolved else []
     verified = bool(table["numerical_error"].notna().any())
-    rows[0] += ["numerical error both ways", "all together"] if verified else []
+    rows[0] += ["with numerical error", "total interval"] if verified else []
     for row in table.to_dict("records"):
         line = [row["load"], value(row["nominal"], row["unit"]), value(row["level"], row["unit"])]
         line += [str(row["n"]), str(row["count"]), percent(row["estimate"])]

@@ -22,7 +22,7 @@ MAX_KEPT_SAMPLES = 12_000
 """Maximum number of samples in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
 
 NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
-"""Stands for the statistics of single revolutions where none are asked for."""
+"""Empty statistics of single revolutions, if they are not needed."""
 
 
 def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:

@@ -1,7 +1,7 @@
 """Stationary joints: their motion never repeats, but the distribution of their largest loads does not change.
 
-Such a joint is watched for some revolutions. The largest loads of each revolution (block maxima) tell how large the
-largest of ``solver.duration`` revolutions is: values above a threshold follow a generalised Pareto distribution
+Such a joint is watched for some revolutions. The largest loads of each revolution (block maxima) predict the
+largest of ``solver.duration`` revolutions: values above a threshold follow a generalised Pareto distribution
 (Pickands 1975), fitted by probability-weighted moments (Hosking and Wallis 1987). Heavy tails are excluded from the
 fit: a driven joint with losses has bounded loads.
 """

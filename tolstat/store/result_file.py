@@ -318,7 +318,7 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
             raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run") from error
         raise store_error(path, f"is damaged: {error}", RUN_AGAIN) from error
     if mode != "r" and not is_at(file, path):
-        # opened before another process replaced the file, locked afterwards: this file has no name any more
+        # another process replaced the file between opening and locking: the open file is not at `path`
         file.close()
         raise store_error(path, "is being written by another process", "wait until that process ends, or stop it")
     return file
@@ -389,5 +389,5 @@ def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], gr
 
 
 def store_error(path: Path, found: str, remedy: str) -> StoreError:
-    """Make the error that says what is wrong with a file and what to do about it."""
+    """Return the error of a file: what is wrong, and the remedy."""
     return StoreError(str(Fault(str(path), found, remedy)))

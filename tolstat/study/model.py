@@ -180,7 +180,7 @@ class Subset(Sampling):
     def _whole_seeds(self) -> Self:
         seeds = self.per_level * self.p0
         if abs(seeds - round(seeds)) > 1e-9 or seeds < 2:
-            found = f"p0 = {self.p0:g} of n = {self.per_level} joints is {seeds:g} seeds"
+            found = f"p0 x n = {self.p0:g} x {self.per_level} = {seeds:g} seeds"
             raise refuse(found, "give n and p0 whose product is a whole number of at least 2")
         return self
 

@@ -82,7 +82,7 @@ def test_interrupted_in_progress_and_resumed(tmp_path: Path, reference, workers:
         if counts.done >= 12:
             raise KeyboardInterrupt
 
-    with pytest.raises(campaign.Interrupted, match="run the same command to go on") as caught:
+    with pytest.raises(campaign.Interrupted, match="to resume, run the same command again") as caught:
         campaign.run(study, path, workers, 4, progress=interrupt, stages=fakes.stages())
     assert caught.value.counts.done == 12
     assert caught.value.path == path
@@ -162,7 +162,7 @@ def test_a_request_to_stop_keeps_finished_blocks(tmp_path: Path, workers: int, n
     assert process.returncode == 128 + number
     with ResultStore.open(path) as store:
         counts = store.counts()
-    assert said == f"stopped: {counts.done} of 40 joints are kept in {path}\n  hint: run the same command to go on\n"
+    assert said.startswith(f"stopped: {path} holds the results of {counts.done} of 40 joints\n  hint: to resume")
     assert 2 <= counts.done < 40
     campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
     campaign.run(fakes.Study(), tmp_path / "b.h5", 1, stages=fakes.stages())
@@ -244,7 +244,7 @@ def test_another_study_is_refused_with_the_keys(tmp_path: Path) -> None:
         f"{path}: is the result file of another study\n"
         "    sampling.seed: 7 in the file, 8 in the study\n"
         "    solver.steps_per_rev: 30 in the file, 60 in the study\n"
-        "  hint: use another --out, or delete the file"
+        "  hint: give another file: --out OTHER.h5"
     )
     assert path.read_bytes() == before
 
@@ -307,7 +307,7 @@ def test_signals_mean_the_same_as_before_afterwards(tmp_path: Path, monkeypatch:
 def test_an_ignored_hang_up_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with signals.caught() as stop, stop.patiently():
+        with signals.caught() as stop, stop.deferred():
             signal.raise_signal(signal.SIGHUP)
             assert not stop()
             signal.raise_signal(signal.SIGTERM)
@@ -328,7 +328,7 @@ def test_workers_and_block_must_be_positive(tmp_path: Path) -> None:
 def test_default_block(n: int, workers: int) -> None:
     size = execution.default_block(n, workers)
     assert 1 <= size <= execution.MAX_BLOCK
-    assert size == 1 or n // size >= execution.BLOCKS_PER_WORKER * workers
+    assert size == 1 or n // size >= execution.MIN_BLOCKS_PER_WORKER * workers
 
 
 REAL_STUDY = (
@@ -379,9 +379,9 @@ def test_progress_lines_once_a_minute() -> None:
         now[0] = 125
         lines(Counts(100, 100, 1, 3))
     assert out.getvalue().splitlines() == [
-        "tolstat: 73 of 100 joints, 1 joints/s, 0:27 to go, 2 failed, 1 not settled",
-        "tolstat: 90 of 100 joints, 0.639 joints/s, 0:16 to go, 2 failed, 1 not settled",
-        "tolstat: 100 of 100 joints, 0.704 joints/s, 0:00 to go, 3 failed, 1 not settled",
+        "tolstat: 73 of 100 joints, 1 joints/s, 0:27 remaining, 2 failed, 1 not settled",
+        "tolstat: 90 of 100 joints, 0.639 joints/s, 0:16 remaining, 2 failed, 1 not settled",
+        "tolstat: 100 of 100 joints, 0.704 joints/s, 0:00 remaining, 3 failed, 1 not settled",
     ]
 
 
@@ -389,7 +389,7 @@ def test_progress_text_before_the_first_joint() -> None:
     text = progress.text(Counts(513, 100, 0, 0), begun=100, seconds=0.0)
     assert text == "100 of 513 joints, 0 failed, 0 not settled"
     assert progress.text(Counts(513, 100, 4, 0, 3), 100, 0.0).endswith(", 0 failed, 4 not settled, 3 not resolved")
-    assert "2:00:00 to go" in progress.text(Counts(7201, 1, 0, 0), begun=0, seconds=1.0)
+    assert "2:00:00 remaining" in progress.text(Counts(7201, 1, 0, 0), begun=0, seconds=1.0)
 
 
 def test_progress_bar_goes_to_stderr(capfd: pytest.CaptureFixture[str]) -> None:

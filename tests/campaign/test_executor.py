@@ -16,17 +16,21 @@ from typing import Any
 import pytest
 
 from tests.support.environment import environment
-from tolstat.campaign.executors import Lost, Work, WorkerDied, available_workers, map_here, map_in_processes
-from tolstat.campaign.executors.common import THREAD_VARIABLES, never
+from tolstat.campaign.executors import Lost, Work, WorkerDied, available_workers, map_in_processes, map_serially
+from tolstat.campaign.executors.common import THREAD_VARIABLES, never_stop
 
 SQUARES = {i: i * i for i in range(20)}
 
 
 def map_blocks(
-    function: Callable[[Any], Any], blocks: Iterable[Any], workers: int, stop: Callable[[], bool] = never, **how: Any
+    function: Callable[[Any], Any],
+    blocks: Iterable[Any],
+    workers: int,
+    stop: Callable[[], bool] = never_stop,
+    **how: Any,
 ) -> Generator[tuple[Any, Any], None, None]:
     if workers == 1:
-        return map_here(Work(function, **how), blocks, stop)
+        return map_serially(Work(function, **how), blocks, stop)
     return map_in_processes(Work(function, **how), blocks, workers, stop)
 
 
@@ -179,9 +183,9 @@ def test_the_only_block_is_given_up_too() -> None:
 
 
 def test_no_block_is_blamed_when_all_workers_die() -> None:
-    with pytest.raises(WorkerDied, match="6 times in a row a worker process died over its block") as caught:
+    with pytest.raises(WorkerDied, match="6 worker processes in a row died") as caught:
         list(map_in_processes(Work(die), range(100), 1))
-    assert "killed by SIGKILL\n  hint: use fewer workers" in str(caught.value)
+    assert "killed by SIGKILL\n  hint: if memory is short, use fewer workers" in str(caught.value)
     assert multiprocessing.active_children() == []
 
 
@@ -205,7 +209,7 @@ def test_an_exception_in_every_block_comes_through(workers: int) -> None:
 
 
 def test_workers_that_cannot_start() -> None:
-    with pytest.raises(WorkerDied, match="died before it had begun, 3 times in a row: ended with exit code 0"):
+    with pytest.raises(WorkerDied, match="3 worker processes in a row died at their start: ended with exit code 0"):
         list(map_blocks(square, range(9), 2, prepare=sys.exit))
 
 
@@ -217,7 +221,7 @@ def test_a_script_without_a_main_guard_is_told(tmp_path: Path) -> None:
     assert ended.returncode == 1
     assert "WorkerDied" in ended.stderr
     assert '__name__ == "__main__"' in ended.stderr
-    assert "died before it had begun" in ended.stderr
+    assert "died at their start" in ended.stderr
 
 
 def test_workers_end_with_their_parent(tmp_path: Path) -> None:

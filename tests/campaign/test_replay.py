@@ -123,7 +123,7 @@ def test_command(file: Path, tmp_path: Path) -> None:
 
     done = call("replay", file, "--row", 1, "--out", tmp_path / "trace.csv", "--json")
     assert done.exit_code == 0
-    assert done.stderr.endswith("row 1: equal to what is stored, bit for bit\n")
+    assert done.stderr.endswith("row 1: identical to the stored results, bit for bit\n")
     summary = json.loads(done.stdout)
     assert summary["equal"]
     trace = pd.read_csv(tmp_path / "trace.csv")
@@ -136,11 +136,11 @@ def test_command(file: Path, tmp_path: Path) -> None:
         check_anew(changed, 1)
     done = call("replay", path, "--row", 1)
     assert done.exit_code == 1
-    assert "row 1: 1 stored values differ, by a relative 0.0" in done.stderr
-    assert "the versions are those that made the file" in done.stderr
+    assert "row 1: 1 values differ, largest relative difference 0.0" in done.stderr
+    assert "all versions are those that made the file" in done.stderr
     done = call("replay", path, "--row", 99)
     assert done.exit_code == 2
-    assert "hint: give one of these with --row" in done.stderr
+    assert "hint: give one of these rows, for example --row 0" in done.stderr
 
 
 def test_pending_rows_and_unknown_options_are_refused(file: Path, tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_pending_rows_and_unknown_options_are_refused(file: Path, tmp_path: Path
     with ResultStore.open(path) as store:
         with pytest.raises(InputError, match="row 2 is pending"):
             replay.replay(store, 2)
-        with pytest.raises(InputError, match="options of the solver that this tolstat does not know: warp"):
+        with pytest.raises(InputError, match="solver options that this version of tolstat does not know: warp"):
             replay.replay(store, 1)
 
 

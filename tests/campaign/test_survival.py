@@ -163,7 +163,7 @@ def test_a_file_that_is_deleted_meanwhile_is_put_back(
             if replaced:
                 path.write_text("of somebody else")
 
-    with pytest.raises(StoreError, match=f"while the campaign went on\n  hint: {tmp_path}.* holds all finished joints"):
+    with pytest.raises(StoreError, match=f"during the campaign\n  hint: {tmp_path}.* holds all finished joints"):
         campaign.run(fakes.Study(), path, 1, 5, progress=remove, stages=fakes.stages())
     kept = tmp_path / "a.saved.h5" if replaced else path
     with ResultStore.open(kept) as store:
@@ -196,14 +196,14 @@ def test_what_cannot_be_simulated_again_is_refused(tmp_path: Path) -> None:
         file["errors/pin1.offset_t"][7] += 1e-9
         file["histories/mode"][3, 4, 1] += 1
     with ResultStore.open(path) as store:
-        with pytest.raises(StoreError, match="is damaged: the errors of row 7 are not as they were written"):
+        with pytest.raises(StoreError, match="is damaged: the errors of row 7 do not match"):
             store.errors()
-        with pytest.raises(StoreError, match="is damaged: the history mode of row 3 is not as written"):
+        with pytest.raises(StoreError, match="is damaged: the history mode of row 3 does not match"):
             store.histories("mode")
         assert store.histories("mode", np.arange(4, 9)).any()
     with h5py.File(path, "r+") as file:
         file.attrs["created"] = "yesterday"
-    with pytest.raises(StoreError, match="is damaged: its attributes are not as they were written"):
+    with pytest.raises(StoreError, match="is damaged: its attributes do not match"):
         ResultStore.open(path)
 
 
@@ -295,7 +295,7 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, h
         campaign.run(study, path, 1, 1, interrupt, stages, retry=AGAIN, tell=told.append)
     campaign.run(study, path, 2, 1, stages=stages)  # the rows to come know their settings
     assert campaign.run(study, path, 1, stages=stages, retry=AGAIN, tell=told.append).failed == 0
-    assert told == [f"{failed.size} joints once more", "0 joints once more"]
+    assert told == [f"{failed.size} joints are simulated again", "0 joints are simulated again"]
     with ResultStore.open(path) as store:
         assert store.retries == [json.loads(json.dumps(AGAIN.entry()))]
         assert np.flatnonzero(store.attempt() == 1).tolist() == failed.tolist()
@@ -422,7 +422,7 @@ def read_only(small_disk: Path) -> Iterator[Path]:
 
 def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expected: dict[str, bytes]) -> None:
     with pytest.raises(
-        StoreError, match=r"new\.h5: cannot be written: Read-only file system\n  hint: check the folder"
+        StoreError, match=r"new\.h5: cannot be written: Read-only file system\n  hint: check that the folder"
     ):
         campaign.run(fakes.Study(), read_only / "new.h5", 1, stages=fakes.stages())
     with pytest.raises(StoreError, match=r"a\.h5: cannot be opened: no permission\n  hint: change its permissions"):
@@ -439,7 +439,7 @@ def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expecte
 
 def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
     study, path = fakes.Study(output=fakes.Output("full")), small_disk / "a.h5"
-    with pytest.raises(StoreError, match=r"No space left on device\n  hint: make room"):
+    with pytest.raises(StoreError, match=r"No space left on device\n  hint: free disk space"):
         campaign.run(study, path, 1, 2, stages=fakes.stages())
     moved = tmp_path / "a.h5"
     shutil.copy(path, moved)

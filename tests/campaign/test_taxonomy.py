@@ -137,7 +137,7 @@ def test_each_state_can_be_asked_for_again(path: Path) -> None:
     made = study.load(path.with_suffix(".toml"))
     for state in Status:
         if state == Status.PENDING:
-            with pytest.raises(InputError, match="'pending' is no state"):
+            with pytest.raises(InputError, match="'pending' is not a status"):
                 parse(state.label, (), made)
         else:
             assert parse(state.label, (), made).status == (state,)

@@ -111,15 +111,15 @@ def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):
 
 def test_each_check_changes_what_it_says():
     options = Options()
-    assert verify.changed(options, "half_step") == options._replace(steps_per_rev=360)
-    assert verify.changed(options, "newton").newton_tol == pytest.approx(1e-8)
-    settling = verify.changed(options, "settling")
+    assert verify.options_of_check(options, "half_step") == options._replace(steps_per_rev=360)
+    assert verify.options_of_check(options, "newton").newton_tol == pytest.approx(1e-8)
+    settling = verify.options_of_check(options, "settling")
     assert (settling.settle_tol, settling.start) == (pytest.approx(1e-6), Start.RAMP)
     for method in Method:
-        assert verify.changed(options._replace(method=int(method)), "method").method != method
+        assert verify.options_of_check(options._replace(method=int(method)), "method").method != method
     # types of the fields decide which compiled code runs
-    for name in verify.FULL:
-        assert [type(x) for x in verify.changed(options, name)] == [type(x) for x in options]
+    for name in verify.ALL_CHECKS:
+        assert [type(x) for x in verify.options_of_check(options, name)] == [type(x) for x in options]
 
 
 def test_the_seed_chooses_the_joints():
@@ -164,13 +164,13 @@ def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
         assert found is not None
         assert found.rows.tolist() == verify.choose(np.flatnonzero(store.status()[1:] == Status.OK) + 1, 2, 7).tolist()
         assert np.array_equal(found.base, store.results()[found.rows])
-    assert tuple(found.checks) == verify.SMALL
+    assert tuple(found.checks) == verify.QUICK_CHECKS
     for name, check in found.checks.items():
         # the invented solver knows no settings but the number of steps
         expected = found.base.copy()
         expected["steps"] *= 2 if name == "half_step" else 1
         assert np.array_equal(check.results, expected)
-        assert Options(**check.options) == verify.changed(Options(steps_per_rev=30), name)
+        assert Options(**check.options) == verify.options_of_check(Options(steps_per_rev=30), name)
     with ResultStore.open(path, "r+") as store:
         verification.write(store, found._replace(rows=found.rows[:1], checks={}))
         again = verification.read(store)
@@ -191,7 +191,7 @@ def off_by(path, factor, rows=(5, 9)):
         true = base.copy()
         for name in ("F_max", "T_max", "contact_max", "psi_max"):
             true[name] *= factor
-        checks = {name: Check("", {}, base) for name in verify.SMALL} | {"reference": Check("", {}, true)}
+        checks = {name: Check("", {}, base) for name in verify.QUICK_CHECKS} | {"reference": Check("", {}, true)}
         verification.write(store, Verification(1, np.array(rows), base, checks))
 
 
@@ -241,11 +241,11 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
     assert done.exit_code == 0, done.stderr
     found = json.loads(done.stdout)
     assert len(found["rows"]) == 2
-    assert list(found["checks"]) == list(verify.FULL)
+    assert list(found["checks"]) == list(verify.ALL_CHECKS)
     assert found["kinds"]["reference"]["F"]["joints"] == 2
     assert found["loads"]["half_step"]["cross1.T"]["worst"] > 0
     table = pd.read_csv(out)
-    assert len(table) == 2 * len(verify.FULL) * len(accuracy.OBSERVABLES)
+    assert len(table) == 2 * len(verify.ALL_CHECKS) * len(accuracy.OBSERVABLES)
     with ResultStore.open(path) as store:
         kept = verification.read(store)
         assert kept is not None
@@ -255,7 +255,7 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
         assert part["value"].tolist() == kept.checks["reference"].results["T_max"][:, 5].tolist()
     lines = call("verify", plan_path, "--joints", 1).stdout.splitlines()
     assert lines[0].split() == ["load", "error", "joints", "median", "95", "%", "below", "worst"]
-    assert len(lines) == 1 + len(LARGEST) * (len(verify.FULL) + 1)
+    assert len(lines) == 1 + len(LARGEST) * (len(verify.ALL_CHECKS) + 1)
 
 
 def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
@@ -282,7 +282,7 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
         "500 rpm", "2000 rpm"
     )
-    found = verify.check_study(study.load(written(tmp_path, text)), joints=1, names=(*verify.SMALL, "reference"))
+    found = verify.check_study(study.load(written(tmp_path, text)), joints=1, names=(*verify.QUICK_CHECKS, "reference"))
     true = force_and_torque(found.base, found.checks["reference"].results)
     seen = force_and_torque(found.base, found.checks["fidelity"].results)
     assert true.min() > 1e-3  # the inertia of bodies that deviate from the ideal motion
@@ -298,10 +298,10 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
     pending = synthetic.store(tmp_path, simulated=0)
     bad = written(tmp_path, REAL.replace("[solver]", "[solver]\nstep = 3"))
     for arguments, words in (
-        ((tmp_path / "none.h5",), ["is not there"]),
+        ((tmp_path / "none.h5",), ["does not exist"]),
         ((pending,), ["has no settled joint", "tolstat run"]),
         ((pending, "--joints", 0), ["0 is less than one"]),
-        ((pending, "--joints", "most"), ["joints: 'most' is no whole number", '"all"']),
+        ((pending, "--joints", "most"), ["joints: 'most' is not a whole number", "--joints all"]),
         ((bad, "--joints", 0), ["0 is less than one", "solver.step"]),
         ((pending, "--out", tmp_path / "none" / "a.csv"), ["no such folder"]),
     ):
@@ -312,5 +312,5 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="less than one"):
         verify.check_study(study.load(written(tmp_path)), joints=-1)
     monkeypatch.setattr(verify, "versions", lambda: {"tolstat": "9.9", "sources": "0"})
-    with pytest.raises(StoreError, match="was made by other code"):
+    with pytest.raises(StoreError, match="was made by another version of the code"):
         verify.check_file(synthetic.store(tmp_path, name="other"))

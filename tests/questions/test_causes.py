@@ -213,7 +213,7 @@ def test_capability_command_prints_indices_and_return_loads(path):
 def test_capability_without_limits_and_thin_tails_are_refused(tmp_path):
     sweep, few = synthetic.store(tmp_path, synthetic.SWEEP, "sweep"), synthetic.store(tmp_path)
     for arguments, text in (
-        ((sweep,), "no joints judged by limits"),
+        ((sweep,), "has no limits"),
         ((few, "--one-in", 100), "simulate some 500 joints"),
     ):
         done = run("capability", *arguments)

@@ -170,7 +170,7 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
     blocked.mkdir()
     done = run("compare", a, a)
     assert done.exit_code == 2
-    assert "hint: name another folder" in done.stderr
+    assert "hint: give another folder" in done.stderr
     with ResultStore.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:
         compare.compared(one.view(), one.view(), ["cros1.F", "nothing"])
     assert len(refused.value.faults) == 2

@@ -135,7 +135,7 @@ def test_two_files_of_the_same_joints_stopped_and_gone_on_with(tmp_path, plan):
     stop_at.append(9)  # blocks into the joints that come after the pilots
     stopped = CliRunner().invoke(app, command)
     assert stopped.exit_code == 130
-    assert "to go on" in stopped.stderr
+    assert "to resume" in stopped.stderr
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.stderr
     said = json.loads(done.stdout)
@@ -158,7 +158,9 @@ def test_every_fault_is_told(tmp_path, plan):
     assert done.exit_code == 2
     for part in ("low: 'auto' is not a fidelity", "high: 'dynamic:x' is not a fidelity"):
         assert part in done.stderr
-    assert "--budget: '1' is no time" in CliRunner().invoke(app, ["multifidelity", str(plan), "--budget", "1"]).stderr
+    assert (
+        "--budget: '1' is not a time" in CliRunner().invoke(app, ["multifidelity", str(plan), "--budget", "1"]).stderr
+    )
     same = CliRunner().invoke(app, ["multifidelity", str(plan), "--low", "dynamic"])
     assert "low: 'dynamic' is the same as 'dynamic'" in same.stderr
     solver = multifidelity.solver_of(study.load(plan), "quasistatic:36", "--low")

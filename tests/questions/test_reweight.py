@@ -121,8 +121,8 @@ def test_every_fault_of_the_settings_is_told_once(tmp_path):
     with pytest.raises(InputError) as found:
         changed(load(tmp_path), bad)
     text = str(found.value)
-    assert "selects no error that the study scatters" in text
-    assert "is no setting" in text
+    assert "selects no error that has a tolerance" in text
+    assert "is not a setting" in text
     assert text.count("0.1 has no unit") == 1
     assert "colour" in text
 

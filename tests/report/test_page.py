@@ -256,9 +256,9 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     ("arguments", "said"),
     [
         (["--out", "gone/p.html", "--accept", "much"], "no such folder"),
-        (["--out", "p.html", "--accept", "much"], "is no share"),
-        (["--out", "p.html", "--accept", "110 %"], "is no share"),
-        (["--accept", "5 %"], "is for a page"),
+        (["--out", "p.html", "--accept", "much"], "is not a share"),
+        (["--out", "p.html", "--accept", "110 %"], "is not a share"),
+        (["--accept", "5 %"], "is used with an HTML page only"),
     ],
 )
 def test_wrong_options_write_nothing(path, tmp_path, monkeypatch, arguments, said):

@@ -43,8 +43,8 @@ def test_failed_and_unsettled_joints_are_counted_both_ways():
     row = table.iloc[0]
     assert (row["n"], row["n_failed"], row["n_unsettled"]) == (200, 7, 5)
     assert row["bound_upper"] - row["bound_lower"] == pytest.approx(12 / 200)
-    assert "with failed, unsettled" in as_text(exceedance.LIMITS, table)
-    assert "with failed, unsettled" not in as_text(exceedance.LIMITS, query.limits(view()))
+    assert "with unresolved joints" in as_text(exceedance.LIMITS, table)
+    assert "with unresolved joints" not in as_text(exceedance.LIMITS, query.limits(view()))
 
 
 def test_dependent_samples_have_no_interval_and_the_note_says_why():

@@ -47,7 +47,7 @@ def test_statistics_are_of_a_sample(tmp_path):
         summary.statistics(store.view())
     done = export(synthetic.store(tmp_path), "--csv", "x.csv", "--by", "cross1.F")
     assert done.exit_code == 2
-    assert "--by is for --json" in done.stderr
+    assert "--by is used with --json only" in done.stderr
 
 
 def test_what_is_not_installed_is_said_before_anything_is_written(tmp_path, monkeypatch):

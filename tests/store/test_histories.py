@@ -81,7 +81,7 @@ def test_a_reader_finds_the_histories_in_the_file_that_replaced_its_own(tmp_path
 def test_histories_that_are_gone_are_an_error(tmp_path: Path, study: fakes.Study) -> None:
     path = tmp_path / "a.h5"
     expected = complete_store(path, study)
-    lost = r"a.h5.parts: lacks the histories of 5 joints that are done\n  hint: bring the folder back"
+    lost = r"a.h5.parts: lacks the histories of 5 finished joints\n  hint: restore the folder"
     before = path.read_bytes()
     with ResultStore.open(path, "r+") as store:
         (tmp_path / "a.h5.parts" / "00000000.h5").unlink()

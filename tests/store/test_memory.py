@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from tests.questions.test_causes import TEXT, made
 from tolstat.cli import app
 from tolstat.common.loads import LOAD_FIELDS
-from tolstat.common.tables import ERROR, RESULT
+from tolstat.common.tables import RESULT
 from tolstat.store import ResultStore, reader, view
 
 BLOCK = 256
@@ -58,21 +58,24 @@ def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, comma
     assert len(read) >= 1500 // BLOCK
 
 
-def test_only_the_fields_asked_for_are_held(path):
+def test_only_loads_and_the_first_errors_are_held(path, monkeypatch):
+    monkeypatch.setattr(view, "BLOCK", BLOCK)
     with ResultStore.open(path) as store:
-        whole, part = view.read(store), view.read(store, LOAD_FIELDS, ["pin1.offset_t"])
-    assert whole.results.dtype == RESULT
-    assert whole.errors.dtype == ERROR
-    assert part.results.itemsize < 0.4 * RESULT.itemsize
-    assert part.errors.dtype.names == ("pin1.offset_t",)
-    for field in LOAD_FIELDS:
-        np.testing.assert_array_equal(part.results[field], whole.results[field])
-    np.testing.assert_array_equal(part.errors["pin1.offset_t"], whole.errors["pin1.offset_t"])
+        whole, part = store.results()[1:], store.view()
+        assert part.results.itemsize < 0.4 * RESULT.itemsize
+        for field in LOAD_FIELDS:
+            np.testing.assert_array_equal(part.results[field], whole[field])
+        assert len(part._first_errors) == BLOCK
 
 
 def test_errors_of_some_joints_are_those_rows(path, monkeypatch):
     monkeypatch.setattr(view, "BLOCK", BLOCK)
     samples = np.array([0, 3, 254, 255, 256, 1499])
     with ResultStore.open(path) as store:
-        found = view.errors_at(store, ["pin2.offset_z"], samples)
-        np.testing.assert_array_equal(found["pin2.offset_z"], store.errors()["pin2.offset_z"][1 + samples])
+        errors, made = store.errors()[1:], store.view()
+        found = made.errors(samples, ["pin2.offset_z"])
+        assert found.dtype.names == ("pin2.offset_z",)
+        np.testing.assert_array_equal(found["pin2.offset_z"], errors["pin2.offset_z"][samples])
+        np.testing.assert_array_equal(made.errors(samples[:4]), errors[samples[:4]])
+        blocks = list(made.error_blocks(["pin2.offset_z"]))
+        np.testing.assert_array_equal(np.concatenate([b["pin2.offset_z"] for b in blocks]), errors["pin2.offset_z"])

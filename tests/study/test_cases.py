@@ -257,15 +257,15 @@ def test_workers_blocks_and_interruptions_change_no_byte(tmp_path: Path) -> None
 
 FAULTS = {
     "unknown case": (('["b"]', '["c"]'), "variant[1].cases: no case 'c'"),
-    "case of two names": (('name = "a"', 'name = "b"'), "case[1].name: there is a case 'b' already"),
-    "ideal by hand": (('name = "a"', 'name = "ideal"'), "case[0].name: there is a case 'ideal' already"),
+    "case of two names": (('name = "a"', 'name = "b"'), "case[1].name: a case 'b' exists already"),
+    "ideal by hand": (('name = "a"', 'name = "ideal"'), "case[0].name: a case 'ideal' exists already"),
     "no errors": (('errors.hole4.offset_t = "0.1 mm"', "errors = {}"), "case[0].errors"),
     "no unit": (('"0.1 mm"', "0.1"), "case[0].errors.hole4.offset_t: 0.1 has no unit"),
     "error of nothing": (("hole4.offset_t", "hole5.offset_t"), "case[0].errors.hole5.offset_t: selects nothing"),
     "operation as error": (("hole4.offset_t", "operation.alpha"), "operation.alpha: is not an error"),
     "case and grid": (
         ("pin1.offset_z", "pin1.diameter"),
-        "case[1].errors.pin1.diameter: pin1.diameter is decided by grid.pin*.diameter already",
+        "case[1].errors.pin1.diameter: pin1.diameter is set by grid.pin*.diameter already",
     ),
     "grid value": (('"15 deg"]', '"15 mm"]'), "grid.operation.alpha[1]: '15 mm' cannot be a value in rad"),
     "grid is no list": (('["0 deg", "15 deg"]', '"0 deg"'), "grid.operation.alpha: '0 deg' is not a list"),
@@ -274,13 +274,13 @@ FAULTS = {
     "unknown key": (("vary.contact.D_P", "vary.contact.D_X"), "variant[1].vary.contact.D_X: unknown key"),
     "unknown base": (('name = "plain"', 'name = "p"\njoint.base = "x"'), "variant[0].joint.base: no joint is named"),
     "vary without unit": (('to = "75.6 mm"', "to = 75.6"), "variant[1].vary.contact.D_P: 75.6 has no unit"),
-    "vary beyond": (('to = "75.6 mm"', 'to = "77 mm"'), "variant[1].vary.contact.D_P: a pin of 0.077 m does not go"),
+    "vary beyond": (('to = "75.6 mm"', 'to = "77 mm"'), "variant[1].vary.contact.D_P: a pin of 0.077 m does not fit"),
     "vary a word": (
         (
             'vary.contact.D_P = { from = "76.0 mm", to = "75.6 mm" }',
             'vary.contact.law = { from = "mode", to = "point" }',
         ),
-        "variant[1].vary.contact.law: 'mode' is no quantity",
+        "variant[1].vary.contact.law: 'mode' is not a quantity",
     ),
     "vary nothing": (('to = "75.6 mm"', 'to = "76 mm"'), "variant[1].vary.contact.D_P: from and to are equal"),
     "vary without end": ((', to = "75.6 mm"', ""), "variant[1].vary.contact.D_P.to: missing key"),
@@ -288,7 +288,7 @@ FAULTS = {
     "points alone": (('name = "plain"', 'name = "plain"\npoints = 4'), "variant[0]: points without vary"),
     "seed of a line": (("points = 3", "points = 3\nseed = 1"), "variant[1]: seed without a random design"),
     "n": (('method = "cases"', 'method = "cases"\nn = 8'), "sampling: n is given with 'cases'"),
-    "nominal": (('"cases"\n', '"cases"\nnominal_first = true\n'), "sampling: nominal_first with 'cases'"),
+    "nominal": (('"cases"\n', '"cases"\nnominal_first = true\n'), "sampling: nominal_first is given with 'cases'"),
     "scatter": (
         ("[grid]", '[tolerances]\npin1.offset_t = { plus_minus = "1 mm" }\n[grid]'),
         "tolerances: has no effect with 'cases'",

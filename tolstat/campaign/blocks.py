@@ -22,14 +22,14 @@ from tolstat.store.recorded import perturbed, settings, variants
 if TYPE_CHECKING:
     from tolstat.study import Study
 
-FIRST_BLOCK, MAX_BLOCK = 256, 2048
+MAX_FIRST_BLOCK, MAX_BLOCK = 256, 2048
 """Largest default number of joints in a block, before and after the time per joint is known: enough to keep the lanes
 busy, and at most 90 MB of histories."""
-BLOCKS_PER_WORKER = 4
+MIN_BLOCKS_PER_WORKER = 4
 """Minimum number of blocks per worker by default, so that no worker is idle for long at the end."""
-LEAST_S, MOST_S = 1.0, 8.0
+MIN_BLOCK_S, MAX_BLOCK_S = 1.0, 8.0
 """Smallest and largest target duration of a block, s: a kill loses the blocks in work."""
-WRITE_SHARE, PARENT_SHARE = 0.05, 0.25
+MAX_WRITE_SHARE, MAX_PARENT_SHARE = 0.05, 0.25
 """Largest share of a block's simulation time that writing it may take, and largest share of the parent's time spent on
 writing: beyond a quarter the workers begin to wait for the parent. Writing a block waits twice for the disk, 5 to 50 ms
 together, whatever the block's size."""
@@ -135,15 +135,15 @@ class Pace:
 
     def take(self, available: int) -> int:
         """Return the size of the next block, and count its joints as handed out."""
-        last = max(self._left // (BLOCKS_PER_WORKER * self._workers), -(-self._size // 4))  # no worker is idle for long
+        last = max(self._left // (MIN_BLOCKS_PER_WORKER * self._workers), -(-self._size // 4))  # shorter at the end
         size = min(available, self._fixed or min(self._size, last))
         self._left -= size
         return size
 
     def note(self, joints: int, simulating_s: float, writing_s: float) -> None:
         """Adapt the size of blocks to the time a worker took for a block and the parent took to write it."""
-        aim = writing_s * max(1 / WRITE_SHARE, self._workers / PARENT_SHARE)
-        wanted = min(max(aim, LEAST_S), MOST_S) * joints / max(simulating_s, 1e-9)
+        target_s = writing_s * max(1 / MAX_WRITE_SHARE, self._workers / MAX_PARENT_SHARE)
+        wanted = min(max(target_s, MIN_BLOCK_S), MAX_BLOCK_S) * joints / max(simulating_s, 1e-9)
         step = min(max(wanted, 0.5 * self._size), 2.0 * self._size)  # limits the effect of one untypical block
         self._size = max(1, min(MAX_BLOCK, round(step)))
 
@@ -192,7 +192,7 @@ def simulate_pending(
     )
     results: Generator[tuple[Block, Timed | Lost], None, None]
     if kind == "serial":
-        results = executors.map_here(work, blocks, stop)
+        results = executors.map_serially(work, blocks, stop)
     elif kind == "dask":
         from tolstat.campaign.executors.cluster import map_on_cluster
 
@@ -213,7 +213,7 @@ def simulate_pending(
 
 def default_block(n_pending: int, workers: int) -> int:
     """Return the number of joints in the first blocks: about a second of work, and several blocks per worker."""
-    return max(1, min(FIRST_BLOCK, n_pending // (BLOCKS_PER_WORKER * workers)))
+    return max(1, min(MAX_FIRST_BLOCK, n_pending // (MIN_BLOCKS_PER_WORKER * workers)))
 
 
 def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec]) -> Simulation:

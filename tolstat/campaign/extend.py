@@ -16,19 +16,20 @@ from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Counts, ResultStore
-from tolstat.store.assembly import Differing, assemble, check_free
+from tolstat.store.assembly import DifferingResults, assemble, check_free
 from tolstat.store.recall import differing_keys, recall
 from tolstat.store.result_file import BLOCK
 
 if TYPE_CHECKING:
     from tolstat.study import Study
 
-CANNOT_GROW = {
-    "lhs": "a Latin hypercube has as many strata as joints: further joints would change those that are there",
-    "sweep": "a sweep has its number of joints from its points",
-    "cases": "its joints are listed one by one",
-    "subset": "how many joints a subset simulation has is for its levels to decide",
+NOT_EXTENDABLE = {
+    "lhs": "a Latin hypercube has as many strata as joints, so that more joints would change the existing ones",
+    "sweep": "the points of a sweep determine its number of joints",
+    "cases": "its study lists the joints one by one",
+    "subset": "the levels of a subset simulation determine its number of joints",
 }
+"""Sampling methods whose campaigns cannot be extended, and the reason."""
 
 
 class Merged(NamedTuple):
@@ -150,10 +151,10 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         drawn = origin if columns(stores[0].sampling) else None
         try:
             assemble(out, attrs, stores[0].campaign_rows, stores, errors, design, origin=drawn)
-        except Differing as error:
+        except DifferingResults as error:
             holding = [str(store.path) for store in stores if error.row in store.rows]
             found = f"hold different results of row {error.row}: {error.column} differs"
-            remedy = f"replay it with: tolstat replay {holding[0]} --row {error.row}; keep the file that agrees"
+            remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {error.row}"
             raise InputError([Fault(" and ".join(holding), found, remedy)]) from None
     with ResultStore.open(out) as store:
         return Merged(store.counts(), sum(len(s.rows) for s in stores) - store.n)
@@ -162,16 +163,17 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
 def _check_extendable(store: ResultStore, n: int) -> None:
     place, held = str(store.path), store.sampling["n"]
     faults = []
-    reason = CANNOT_GROW.get(store.sampling["method"])
+    reason = NOT_EXTENDABLE.get(store.sampling["method"])
     if reason:
-        faults.append(Fault(place, f"cannot be extended: {reason}", "run a campaign of its own with the number wanted"))
+        remedy = "change the study, and run it as another campaign: tolstat run STUDY --out OTHER.h5"
+        faults.append(Fault(place, f"cannot be extended: {reason}", remedy))
     elif n <= held:
-        faults.append(Fault(place, f"has {held} joints already", f"give --n more than {held}"))
+        faults.append(Fault(place, f"has {held} joints already", f"give a larger number, for example --n {2 * held}"))
     if not store.whole:
-        found = f"holds rows {store.rows[0]}:{store.rows.stop} of a campaign only"
-        faults.append(Fault(place, found, "merge all slices first, with: tolstat merge"))
+        found = f"holds only rows {store.rows[0]}:{store.rows.stop} of the campaign"
+        faults.append(Fault(place, found, "merge all slices first: tolstat merge SLICE... --out FILE"))
     elif store.history_specs and not store.complete:
-        faults.append(Fault(place, "has joints pending, with histories to come", "finish it first, with: tolstat run"))
+        faults.append(_unfinished(store))
     if faults:
         raise InputError(faults)
 
@@ -182,29 +184,31 @@ def _check_one_campaign(stores: Sequence[ResultStore]) -> None:
     for store in stores[1:]:
         lines = differing_keys(store.identity, first.identity)
         lines += [
-            f"{name}: {store.versions.get(name)} in the file, {first.versions.get(name)} there"
+            f"{name}: {store.versions.get(name)} in the file, {first.versions.get(name)} in {first.path}"
             for name in ("tolstat", "sources")
             if store.versions.get(name) != first.versions.get(name)
         ]
-        lines = [line.replace("in the study", "there") for line in lines]
+        lines = [line.replace("in the study", f"in {first.path}") for line in lines]
         if store.retries != first.retries:
-            lines.append("other retries in the file than there")
+            lines.append(f"its retries differ from those of {first.path}")
         if lines:
-            found = "\n    ".join([f"is not of the campaign of {first.path}", *lines])
-            faults.append(
-                Fault(str(store.path), found, "leave it out, or compute it again with the same study and code")
-            )
+            found = "\n    ".join([f"belongs to another campaign than {first.path}", *lines])
+            faults.append(Fault(str(store.path), found, "leave it out, or run it again with the same study and code"))
     missing = _missing(stores)
     if missing:
         listed = ", ".join(f"{part.start}:{part.stop}" for part in missing)
-        remedy = f"compute each, with: tolstat run STUDY --rows {missing[0].start}:{missing[0].stop} --out FILE"
-        faults.append(Fault("merge", f"no file holds rows {listed} of {first.campaign_rows}", remedy))
+        remedy = f"simulate them: tolstat run STUDY --rows {missing[0].start}:{missing[0].stop} --out FILE"
+        faults.append(Fault("merge", f"no slice holds rows {listed} of {first.campaign_rows}", remedy))
     if first.history_specs:
-        remedy = "finish it first, with: tolstat run"
-        pending = [store for store in stores if not store.complete]
-        faults += [Fault(str(s.path), "has joints pending, with histories to come", remedy) for s in pending]
+        faults += [_unfinished(store) for store in stores if not store.complete]
     if faults:
         raise InputError(faults)
+
+
+def _unfinished(store: ResultStore) -> Fault:
+    """Return the fault of a campaign with histories that has pending joints."""
+    remedy = f"simulate them first: tolstat run STUDY --out {store.path}"
+    return Fault(str(store.path), "has pending joints, whose load histories are missing", remedy)
 
 
 def _missing(stores: Sequence[ResultStore]) -> list[range]:

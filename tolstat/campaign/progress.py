@@ -13,8 +13,8 @@ from tolstat.store import Counts
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-LINE_S = 60.0
-"""Seconds between two lines where there is no terminal."""
+LINE_INTERVAL_S = 60.0
+"""Time between two lines if stderr is not a terminal, s."""
 
 
 class Reporter(Protocol):
@@ -39,13 +39,13 @@ def text(counts: Counts, begun: int, seconds: float) -> str:
     Returns
     -------
     str
-        ``"128 of 513 joints, 2.9 joints/s, 2:12 to go, 1 failed, 0 not settled"``; without rate and time
-        to go before the first joint is done.
+        ``"128 of 513 joints, 2.9 joints/s, 2:12 remaining, 1 failed, 0 not settled"``; without rate and remaining
+        time before the first joint is done.
     """
     words = [f"{counts.done} of {counts.total} joints"]
     if counts.done > begun and seconds > 0:
         rate = (counts.done - begun) / seconds
-        words += [f"{rate:.3g} joints/s", f"{_clock((counts.total - counts.done) / rate)} to go"]
+        words += [f"{rate:.3g} joints/s", f"{_clock((counts.total - counts.done) / rate)} remaining"]
     return ", ".join([*words, counts.shortfall])
 
 
@@ -75,7 +75,7 @@ class Lines:
         self._stream = stream
         self._clock = clock
         self._start: tuple[int, float] | None = None
-        self._said = 0.0
+        self._printed_at = 0.0
         self._last = ""
 
     def __enter__(self) -> Self:
@@ -92,10 +92,10 @@ class Lines:
         now = self._clock()
         if self._start is None:
             self._start = counts.done, now
-            self._said = now
+            self._printed_at = now
         self._last = text(counts, self._start[0], now - self._start[1])
-        if now - self._said >= LINE_S:
-            self._said = now
+        if now - self._printed_at >= LINE_INTERVAL_S:
+            self._printed_at = now
             self._print()
 
     def note(self, text: str) -> None:
@@ -108,7 +108,7 @@ class Lines:
 
 
 class Bar:
-    """Progress as a bar with rate and time to go, for a terminal."""
+    """Progress as a bar with rate and remaining time, for a terminal."""
 
     def __init__(self) -> None:
         self._start: tuple[int, float] | None = None

@@ -1,4 +1,4 @@
-"""What a user can do about a joint that is not ok, in one sentence."""
+"""Remedy for a joint whose status is not ok, in one sentence."""
 
 from __future__ import annotations
 
@@ -8,14 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.common.tables import MAX_ITERATIONS, STATUS_TEXT, Motion, Status
+from tolstat.common.tables import MAX_ITERATIONS, Motion, Status
+from tolstat.solver.refinement import MIN_MAX_REVS
 
-ALLOWED_REVS, ALLOWED_STEPS = 1000, 20_000
-"""Largest solver.max_revs and solver.steps_per_rev that a study may ask for."""
+MAX_REVS, MAX_STEPS = 1000, 20_000
+"""Largest solver.max_revs and solver.steps_per_rev that a study may have."""
+WITHOUT_RESULTS = {
+    Status.TIMEOUT: 'simulate it again with more time: tolstat run STUDY --retry timeout --joint-timeout "1 h"',
+    Status.CRASHED: "simulate it again: tolstat run STUDY --retry crashed; if it crashes again, report the error",
+    Status.INVALID_INPUT: "a parameter is not finite: check the tolerances in the study",
+    Status.OUTSIDE_MODEL: "negative clearance, |alpha| >= 90 deg, no speed or no stiffness: change the joint or its tolerances",
+}
+"""Remedies that do not depend on the results of the joint."""
 
 
 def remedy(row: np.void, options: Mapping[str, Any]) -> str:
-    """Return which setting may help, or what the results can be used for.
+    """Return the setting that may help, or what the results mean.
 
     Parameters
     ----------
@@ -32,46 +40,61 @@ def remedy(row: np.void, options: Mapping[str, Any]) -> str:
     status, motion = Status(int(row["status"])), Motion(int(row["motion"]))
     if status in (Status.OK, Status.PENDING):
         return ""
+    if status in WITHOUT_RESULTS:
+        return WITHOUT_RESULTS[status]
     if status == Status.NEWTON_FAILED:
-        return _of_failure(row, options)
+        return _of_newton_failure(row, options)
+    if status == Status.NOT_FINITE:
+        return f"the solution overflowed at {_place(row)}: try solver.steps_per_rev = {_more_steps(options)}"
     if status == Status.NOT_RESOLVED:
-        return _of_steps(row, options)
+        return _of_unresolved(row, options)
     if status == Status.STATIONARY and motion == Motion.SUBHARMONIC:
-        return f"repeats every {row['period']} revolutions, which the results cover"
+        return f"the motion repeats every {row['period']} revolutions; the results cover all of them"
     if status == Status.STATIONARY:
-        return f"never repeats: largest loads are those of {options['duration']} revolutions, with an interval"
+        return f"the motion never repeats; the largest loads of {options['duration']} revolutions have an interval"
     if motion == Motion.SLOW or (status == Status.NOT_SETTLED and float(row["closure_trend"]) < -1e-3):
         return _of_slow(row, options)
     if motion in (Motion.QUASI_PERIODIC, Motion.CHAOTIC):
         kind = motion.label.replace("_", "-")
-        return f"{kind}, and its largest loads still change: try a larger solver.max_revs"
-    if status == Status.NOT_SETTLED:
-        return "give more solver.max_revs, and solver.max_refinements above 0 to be told what motion it is"
-    return STATUS_TEXT[status]
+        return f"the motion is {kind} and its largest loads still change: try solver.max_revs = {_more_revs(options)}"
+    classify = "" if options["max_refinements"] else ", and solver.max_refinements = 3 to classify the motion"
+    return f"try solver.max_revs = {_more_revs(options)}{classify}"
 
 
-def _of_failure(row: np.void, options: Mapping[str, Any]) -> str:
-    place = f"step {row['failed_step']} ({math.degrees(row['failed_theta']):.0f} deg)"
-    steps = min(4 * int(options["steps_per_rev"]), ALLOWED_STEPS)
+def _place(row: np.void) -> str:
+    return f"step {row['failed_step']} ({math.degrees(row['failed_theta']):.0f} deg)"
+
+
+def _more_steps(options: Mapping[str, Any]) -> int:
+    return min(4 * int(options["steps_per_rev"]), MAX_STEPS)
+
+
+def _more_revs(options: Mapping[str, Any]) -> int:
+    """Return a larger solver.max_revs, also larger than that of the refinement."""
+    return min(4 * max(int(options["max_revs"]), MIN_MAX_REVS), MAX_REVS)
+
+
+def _of_newton_failure(row: np.void, options: Mapping[str, Any]) -> str:
+    place, steps = _place(row), _more_steps(options)
     if row["newton_iterations"] > MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
         return f"{MAX_ITERATIONS} iterations a step were spent at {place}: try solver.steps_per_rev = {steps}"
     return f"failed at {place}: try solver.steps_per_rev = {steps}, or solver.max_halvings = 20"
 
 
-def _of_steps(row: np.void, options: Mapping[str, Any]) -> str:
+def _of_unresolved(row: np.void, options: Mapping[str, Any]) -> str:
     change = float(row["refinement_change"])
     if not math.isfinite(change):
-        return "fails with error-controlled steps: try solver.max_halvings = 20"
+        return "error-controlled steps failed: try solver.max_halvings = 20"
     more = int(options["max_refinements"]) + 1
-    return f"largest loads change by {change:.1%} with the last tolerance: try solver.max_refinements = {more}"
+    return f"the last tighter tolerance changes largest loads by {change:.1%}: try solver.max_refinements = {more}"
 
 
 def _of_slow(row: np.void, options: Mapping[str, Any]) -> str:
     trend = float(row["closure_trend"])
     if not trend < -1e-3:
-        return "neighbouring motions converge: give more solver.max_revs"
+        return f"neighbouring motions converge: try solver.max_revs = {_more_revs(options)}"
     missing = math.log10(float(row["closure"]) / options["settle_tol"]) / -trend
     revs = float(row["revolutions"]) + missing
-    if revs > ALLOWED_REVS:
+    if revs > MAX_REVS:
         return f"would settle in some {revs:.0f} revolutions: give a larger solver.settle_tol"
-    return f"settles in some {revs:.0f} revolutions: try solver.max_revs = {min(math.ceil(1.3 * revs), ALLOWED_REVS)}"
+    return f"settles in some {revs:.0f} revolutions: try solver.max_revs = {min(math.ceil(1.3 * revs), MAX_REVS)}"

@@ -55,7 +55,7 @@ class Replay(NamedTuple):
     differences : list of Difference
         Values that are not the same to the last bit.
     code : list of str
-        Software versions that differ from those that made the file: ``"numpy: 2.1.0 then, 2.4.6 now"``.
+        Software versions that differ from those that made the file: ``"numpy: 2.1.0 in the file, 2.4.6 now"``.
     """
 
     row: int
@@ -86,12 +86,12 @@ def replay(store: ResultStore, row: int) -> Replay:
     """
     place = str(store.path)
     if row not in store.rows:
-        found = f"has the rows {store.rows[0]} to {store.rows[-1]}, not {row}"
-        raise InputError([Fault(place, found, "give one of these with --row")])
+        found = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"
+        raise InputError([Fault(place, found, f"give one of these rows, for example --row {store.rows[0]}")])
     here = slice(store.slot(row), store.slot(row) + 1)
     stored = store.results(here)
     if stored["status"][0] == Status.PENDING:
-        raise InputError([Fault(place, f"row {row} is pending", "simulate it first, with: tolstat run")])
+        raise InputError([Fault(place, f"row {row} is pending", f"simulate it first: tolstat run STUDY --out {place}")])
     params = parameters(store, np.array([here.start]))
     options = options_of(store, here.start)
     warm_up()
@@ -102,7 +102,7 @@ def replay(store: ResultStore, row: int) -> Replay:
     if store.history_specs:
         differences += _different_histories(store, here.start, params, options)
     now = versions()
-    code = [f"{name}: {store.versions.get(name)} then, {new} now" for name, new in now.items()]
+    code = [f"{name}: {store.versions.get(name)} in the file, {new} now" for name, new in now.items()]
     changed = [line for line, name in zip(code, now, strict=True) if store.versions.get(name) != now[name]]
     return Replay(row, result, Status(stored["status"][0]), differences, changed)
 

@@ -49,12 +49,12 @@ class Retry(NamedTuple):
         return {"status": status, "settings": self.settings, "options": self.options._asdict()}
 
 
-def parse(states: str, settings: Sequence[str], study: Study) -> Retry:
+def parse(statuses: str, settings: Sequence[str], study: Study) -> Retry:
     """Parse a retry from the arguments of the command line.
 
     Parameters
     ----------
-    states : str
+    statuses : str
         ``"newton_failed,timeout"``.
     settings : sequence of str
         ``"solver.steps_per_rev=360"``: a key of the study's ``[solver]`` and its value as in TOML.
@@ -68,10 +68,10 @@ def parse(states: str, settings: Sequence[str], study: Study) -> Retry:
     """
     faults: list[Fault] = []
     labels = {state.label: state for state in Status if state != Status.PENDING}
-    names = [name.strip() for name in states.split(",")]
+    names = [name.strip() for name in statuses.split(",")]
     for name in names:
         if name not in labels:
-            faults.append(Fault("--retry", f"{name!r} is no state", strict.did_you_mean(name, list(labels))))
+            faults.append(Fault("--retry", f"{name!r} is not a status", strict.did_you_mean(name, list(labels))))
     changed: dict[str, Any] = {}
     for text in settings:
         with gather(faults):
@@ -90,7 +90,7 @@ def parse(states: str, settings: Sequence[str], study: Study) -> Retry:
 def _setting(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if not (equals and key.startswith("solver.")):
-        raise InputError([Fault("--set", f"{text!r} sets nothing of the solver", "write solver.steps_per_rev=360")])
+        raise InputError([Fault("--set", f"{text!r} is not a solver setting", "write --set solver.steps_per_rev=360")])
     try:
         return key.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
@@ -123,9 +123,10 @@ def begin(store: ResultStore, retry: Retry, specs: Mapping[str, HistorySpec], te
     if store.retries[-1:] == [entry] and np.any(store.attempt()[store.pending()] == number):
         return
     if dict(specs) != store.history_specs:
-        found = "with these settings load histories have another number of samples than those in the file"
-        raise InputError([Fault("--set", found, "leave solver.steps_per_rev as it is, or run a campaign of its own")])
+        found = "these settings give load histories another number of samples than those in the file"
+        remedy = "remove solver.steps_per_rev, or run another campaign: tolstat run STUDY --out OTHER.h5"
+        raise InputError([Fault("--set", found, remedy)])
     rows = np.flatnonzero(np.isin(store.status(), retry.status))
-    tell(f"{rows.size} joints once more")
+    tell(f"{rows.size} joints are simulated again")
     if rows.size:
         store.begin_retry(rows, entry)

@@ -48,7 +48,8 @@ class Interrupted(Exception):
         self.counts = counts
         self.exit_code = 128 + number
         super().__init__(
-            f"stopped: {counts.done} of {counts.total} joints are kept in {path}\n  hint: run the same command to go on"
+            f"stopped: {path} holds the results of {counts.done} of {counts.total} joints\n"
+            "  hint: to resume, run the same command again"
         )
 
 
@@ -94,7 +95,7 @@ def run(
     tell : callable, optional
         Called with messages: fidelity that ``auto`` chose, why a joint was given up, how many are simulated again.
     check : bool
-        Whether to verify a few joints at the end, to estimate the numerical error; see `verify.small`.
+        Whether to verify a few joints at the end, to estimate the numerical error; see `verify.check_few`.
 
     Returns
     -------
@@ -129,7 +130,7 @@ def run(
                 stages.warm_up()
                 store.begin_session(counts.done)
             finished = simulate_pending(study, store, last, stages, execution, stop)
-            with stop.patiently(), closing(finished):
+            with stop.deferred(), closing(finished):
                 for done in finished:
                     store.write(done.rows, done.simulation)
                     counts = counts.after(done.simulation.results["status"])
@@ -139,15 +140,15 @@ def run(
                     if progress:
                         progress(counts)
             if check:
-                verify.small(store, partial(_rows_of, study, store, stages), stages.simulate)
+                verify.check_few(store, partial(_rows_of, study, store, stages), stages.simulate)
             store.finish()
             store.end_session()
         except KeyboardInterrupt:
             store.end_session()
             raise Interrupted(path, store.counts(), stop.number) from None
         except WorkerDied as error:
-            kept = f"{counts.done} of {counts.total} joints are kept in {path}"
-            raise WorkerDied(f"{error}\n  {kept}: run the same command to go on") from error
+            kept = f"{path} holds the results of {counts.done} of {counts.total} joints"
+            raise WorkerDied(f"{error}\n  {kept}; to resume, run the same command again") from error
         if next(pending(store, last), None) is not None:
             raise Interrupted(path, counts, stop.number)
         return counts
@@ -185,7 +186,7 @@ def _create_or_resume(
     store = ResultStore.open(path, "r+")
     try:
         _check_same(store, study, rows)
-        store.judge_by(study)
+        store.update_study(study)
     except StoreError:
         store.close()
         raise
@@ -195,12 +196,12 @@ def _create_or_resume(
 def _check_part(part: range, n: int) -> None:
     """Refuse what is not a part, without gaps, of the n rows of a study."""
     if not (0 <= part.start < part.stop <= n and part.step == 1):
-        found = f"{part.start}:{part.stop} are no rows of the {n} that the study has"
-        raise InputError([Fault("rows", found, f"give a part of 0:{n}")])
+        found = f"{part.start}:{part.stop} is no part of the rows 0:{n} of the study"
+        raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {n}")])
 
 
 def _rows_of(study: Study, store: ResultStore, stages: Stages, rows: NDArray[np.intp]) -> NDArray[np.void]:
-    """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
+    """Return the parameters of the joints in file slots `rows`, (m,) table PARAM."""
     errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
     return perturbed(study, store.row(rows), errors, stages.perturb)
 
@@ -219,22 +220,23 @@ def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any
     errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
     params = perturbed(study, rows, errors, stages.perturb)
     simulate = partial(stages.simulate, histories="none", n_harmonics=0)
-    budget, least = study.solver.error_budget, _least_steps(*_history_options(study))
-    return fidelity.choose(params, study.solver.options(), budget, study.asked, simulate, least).record
+    budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
+    return fidelity.choose(params, study.solver.options(), budget, study.asked, simulate, min_steps).record
 
 
-def _least_steps(histories: str, n_harmonics: int) -> int:
+def _min_steps(histories: str, n_harmonics: int) -> int:
     """Minimum steps per revolution from which the kept histories can be computed."""
     harmonics = 2 * n_harmonics + 1 if "harmonics" in histories else 0
-    return max(harmonics, rainflow.LEAST_SAMPLES if "cycles" in histories else 0)
+    return max(harmonics, rainflow.MIN_SAMPLES if "cycles" in histories else 0)
 
 
 def _check_same(store: ResultStore, study: Study, rows: range) -> None:
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
-    found, remedy = "is the result file of another study", "use another --out, or delete the file"
+    found, remedy = "is the result file of another study", "give another file: --out OTHER.h5"
     if not differing:
-        began = f"commit {store.git_commit}" if store.git_commit else "the code that began it"
-        found, remedy = "was begun by other code", f"use another --out, or go on with {began}"
+        code = f"commit {store.git_commit}" if store.git_commit else "the version that began it"
+        found = "was begun by another version of the code"
+        remedy = f"give another file: --out OTHER.h5, or resume with {code}"
     now = versions()
     for name, noun in (("tolstat", "version"), ("sources", "hash")):
         held = store.versions.get(name, "unknown")
@@ -252,9 +254,8 @@ def _check_positive(**numbers: float | None) -> None:
     faults = []
     for name, value in numbers.items():
         if value is not None and not (value > 0 if isinstance(value, float) else value >= 1):
-            faults.append(
-                Fault(name, f"{value} is too small", "give a time above zero, or a whole number of 1 or more")
-            )
+            remedy = "give a time above zero" if isinstance(value, float) else "give a whole number of at least 1"
+            faults.append(Fault(name, f"{value} is too small", remedy))
     if faults:
         raise InputError(faults)
 

@@ -24,28 +24,28 @@ class Stop:
     def __init__(self) -> None:
         self.number = signal.SIGINT
         self._asked = False
-        self._patient = False
+        self._deferred = False
 
     def __call__(self) -> bool:
         """Whether to stop."""
         return self._asked
 
     @contextmanager
-    def patiently(self) -> Iterator[None]:
-        """Inside, the first signal only sets the request, so that no write is interrupted; a second one interrupts."""
-        self._patient = True
+    def deferred(self) -> Iterator[None]:
+        """Inside, the first signal only requests a stop, so that no write is interrupted; a second one interrupts."""
+        self._deferred = True
         try:
             yield
         finally:
-            self._patient = False
+            self._deferred = False
 
-    def take(self, number: int, frame: FrameType | None) -> None:
+    def handle(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal."""
         again, self._asked, self.number = self._asked, True, signal.Signals(number)
         if again:  # no signal may interrupt the cleanup that follows
             for caught in CAUGHT:
                 signal.signal(caught, signal.SIG_IGN)
-        if again or not self._patient:
+        if again or not self._deferred:
             raise KeyboardInterrupt
 
 
@@ -61,7 +61,7 @@ def caught() -> Iterator[Stop]:
     if threading.current_thread() is threading.main_thread():
         for number in CAUGHT:
             if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
-                before[number] = signal.signal(number, stop.take)
+                before[number] = signal.signal(number, stop.handle)
     try:
         yield stop
     finally:

@@ -64,7 +64,7 @@ class Look(NamedTuple):
     above : int
         Valid joints above the level.
     lower, upper : float
-        Interval with the confidence of one look, see `each`.
+        Interval with the confidence of one look, see `look_confidence`.
     """
 
     joints: int
@@ -93,7 +93,11 @@ class Outcome(NamedTuple):
 
     def record(self, rule: Rule) -> dict[str, Any]:
         """Return the attribute ``stop`` of the result file."""
-        planned = {"confidence": CONFIDENCE, "confidence_of_a_look": each(len(self.looks)), "looks": self.looks}
+        planned = {
+            "confidence": CONFIDENCE,
+            "confidence_of_a_look": look_confidence(len(self.looks)),
+            "looks": self.looks,
+        }
         return {"rule": rule.text} | self.look._asdict() | planned
 
 
@@ -105,14 +109,16 @@ def parse(text: str) -> Rule:
     InputError
         With every fault of it.
     """
-    said = rules.parse(text, "width", "--until", EXAMPLE)
-    if len(said.loads) > 1:
-        raise InputError([Fault("--until", f"{text!r} is a rule for {len(said.loads)} loads", EXAMPLE)])
-    return Rule(said.text, said.loads[0], said.level, said.bound)
+    statement = rules.parse(text, "width", "--until", EXAMPLE)
+    if len(statement.loads) > 1:
+        raise InputError(
+            [Fault("--until", f"{text!r} is a rule for {len(statement.loads)} loads instead of one", EXAMPLE)]
+        )
+    return Rule(statement.text, statement.loads[0], statement.level, statement.bound)
 
 
 def looks(width: float, n: int) -> list[int]:
-    """Numbers of joints at which to look: doubled from the smallest that can suffice; the last is `n`.
+    """Return the numbers of joints at which to look: doubled from the smallest that can suffice; the last is `n`.
 
     Fewer joints than the first number cannot suffice: even with none of them above the level, the interval ends at
     1 - ((1 - confidence) / 2)^(1 / joints). Doubling ends at the first number that suffices for any share above the
@@ -129,15 +135,15 @@ def looks(width: float, n: int) -> list[int]:
     return [*planned, n]
 
 
-def each(n_looks: int) -> float:
+def look_confidence(n_looks: int) -> float:
     """Confidence of one look, such that all looks together have the confidence `CONFIDENCE` (Bonferroni)."""
     return 1.0 - (1.0 - CONFIDENCE) / n_looks
 
 
 def interval(count: int, n_unresolved: int, n: int, n_looks: int) -> tuple[float, float]:
     """Interval of one look at `n` joints; unresolved ones count as below the level for its lower end, else above."""
-    lower, _ = exceedance.clopper_pearson(count, n, each(n_looks))
-    _, upper = exceedance.clopper_pearson(count + n_unresolved, n, each(n_looks))
+    lower, _ = exceedance.clopper_pearson(count, n, look_confidence(n_looks))
+    _, upper = exceedance.clopper_pearson(count + n_unresolved, n, look_confidence(n_looks))
     return float(lower), float(upper)
 
 
@@ -166,11 +172,13 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
     """
     if study.sampling.method != "random":
         own = study.sampling.method
-        found = f"sampling.method is {own!r}: only independent samples, alike in weight, have such an interval"
-        raise InputError([Fault("--until", found, 'use sampling.method = "random"')])
+        found = f"sampling.method is {own!r}: its interval needs independent samples of equal weight"
+        raise InputError([Fault("--until", found, 'write sampling.method = "random" in the study')])
     if not selected_results.holds(study.output.columns, rule.load):
         remedy = f"add {', '.join(LOADS[rule.load].columns)}"
-        raise InputError([Fault(f"{study.path}: output.results", f"leaves out {rule.load} of --until", remedy)])
+        raise InputError(
+            [Fault(f"{study.path}: output.results", f"leaves out {rule.load}, which --until needs", remedy)]
+        )
     planned = looks(rule.width, study.samples)
     first = study.first_sample
     for joints in planned:
@@ -182,7 +190,7 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
     outcome = Outcome(look.upper - look.lower < rule.width, look, planned)
     if outcome.reached:
         with ResultStore.open(out, "r+") as store:
-            store.note_stop(outcome.record(rule))
+            store.record_stop(outcome.record(rule))
     return outcome
 
 

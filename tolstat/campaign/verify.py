@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.campaign.executors import Lost, Work, map_here, map_in_processes
+from tolstat.campaign.executors import Lost, Work, map_in_processes, map_serially
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
@@ -22,31 +22,31 @@ from tolstat.store.verification import Check, Verification
 if TYPE_CHECKING:
     from tolstat.study import Study
 
-SMALL = ("half_step", "newton", "settling")
+QUICK_CHECKS = ("half_step", "newton", "settling")
 """Checks at the end of every run; they need no code beyond that of the run."""
-FULL = (*SMALL, "method", "reference")
-LEAST_STEPS = 180
+ALL_CHECKS = (*QUICK_CHECKS, "method", "reference")
+MIN_STEPS = 180
 """Minimum steps per revolution of the dynamic simulation that checks one of lower fidelity."""
 DESCRIPTION = {
     "half_step": "twice as many steps a revolution",
-    "newton": "Newton stops at a hundredth of solver.newton_tol",
-    "settling": "from the other start, settled at a hundredth of solver.settle_tol",
-    "method": "another method of integration",
-    "fidelity": "dynamic, where the campaign is below",
+    "newton": "a hundredth of solver.newton_tol",
+    "settling": "the other solver.start, and a hundredth of solver.settle_tol",
+    "method": "another solver.method",
+    "fidelity": "dynamic fidelity instead of a lower one",
     "reference": "scipy's Radau, rtol 1e-7, largest loads at 2880 angles and all steps",
 }
-SMALL_SHARE, SMALL_MOST = 400, 16
-"""One joint in 400 is checked at the end of a run, at least one and at most 16: some 2 % of its time."""
+JOINTS_PER_CHECKED, MAX_CHECKED = 400, 16
+"""At the end of a run one joint in 400 is checked, at least one and at most 16: some 2 % of the run's time."""
 
 Simulate = Callable[..., Simulation]
 Progress = Callable[[Counts], None]
 
 
-def silent(counts: Counts) -> None:
+def no_progress(counts: Counts) -> None:
     """Report no progress."""
 
 
-def changed(options: Options, check: str) -> Options:
+def options_of_check(options: Options, check: str) -> Options:
     """Return the solver options of a check.
 
     Parameters
@@ -54,7 +54,7 @@ def changed(options: Options, check: str) -> Options:
     options : Options
         Solver options of the campaign.
     check : str
-        One of `FULL`, or ``fidelity``.
+        One of `ALL_CHECKS`, or ``fidelity``.
     """
     if check == "half_step":
         return options._replace(steps_per_rev=2 * options.steps_per_rev)
@@ -67,7 +67,7 @@ def changed(options: Options, check: str) -> Options:
         other = Method.BDF2 if options.method == Method.TR_BDF2 else Method.TR_BDF2
         return options._replace(method=int(other))
     if check == "fidelity" and options.fidelity != Fidelity.DYNAMIC:
-        steps = max(options.steps_per_rev, LEAST_STEPS)
+        steps = max(options.steps_per_rev, MIN_STEPS)
         return options._replace(fidelity=int(Fidelity.DYNAMIC), steps_per_rev=steps)
     return options
 
@@ -86,7 +86,7 @@ def run_checks(
     names: Iterable[str],
     simulate: Simulate | None = None,
     workers: int = 1,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> dict[str, Check]:
     """Simulate joints again, once for each check.
 
@@ -97,7 +97,7 @@ def run_checks(
     options : sequence of Options
         Solver options of each joint in the campaign.
     names : iterable of str
-        Names from `FULL`; ``fidelity`` is added if a joint is below dynamic fidelity.
+        Names from `ALL_CHECKS`; ``fidelity`` is added if a joint is below dynamic fidelity.
     simulate : callable, optional
         Replaces `simulation.simulate_rows`.
     workers : int
@@ -112,11 +112,11 @@ def run_checks(
     lower = any(own.fidelity != Fidelity.DYNAMIC for own in options)
     checks = {}
     for name in (*names, *(("fidelity",) if lower else ())):
-        own = [changed(one, name) for one in options]
+        own = [options_of_check(one, name) for one in options]
         if name == "reference":
             results = _references(params, own, workers, progress)
         else:
-            results = by_options(partial(_plain, simulate), params, own)
+            results = solve_by_options(partial(_plain, simulate), params, own)
         checks[name] = Check(DESCRIPTION[name], own[0]._asdict(), results)
     return checks
 
@@ -133,7 +133,7 @@ def _references(
     work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
     done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
     workers = min(workers, len(blocks))
-    done = map_in_processes(work, blocks, workers) if workers > 1 else map_here(work, blocks)
+    done = map_in_processes(work, blocks, workers) if workers > 1 else map_serially(work, blocks)
     results, counts = without_results(len(blocks), Status.CRASHED), Counts(len(blocks), 0, 0, 0)
     progress(counts)
     with closing(done):
@@ -158,7 +158,7 @@ def _plain(simulate: Simulate | None, params: NDArray[np.void], options: Options
     return (simulate or simulate_rows)(params, options, histories="none", n_harmonics=0).results
 
 
-def by_options(
+def solve_by_options(
     solve: Callable[[NDArray[np.void], Options], NDArray[np.void]],
     params: NDArray[np.void],
     options: Sequence[Options],
@@ -171,7 +171,7 @@ def by_options(
     return results
 
 
-def of_campaign(
+def check_campaign(
     store: ResultStore,
     parameters: Callable[[NDArray[np.intp]], NDArray[np.void]],
     names: Iterable[str],
@@ -179,7 +179,7 @@ def of_campaign(
     seed: int,
     simulate: Simulate | None = None,
     workers: int = 1,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Verification | None:
     """Check settled joints of a campaign.
 
@@ -215,12 +215,12 @@ def of_campaign(
     return Verification(seed, rows, base, checks)
 
 
-def small(store: ResultStore, parameters: Callable[..., NDArray[np.void]], simulate: Simulate) -> None:
+def check_few(store: ResultStore, parameters: Callable[..., NDArray[np.void]], simulate: Simulate) -> None:
     """Check a few joints of a complete campaign and store the checks, unless the file is a slice or has checks."""
     if not (store.complete and store.whole) or verification.read(store) is not None:
         return
-    joints = min(max(store.n // SMALL_SHARE, 1), SMALL_MOST)
-    found = of_campaign(store, parameters, SMALL, joints, int(store.sampling["seed"]), simulate)
+    joints = min(max(store.n // JOINTS_PER_CHECKED, 1), MAX_CHECKED)
+    found = check_campaign(store, parameters, QUICK_CHECKS, joints, int(store.sampling["seed"]), simulate)
     if found is not None:
         verification.write(store, found)
 
@@ -231,7 +231,7 @@ def check(
     seed: int | None = None,
     on_start: Callable[[], None] = lambda: None,
     workers: int = 1,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Verification:
     """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
 
@@ -243,7 +243,7 @@ def check(
         return check_file(path, joints, seed, on_start=on_start, workers=workers, progress=progress)
     faults: list[Fault] = []
     with gather(faults):
-        number_of(joints)
+        parse_joints(joints)
     with gather(faults):
         plan = load(path)
     if faults:
@@ -256,10 +256,10 @@ def check_file(
     path: Path,
     joints: int | str = 24,
     seed: int | None = None,
-    names: Iterable[str] = FULL,
+    names: Iterable[str] = ALL_CHECKS,
     on_start: Callable[[], None] = lambda: None,
     workers: int = 1,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Verification:
     """Check joints of a result file and store the checks in it, replacing an earlier verification.
 
@@ -272,7 +272,7 @@ def check_file(
     seed : int, optional
         Seed of the random choice; the campaign's own seed without it.
     names : iterable of str
-        Names from `FULL`.
+        Names from `ALL_CHECKS`.
     on_start : callable
         Called after the file has been validated, before the simulations.
     workers, progress
@@ -289,17 +289,18 @@ def check_file(
     InputError
         When `joints` is neither a positive integer nor ``"all"``.
     """
-    number = number_of(joints)
+    number = parse_joints(joints)
     with ResultStore.open(path, "r+") as store:
         if any(store.versions.get(key) != value for key, value in versions().items() if key in ("tolstat", "sources")):
-            remedy = "verify it with that code, or run the campaign again with another --out"
-            raise StoreError(str(Fault(str(path), "was made by other code", remedy)))
+            remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
+            raise StoreError(str(Fault(str(path), "was made by another version of the code", remedy)))
         seed = int(store.sampling["seed"]) if seed is None else seed
         if not (store.status() == Status.OK).any():
-            raise StoreError(str(Fault(str(path), "has no settled joint", "run the campaign first: tolstat run")))
+            remedy = f"run the campaign first: tolstat run STUDY --out {path}"
+            raise StoreError(str(Fault(str(path), "has no settled joint", remedy)))
         on_start()
         params = partial(recorded.parameters, store)
-        found = of_campaign(store, params, names, number, seed, None, workers, progress)
+        found = check_campaign(store, params, names, number, seed, None, workers, progress)
         assert found is not None
         verification.write(store, found)
     return found
@@ -309,9 +310,9 @@ def check_study(
     plan: Study,
     joints: int | str = 24,
     seed: int | None = None,
-    names: Iterable[str] = FULL,
+    names: Iterable[str] = ALL_CHECKS,
     workers: int = 1,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Verification:
     """Check joints of a study that has not been run: simulate them with its own settings and for each check.
 
@@ -320,23 +321,23 @@ def check_study(
     from tolstat.joint import perturb
     from tolstat.sampling import draw
 
-    number = number_of(joints)
+    number = parse_joints(joints)
     if plan.solver.fidelity == "auto":
-        remedy = "run the study and verify its result file"
-        raise InputError([Fault(f"{plan.path}: solver.fidelity", "'auto' chooses when the study is run", remedy)])
+        found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
+        raise InputError([Fault(f"{plan.path}: solver.fidelity", found, remedy)])
     seed = plan.sampling.seed if seed is None else seed
     first = 0 if number is None else plan.first_sample
     rows = choose(np.arange(first, plan.rows), number, seed)
     params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)
     options = [plan.solvers[number].options() for number in recorded.variants(plan, rows).tolist()]
-    base = by_options(partial(_plain, None), params, options)
+    base = solve_by_options(partial(_plain, None), params, options)
     checks = run_checks(params, options, names, None, workers, progress)
     for results in (base, *(check.results for check in checks.values())):
         selected_results.blank_others(results, plan.output.columns)
     return Verification(seed, rows, base, checks)
 
 
-def number_of(joints: int | str) -> int | None:
+def parse_joints(joints: int | str) -> int | None:
     """Parse a number of joints; None for ``"all"``.
 
     Raises
@@ -349,9 +350,9 @@ def number_of(joints: int | str) -> int | None:
     try:
         number = int(joints)
     except ValueError:
-        found = f"{joints!r} is no whole number"
+        found = f"{joints!r} is not a whole number"
     else:
         if number >= 1:
             return number
         found = f"{number} is less than one"
-    raise InputError([Fault("joints", found, 'give a whole number of 1 or more, or "all"')])
+    raise InputError([Fault("joints", found, "write --joints 24, or --joints all")])

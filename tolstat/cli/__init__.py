@@ -1,4 +1,4 @@
-"""The command line: a file a command; what commands share is in `_app`. Help lists them in the order given here."""
+"""The command line: one file per command, shared parts in `_app`. `tolstat --help` lists commands in this order."""
 
 from importlib import import_module
 

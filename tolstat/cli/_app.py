@@ -1,8 +1,8 @@
-"""The command line: standard output is data, standard error is talk, exit codes mean something.
+"""Parts that all commands share: the application, common arguments, output, and errors with exit codes.
 
-0: done (joints that failed or did not settle are data, and are counted); 1: a fault of tolstat or of the
-machine; 2: an input that cannot be used; 130: interrupted;
-143: terminated. What is heavy is imported inside the commands.
+Results go to standard output, messages to standard error. Exit codes: 0 success (failed and unsettled joints are
+results); 1 internal error, dead worker processes, or results that `replay` does not reproduce; 2 input that cannot be
+used; 128 + N stopped by signal N (130 after Ctrl-C). Modules that load slowly are imported inside the commands.
 """
 
 from __future__ import annotations
@@ -24,8 +24,11 @@ if TYPE_CHECKING:
     from tolstat.joint import Joint
     from tolstat.report import Report
 
-ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which load is exceeded by which share of the joints."
-EPILOG = "Exit codes: 0 done, 1 internal error, 2 input that cannot be used, 130 interrupted, 143 terminated."
+ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load."
+EPILOG = (
+    "Exit codes: 0 success, 1 internal error (replay: results differ), 2 input that cannot be used, "
+    "128 + N stopped by signal N (130 after Ctrl-C)."
+)
 
 
 class _Commands(TyperGroup):
@@ -59,7 +62,18 @@ app = typer.Typer(
 )
 
 ResultFile = Annotated[Path, typer.Argument(metavar="FILE", help="Result file (HDF5) of a campaign.")]
-Workers = Annotated[int | None, typer.Option("--workers", metavar="W", min=1, help="Processes; default one per core.")]
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="W", min=1, help="Number of worker processes; default: one per core."),
+]
+StudyOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--study",
+        metavar="STUDY",
+        help="Study file (TOML) to read instead of the study text stored in FILE.",
+    ),
+]
 
 
 def main() -> None:
@@ -83,11 +97,12 @@ def _options(
 
 
 def say(text: str) -> None:
+    """Print a message on standard error."""
     typer.echo(text, err=True)
 
 
-def warn(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
-    """Warn of joints that are hardly meant: that of a case or study, or those of its `variants`."""
+def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
+    """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`."""
     places = [f"variant {variant.family!r}: joint" for variant in variants] or ["joint"]
     faults = (f"{place}.{fault}" for place, joint in zip(places, joints, strict=True) for fault in joint.warnings())
     for fault in dict.fromkeys(faults):
@@ -95,6 +110,7 @@ def warn(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) 
 
 
 def tell(report: Report) -> None:
+    """Print the table of a report on standard output, its notes and files on standard error."""
     typer.echo(report.table)
     say(report.notes)
     for path in report.files:
@@ -102,21 +118,29 @@ def tell(report: Report) -> None:
 
 
 def announce_compilation() -> None:
+    """Print a message if the kernels have to be compiled first."""
     from tolstat.solver.simulation import is_compiled
 
     if not is_compiled():
-        say("compiling the kernels for this machine: about a minute, this once")
+        say("compiling the kernels: about a minute, once per machine and version")
 
 
 def as_text(summary: dict[str, Any]) -> str:
+    """Format plain values as JSON."""
     import json
 
     return json.dumps(summary, indent=2, allow_nan=False)
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[Path]:
-    """Yield a temporary file that becomes `path`; what hinders that is the user's to mend."""
+def output_file(path: Path) -> Iterator[Path]:
+    """Yield the path of a temporary file that replaces `path` at the end.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
     from tolstat.common import files
 
     try:
@@ -124,22 +148,37 @@ def writing(path: Path) -> Iterator[Path]:
             yield temporary
     except OSError as error:
         found = f"cannot be written: {error.strerror or error}"
-        raise InputError([Fault(str(path), found, "check the folder, its permissions and space")]) from error
+        raise InputError(
+            [Fault(str(path), found, "check that the folder is writable and the disk has space")]
+        ) from error
 
 
 def make_folder(path: Path) -> None:
+    """Create a folder if it does not exist.
+
+    Raises
+    ------
+    InputError
+        When it cannot be created.
+    """
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        found = f"cannot be made a folder: {error.strerror or error}"
-        raise InputError([Fault(str(path), found, "name another folder with --out")]) from error
+        found = f"cannot be created as a folder: {error.strerror or error}"
+        raise InputError([Fault(str(path), found, "give another folder, for example: --out results")]) from error
 
 
 @contextmanager
-def filling(folder: Path) -> Iterator[None]:
-    """Turn what hinders files from being written to a folder into a fault of the user's to mend."""
+def output_folder(folder: Path) -> Iterator[None]:
+    """Convert an error while files are written to a folder.
+
+    Raises
+    ------
+    InputError
+        When a file cannot be written.
+    """
     try:
         yield
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
-        raise InputError([Fault(str(folder), found, "name another folder with --out")]) from error
+        raise InputError([Fault(str(folder), found, "give another folder, for example: --out results")]) from error

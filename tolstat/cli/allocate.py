@@ -1,4 +1,4 @@
-"""``tolstat allocate``: the cheapest tolerances that keep limits."""
+"""``tolstat allocate``: the cheapest tolerances that meet given exceedances."""
 
 from __future__ import annotations
 
@@ -7,35 +7,53 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, say, writing
-from tolstat.cli.extend import StudyFile
+from tolstat.cli._app import ResultFile, StudyOption, as_text, output_file, say
 
 
 def allocate(
     file: ResultFile,
     limit: Annotated[
         list[str],
-        typer.Option("--limit", metavar="RULE", help='"P(cross*.F > 700 N) < 0.001"; repeat for more.'),
+        typer.Option(
+            "--limit",
+            metavar="RULE",
+            help='Largest share of joints above a level: "P(cross*.F > 700 N) < 0.001"; repeatable.',
+        ),
     ],
     costs: Annotated[
         Path | None,
-        typer.Option("--costs", metavar="TABLE", help="TOML or CSV; default: a tolerance costs its reciprocal."),
+        typer.Option(
+            "--costs",
+            metavar="TABLE",
+            help="Cost of each tolerance, TOML or CSV (see docs/statistics.md); default: cost inversely proportional "
+            "to the tolerance.",
+        ),
     ] = None,
     keep: Annotated[
         list[str] | None,
-        typer.Option("--keep", metavar="PATTERN", help="Errors whose tolerances stay: pin*.diameter; repeat for more."),
+        typer.Option(
+            "--keep",
+            metavar="PATTERN",
+            help='Errors whose tolerances do not change, such as "pin*.diameter"; repeatable; default: none.',
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="STUDY", help="Study file to write, with the tolerances proposed.")
+        Path | None,
+        typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the proposed tolerances."),
     ] = None,
-    study_file: StudyFile = None,
+    study_file: StudyOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> None:
-    """Propose the cheapest tolerances with which limits are kept, from the joints of the file.
+    """Propose the cheapest tolerances that meet the targets.
 
-    Every entry of [tolerances] gets a factor. Half of the joints choose, by what they weigh under other tolerances; the
-    other half judges the choice. Where the joints cannot tell, the verdict is "needs new runs", and what is proposed is
-    a study to run next. A joint without a valid load counts as above the limits.
+    Each entry of [tolerances] is multiplied by one factor. One half of the joints in FILE, reweighted to other
+    tolerances, selects the factors; the other half checks them. A joint without a valid load counts as above the level.
+
+    Prints factor and cost of each tolerance, the share of joints above each level with its 95 % interval, the changed
+    entries as TOML, and a verdict: "holds", or "needs new runs" if the joints in FILE do not suffice. With --out,
+    writes a study with the proposed tolerances and another seed, to be run next.
+
+    Example: tolstat allocate a.h5 --limit "P(cross1.F > 1500 N) < 0.05"
     """
     from tolstat.common.files import check_target
     from tolstat.display import text
@@ -49,7 +67,7 @@ def allocate(
         found = allocated(store.view(study_file), limit, costs, keep or ())
     if out is not None:
         content = found.text
-        with writing(out) as temporary:
+        with output_file(out) as temporary:
             temporary.write_text(content, encoding="utf-8")
     if as_json:
         w = found.weights
@@ -62,6 +80,6 @@ def allocate(
     if found.entries:
         typer.echo("\n[tolerances]\n" + "\n".join(line(*item) for item in found.entries.items()))
     before, after = found.tolerances["cost_before"].sum(), found.tolerances["cost"].sum()
-    say(f"cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)\n{found.verdict}")
+    say(f"total cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)\n{found.verdict}")
     if out is not None:
-        say(f"wrote {out}: run it with tolstat run {out}")
+        say(f"wrote {out}; to run it: tolstat run {out}")

@@ -1,4 +1,4 @@
-"""``tolstat capability``: how a production stands against its limits."""
+"""``tolstat capability``: process capability against the limits."""
 
 from __future__ import annotations
 
@@ -14,14 +14,20 @@ def capability(
     file: ResultFile,
     one_in: Annotated[
         list[float] | None,
-        typer.Option("--one-in", metavar="N", min=1, help="Load that one in N joints exceeds; repeat for more."),
+        typer.Option("--one-in", metavar="N", min=1, help="Print the load that one in N joints exceeds; repeatable."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> None:
-    """Print ppm and Cpk against each limit of the study, and of the joint against all of them.
+    """Print ppm and Cpk against each limit of the study.
 
-    With --one-in also the loads that one in N joints exceeds, and the median of the largest of N joints, from a
-    generalised Pareto tail; N may be more than the joints simulated, and the intervals tell what that is worth.
+    Prints for each limit, and for all limits together, the share of joints above it (ppm) and the process capability
+    index Cpk, each with its 95 % interval.
+
+    With --one-in N, prints also the load that one in N joints exceeds, and the median of the largest load of N joints,
+    from a generalised Pareto distribution fitted to the tail. N may exceed the number of simulated joints: the
+    intervals show the uncertainty of the extrapolation.
+
+    Example: tolstat capability iso2768_f.h5 --one-in 10000
     """
     from tolstat.display import text
     from tolstat.display.table import as_text as aligned
@@ -31,8 +37,8 @@ def capability(
     with ResultStore.open(file) as store:
         view = store.view()
         if not view.limits or view.method in ("sweep", "cases"):
-            remedy = 'give the file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
-            raise StoreError(str(Fault(str(file), "has no joints judged by limits", remedy)))
+            remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
+            raise StoreError(str(Fault(str(file), "has no limits, or its joints are no random sample", remedy)))
         view.check_sample(weighted=False)
         table = query.limits(view)
         try:
@@ -45,8 +51,8 @@ def capability(
         return
     typer.echo(aligned(rendering.LIMITS, table))
     if rare is not None:
-        typer.echo("\nload that one in N joints exceeds; median of the largest of N joints")
+        typer.echo("\nload that one in N joints exceeds; median of the largest load of N joints")
         typer.echo(aligned(rendering.RETURNS, rare))
     say(rendering.note(table))
     if rare is not None and (rare["p"] < 0.05).any():
-        say("a tail with p < 0.05 is not generalised Pareto: do not extrapolate it")
+        say("warning: a tail with p < 0.05 is not generalised Pareto; do not use its estimate")

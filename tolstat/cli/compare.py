@@ -1,4 +1,4 @@
-"""``tolstat compare``: two campaigns side by side."""
+"""``tolstat compare``: differences between two campaigns."""
 
 from __future__ import annotations
 
@@ -7,27 +7,34 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import as_text, filling, make_folder, say
+from tolstat.cli._app import as_text, make_folder, output_folder, say
 
 
 def compare(
-    a: Annotated[Path, typer.Argument(metavar="A", help="Result file (HDF5) of a campaign.")],
-    b: Annotated[Path, typer.Argument(metavar="B", help="Result file of the campaign to compare with it.")],
+    a: Annotated[Path, typer.Argument(metavar="A", help="Result file (HDF5) of the first campaign.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Result file (HDF5) of the second campaign.")],
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="LOAD", help="cross1.F, psi; repeat for more. Default: loads with limits."),
+        typer.Option(
+            "--by", metavar="LOAD", help="Load to compare, such as cross1.F; repeatable; default: loads with limits."
+        ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder for the files, made if need be; default that of B."),
+        typer.Option("--out", metavar="DIR", help="Folder for the files, created if missing; default: folder of B."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables, and write no files.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables; write no files.")] = False,
 ) -> None:
-    """Tell what two campaigns differ in: their studies, the shares above limits, quantiles and means.
+    """Compare the exceedances and loads of two campaigns.
 
-    Prints the shares above limits, and with --by (or without limits) quantiles and means. Joints drawn from the same
-    seed are compared one by one, so that small differences show. Writes curves and the differences as pictures and
-    CSV, and the joints that changed the side of a limit.
+    Prints the differences between the studies and, as B - A with its 95 % interval, the difference of the share above
+    each limit; with --by, or without limits, also of quantiles and means. Joints drawn from the same seed are compared
+    in pairs, which makes the intervals narrow.
+
+    Writes the curves and their difference as PNG and SVG, and as CSV the differences and the joints that are above a
+    limit in one campaign only.
+
+    Example: tolstat compare before.h5 after.h5 --by cross1.F
     """
     from tolstat.display import text
     from tolstat.questions.compare import rendering
@@ -46,7 +53,7 @@ def compare(
     typer.echo(rendering.text(found, loads=bool(by)))
     say(rendering.note(found, str(a), str(b)))
     folder = b.parent if out is None else out
-    with filling(folder):
+    with output_folder(folder):
         files = rendering.write(found, folder / f"{a.stem}_{b.stem}", (a.stem, b.stem))
     for path in files:
         say(f"wrote {path}")

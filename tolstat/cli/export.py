@@ -1,4 +1,4 @@
-"""``tolstat export``: joints as a table."""
+"""``tolstat export``: joints, load cycles or statistics as a file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, say, writing
+from tolstat.cli._app import ResultFile, as_text, output_file, say
 from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -24,35 +24,40 @@ if TYPE_CHECKING:
 def export(
     file: ResultFile,
     out: Annotated[
-        str | None, typer.Option("--csv", metavar="OUT", help="CSV file to write; - for standard output.")
+        str | None,
+        typer.Option("--csv", metavar="OUT", help="Write errors and results as CSV; - for standard output."),
     ] = None,
     cycles: Annotated[
         str | None,
-        typer.Option("--pylife", metavar="OUT", help="CSV file for load cycles as pyLife takes them; - likewise."),
+        typer.Option("--pylife", metavar="OUT", help="Write load cycles as CSV for pyLife; - for standard output."),
     ] = None,
     parquet: Annotated[
-        str | None, typer.Option("--parquet", metavar="OUT", help="Parquet file for the joints (needs pyarrow).")
+        str | None,
+        typer.Option("--parquet", metavar="OUT", help="Write errors and results as Parquet (needs pyarrow)."),
     ] = None,
     statistics: Annotated[
-        str | None, typer.Option("--json", metavar="OUT", help="JSON file for all statistics; - likewise.")
+        str | None,
+        typer.Option("--json", metavar="OUT", help="Write all statistics as JSON; - for standard output."),
     ] = None,
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="LOAD", help="With --json: loads whose causes are told; repeat for more."),
+        typer.Option("--by", metavar="LOAD", help="With --json: load whose causes are included; repeatable."),
     ] = None,
 ) -> None:
-    """Write the joints of a campaign, the cycles of their loads, or all statistics.
+    """Export joints, load cycles or statistics to files.
 
-    One row a joint: its errors, then its results, in SI units; before them the case and variant that it is,
-    if the study lists its joints. The first line names the columns, the second
-    gives their units: pandas reads it with header=[0, 1]. Joints that are pending or failed have their row
-    too; what is not known is empty.
+    --csv writes one row per joint: its errors, then its results, in SI units. If the study lists its joints, case and
+    variant come first. Pending and failed joints are included; unknown values are empty. The first line has the names
+    of the columns, the second their units: read it with pandas.read_csv(OUT, header=[0, 1]).
 
-    Parquet has the same columns, and their units in the metadata: pandas has them as frame.attrs["units"]. JSON has the
-    share above each limit, quantiles, capability, the numerical error and what the file was made by.
+    --parquet writes the same columns; pandas has their units in frame.attrs["units"].
 
-    With --pylife one row a joint, channel and class of range and mean: cycles per revolution, for files whose study
-    keeps cycles or load histories. See docs/questions/fatigue.md for the lines that read it as a Series.
+    --json writes the share above each limit, quantiles, capability, the numerical error and the software versions.
+
+    --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
+    keeps cycles or load histories. docs/questions/fatigue.md shows how to read it as a pandas Series.
+
+    Example: tolstat export iso2768_f.h5 --csv joints.csv
     """
     from tolstat.common.files import check_target
     from tolstat.store import ResultStore
@@ -61,12 +66,14 @@ def export(
     targets = [target for target in given.values() if target is not None]
     if not targets or len(set(targets)) < len(targets):
         raise typer.BadParameter(
-            "give --csv OUT, --parquet OUT, --json OUT or --pylife OUT, or some with different names"
+            "give one or more of --csv OUT, --parquet OUT, --json OUT and --pylife OUT, each with its own file"
         )
     if by and statistics is None:
-        raise typer.BadParameter("--by is for --json OUT")
+        raise typer.BadParameter("--by is used with --json only: add --json OUT")
     if parquet is not None and find_spec("pyarrow") is None:
-        raise InputError([Fault("--parquet", "pyarrow is not installed", "pip install pyarrow, or take --csv")])
+        raise InputError(
+            [Fault("--parquet", "pyarrow is not installed", "install it with: pip install pyarrow, or use --csv OUT")]
+        )
     for target in targets:
         if target != "-":
             check_target(Path(target), file)
@@ -91,7 +98,7 @@ def _write(out: str, write: Callable[[TextIO], object], what: str) -> None:
     if out == "-":
         write(sys.stdout)
         return
-    with writing(Path(out)) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+    with output_file(Path(out)) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         write(stream)
     say(f"wrote {out}: {what}")
 
@@ -118,7 +125,7 @@ def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO
 def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
     plain = frame.droplevel(1, axis=1)
     plain.attrs["units"] = dict(zip(*(frame.columns.get_level_values(k) for k in (0, 1)), strict=True))
-    with writing(path) as temporary:
+    with output_file(path) as temporary:
         plain.to_parquet(temporary, engine="pyarrow")
 
 

@@ -1,36 +1,35 @@
-"""``tolstat extend``: more joints for a campaign."""
+"""``tolstat extend``: add joints to a campaign."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, Workers, say
-from tolstat.cli.run import carry_out
-
-StudyFile = Annotated[
-    Path | None,
-    typer.Option("--study", metavar="STUDY", help="Study file, where the text that FILE keeps does not do any more."),
-]
+from tolstat.cli._app import ResultFile, StudyOption, Workers, say
+from tolstat.cli.run import run_and_report
 
 
 def extend(
     file: ResultFile,
-    n: Annotated[int, typer.Option("--n", metavar="N", min=1, help="Number of joints that the campaign shall have.")],
-    study_file: StudyFile = None,
+    n: Annotated[int, typer.Option("--n", metavar="N", min=1, help="New number of joints, without the nominal joint.")],
+    study_file: StudyOption = None,
     workers: Workers = None,
-    report: Annotated[bool, typer.Option(help="Write and print the report at the end.")] = True,
+    report: Annotated[bool, typer.Option(help="Print the report at the end and write its files.")] = True,
 ) -> None:
-    """Continue a campaign to more joints.
+    """Add joints to a campaign and simulate them.
 
-    The next joints of its sequence are drawn and simulated; no joint that FILE holds changes. FILE is then the
-    same as that of a campaign of N joints. Stopped with Ctrl-C, run STUDY --n N --out FILE goes on.
+    Draws the next joints of the sampling sequence and simulates them; the joints already in FILE do not change. FILE
+    then equals that of a campaign with N joints from the start. Latin hypercubes, sweeps and listed joints cannot be
+    extended. Prints the report and writes its files as tolstat run does.
+
+    To resume after an interruption: tolstat run STUDY --n N --out FILE
+
+    Example: tolstat extend iso2768_f.h5 --n 20000
     """
     from tolstat.campaign import extend as combine
     from tolstat.campaign.blocks import Execution
 
     plan = combine.extend(file, n, study_file)
     say(f"{file}: extended to {n} joints")
-    carry_out(plan, file, report, execution=Execution("processes", workers))
+    run_and_report(plan, file, report, execution=Execution("processes", workers))

@@ -1,4 +1,4 @@
-"""``tolstat fatigue``: equivalent loads and damage sums of the load cycles over a service life."""
+"""``tolstat fatigue``: damage-equivalent loads and damage sums over a service life."""
 
 from __future__ import annotations
 
@@ -8,30 +8,46 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import say, writing
+from tolstat.cli._app import output_file, say
 
 
 def fatigue(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Result files: one, or one for each operating point.")
+        list[Path],
+        typer.Argument(metavar="FILE", help="Result file (HDF5); for a duty cycle, one per operating point."),
     ],
     share: Annotated[
         list[float] | None,
-        typer.Option("--share", metavar="S", help="Share of the revolutions, once for each file; their sum is 1."),
+        typer.Option(
+            "--share",
+            metavar="S",
+            help="Share of the revolutions, once for each FILE in the same order; sum 1; default: 1 for one file.",
+        ),
     ] = None,
     channel: Annotated[
         list[str] | None,
-        typer.Option("--channel", metavar="PATTERN", help='Channels, as "cross*.F_t"; repeat for more.'),
+        typer.Option(
+            "--channel",
+            metavar="PATTERN",
+            help='Load channels to evaluate, such as "cross*.F_t"; repeatable; default: all.',
+        ),
     ] = None,
     csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="OUT", help="CSV file for the loads of all channels.")
+        Path | None,
+        typer.Option(
+            "--csv", metavar="OUT", help="Write the damage-equivalent loads of all evaluated channels as CSV."
+        ),
     ] = None,
 ) -> None:
-    """Print damage-equivalent loads and damage sums over the joints.
+    """Print damage-equivalent loads and damage sums.
 
-    Several files are a duty cycle: the same joints under several operating points. Exponents, service life and S-N
-    lines are those of the section [fatigue] of the (first) study. Without --channel the most loaded component of each
-    bushing's force and torque is printed, and all channels are written.
+    Prints the quantiles of the damage-equivalent load over the joints, and for each S-N line the share of joints whose
+    damage sum exceeds 1, with 95 % intervals. Without --channel, prints the most loaded component of each bushing force
+    and torque. Exponents, service life and S-N lines are those of [fatigue] in the study of the first FILE.
+
+    Several files form a duty cycle: the same joints at several operating points.
+
+    Example: tolstat fatigue low.h5 high.h5 --share 0.3 --share 0.7
     """
     from tolstat.common.files import check_target
     from tolstat.display.table import as_text
@@ -50,10 +66,10 @@ def fatigue(
     table = rendering.by_channel(loads[loads["channel"].isin(shown)] if shown else loads)
     typer.echo(as_text(rendering.LOADS, table))
     if len(damages):
-        typer.echo("\nshare of the joints whose damage exceeds 1")
+        typer.echo("\nshare of joints whose damage sum exceeds 1")
         typer.echo(as_text(rendering.DAMAGES, damages))
     say(rendering.notes(loading, loads))
     if csv:
-        with writing(csv) as temporary:
+        with output_file(csv) as temporary:
             loads.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
         say(f"wrote {csv}")

@@ -1,4 +1,4 @@
-"""``tolstat merge``: slices of a campaign put together."""
+"""``tolstat merge``: merge the slices of a campaign."""
 
 from __future__ import annotations
 
@@ -11,20 +11,26 @@ from tolstat.cli._app import say
 
 
 def merge(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Result files of slices, in any order.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Result file to make; it must not exist.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="SLICE", help="Result files (HDF5) of the slices, in any order.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Result file to create; must not exist.")],
 ) -> None:
-    """Put slices of a campaign together.
+    """Merge the slices of a campaign into one result file.
 
-    The slices are files that run --rows has made. They must be of one study and one version of the code, and cover the
-    campaign; rows in two of them must have the same results. FILE is then the same as that of one run.
+    Slices are made by tolstat run --rows. They must have the same study and version of the code, and together hold all
+    rows of the campaign; a row in several slices must have identical results. FILE then equals that of a single run.
+
+    Prints the number of joints by outcome on standard error.
+
+    Example: tolstat merge part1.h5 part2.h5 --out whole.h5
     """
     from tolstat.campaign import extend
 
     merged = extend.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
-    words = [f"{out}: {counts.done} joints, {counts.shortfall}"]
-    words += [f"{merged.twice} rows were there twice, with the same results"] * bool(merged.twice)
-    words += [f"{pending} still pending: tolstat run STUDY --out {out} goes on with them"] * bool(pending)
-    say("\n".join(words))
+    lines = [f"{out}: {counts.done} joints, {counts.shortfall}"]
+    lines += [f"{merged.twice} surplus copies of rows, with identical results"] * bool(merged.twice)
+    lines += [f"{pending} joints are pending; to simulate them: tolstat run STUDY --out {out}"] * bool(pending)
+    say("\n".join(lines))

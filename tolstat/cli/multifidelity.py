@@ -1,4 +1,4 @@
-"""``tolstat multifidelity``: few joints of a dear simulation, many of a cheap one."""
+"""``tolstat multifidelity``: statistics from two fidelities of the same joints."""
 
 from __future__ import annotations
 
@@ -14,38 +14,60 @@ from tolstat.common.errors import Fault, InputError, gather
 def multifidelity(
     study_file: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).")],
     low: Annotated[
-        str, typer.Option("--low", metavar="FIDELITY", help="Cheap: quasistatic, or with steps a revolution.")
+        str,
+        typer.Option(
+            "--low",
+            metavar="FIDELITY",
+            help="Cheap fidelity (ideal, quasistatic, dynamic), with or without steps per revolution.",
+        ),
     ] = "quasistatic:36",
     high: Annotated[
-        str, typer.Option("--high", metavar="FIDELITY", help="What is asked about: dynamic, dynamic:360 or so.")
+        str,
+        typer.Option(
+            "--high", metavar="FIDELITY", help="Expensive fidelity that the statistics refer to, such as dynamic:360."
+        ),
     ] = "dynamic",
-    budget: Annotated[str, typer.Option("--budget", metavar="TIME", help="Time of one core for all joints.")] = "60 s",
+    budget: Annotated[
+        str,
+        typer.Option("--budget", metavar="TIME", help="Processor time of all joints together, with unit s, min or h."),
+    ] = "60 s",
     pilot: Annotated[
-        int, typer.Option("--pilot", metavar="N", min=16, help="Joints at both fidelities to share the work by.")
+        int, typer.Option("--pilot", metavar="N", min=16, help="Number of joints in the pilot, at both fidelities.")
     ] = 128,
     by: Annotated[
-        str | None, typer.Option("--by", metavar="LOAD", help="Load to share the work for; default the first limit's.")
+        str | None,
+        typer.Option(
+            "--by",
+            metavar="LOAD",
+            help="Load for which the numbers of joints are optimal; default: first load with a limit.",
+        ),
     ] = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder of STUDY_high.h5 and STUDY_low.h5; default this one.")
+        Path, typer.Option("--out", metavar="DIR", help="Folder of STUDY_high.h5 and STUDY_low.h5, created if missing.")
     ] = Path(),
     workers: Workers = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
-    """Estimate means, quantiles and shares of a dear simulation with the help of a cheap one of the same joints.
+    """Combine few expensive and many cheap simulations.
 
-    A pilot tells costs and correlation, and by them how many joints each gets; "no gain" where the dear one alone is
-    as good. Both result files are ordinary ones. Stopped with Ctrl-C, the same command goes on where it was.
+    Estimates means, quantiles and shares above the limits at the high fidelity, from few joints at the high and many at
+    the low fidelity (control variates). A pilot measures the costs and the correlation of both fidelities, which give
+    the numbers of joints; it ends with "no gain" if the high fidelity alone is as good.
+
+    Prints each estimate with its 95 % interval, from both fidelities and from the high fidelity alone. Writes two
+    ordinary result files. To resume after an interruption, run the same command again.
+
+    Example: tolstat multifidelity a.toml --low dynamic:90 --high dynamic:720
     """
     from tolstat import study
     from tolstat.campaign import run as campaign
-    from tolstat.cli.run import seconds_of
+    from tolstat.cli.run import parse_time
     from tolstat.display import text
     from tolstat.questions.multifidelity.query import two_fidelities
 
     faults: list[Fault] = []
     with gather(faults):
-        seconds = seconds_of(budget, "--budget")
+        seconds = parse_time(budget, "--budget")
     with gather(faults):
         plan = study.load(study_file)
     if faults:
@@ -62,6 +84,6 @@ def multifidelity(
         typer.echo(as_text({**head, "high": found.high, "low": found.low, "statistics": text.records(found.table)}))
     else:
         typer.echo(text.plain(found.table))
-    say(f"{found.high} joints of the high fidelity, {found.low} of the low; gain below 1: do without the low one")
+    say(f"{found.high} joints at high fidelity, {found.low} at low; where gain < 1, the high fidelity alone is better")
     for path in found.files:
-        say(f"joints in {path}")
+        say(f"results in {path}")

@@ -1,4 +1,4 @@
-"""``tolstat plan``: what a campaign will take and give."""
+"""``tolstat plan``: predicted cost and precision of a campaign."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, as_text, warn
+from tolstat.cli._app import Workers, announce_compilation, as_text, print_warnings
 
 if TYPE_CHECKING:
     from tolstat.campaign.plan import Plan
@@ -16,16 +16,21 @@ if TYPE_CHECKING:
 def plan(
     study_file: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).")],
     n: Annotated[
-        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints instead of the study's.")
+        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints; default: that of the study.")
     ] = None,
     workers: Workers = None,
-    pilot: Annotated[int, typer.Option("--pilot", metavar="K", min=1, help="Joints to simulate for the plan.")] = 128,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+    pilot: Annotated[
+        int, typer.Option("--pilot", metavar="K", min=1, help="Number of joints simulated for the prediction.")
+    ] = 128,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
-    """Say what a campaign will take and give.
+    """Predict time, memory and precision of a campaign.
 
-    A few joints are simulated, nothing is written: time, memory and file size of all joints, how wide the interval of
-    each limit's exceedance will be, and how many joints a bound of a quantile needs.
+    Simulates a few joints (pilot) and writes nothing. Prints time, memory and file size of the campaign, the width of
+    the 95 % interval of exceedances and of each limit's exceedance, and the number of joints that a 95 % bound of a
+    quantile needs.
+
+    Example: tolstat plan studies/iso2768_f.toml
     """
     from dataclasses import asdict
 
@@ -33,7 +38,7 @@ def plan(
     from tolstat.campaign import plan as plans
 
     loaded = study.load(study_file, n=n)
-    warn(study_file, loaded.joints, loaded.variants)
+    print_warnings(study_file, loaded.joints, loaded.variants)
     announce_compilation()
     made = plans.plan(loaded, workers, pilot)
     typer.echo(as_text(asdict(made)) if as_json else _lines(made))
@@ -45,7 +50,7 @@ def _lines(made: Plan) -> str:
         f"dimensions: {made.dimensions}",
         f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
         *([made.fidelity] if made.fidelity else []),
-        *_rattle(made),
+        *_rattle_warning(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
         f"time: {_duration(made.seconds)} on {made.workers} cores",
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
@@ -60,13 +65,13 @@ def _lines(made: Plan) -> str:
     return "\n".join(lines)
 
 
-def _rattle(made: Plan) -> list[str]:
-    """Warning of joints that rattle, if there are any."""
+def _rattle_warning(made: Plan) -> list[str]:
+    """Warning about joints that rattle, if there are any."""
     found = made.reversals
     if not found.joints:
         return []
-    who = f"warning: the torque reverses in {found.joints} of {made.pilot} joints, since inertia needs up to"
-    return [f"{who} {found.torque:.3g} N*m: they rattle, and one costs {found.cost:.2g} times as much as others"]
+    reason = f"warning: the torque reverses in {found.joints} of {made.pilot} joints: inertia torque up to"
+    return [f"{reason} {found.torque:.3g} N*m; these joints rattle and cost {found.cost:.2g} times as much as others"]
 
 
 def _duration(seconds: float) -> str:

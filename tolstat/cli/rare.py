@@ -1,4 +1,4 @@
-"""``tolstat rare``: the probability of a rare load by subset simulation."""
+"""``tolstat rare``: probability of a rare load by subset simulation."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, as_text, say
-from tolstat.cli.extend import StudyFile
+from tolstat.cli._app import StudyOption, Workers, announce_compilation, as_text, say
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
@@ -26,32 +25,47 @@ class Side(StrEnum):
 
 def rare(
     source: Annotated[
-        Path, typer.Argument(metavar="STUDY|FILE", help="Study (TOML); or a file of tolstat rare, to go on with.")
+        Path,
+        typer.Argument(metavar="STUDY|FILE", help="Study file (TOML), or result file of tolstat rare to resume."),
     ],
     limit: Annotated[
-        str | None, typer.Option("--limit", metavar="LIMIT", help='Load and level: "cross1.F > 900 N".')
+        str | None,
+        typer.Option("--limit", metavar="LIMIT", help='Load and level: "cross1.F > 900 N"; required with STUDY.'),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Result file; default STUDY_rare.h5 in this folder.")
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Result file; default: STUDY_rare.h5 in the current folder."),
     ] = None,
-    n: Annotated[int | None, typer.Option("--n", metavar="N", min=20, help="Joints a level; default 1000.")] = None,
+    n: Annotated[
+        int | None, typer.Option("--n", metavar="N", min=20, help="Number of joints per level; default: 1000.")
+    ] = None,
     p0: Annotated[
-        float | None, typer.Option("--p0", metavar="P", help="Share of them carried to the next level; default 0.1.")
+        float | None,
+        typer.Option("--p0", metavar="P", help="Share of joints carried to the next level, up to 0.5; default: 0.1."),
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", metavar="S", min=0, help="Instead of the study's.")] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", metavar="S", min=0, help="Seed of all draws; default: that of the study.")
+    ] = None,
     unresolved: Annotated[
         Side | None,
-        typer.Option("--unresolved", help="Where joints that fail or do not settle are counted; default below."),
+        typer.Option(
+            "--unresolved",
+            help="Whether failed and unsettled joints count as above or below the level; default: below.",
+        ),
     ] = None,
-    study_file: StudyFile = None,
+    study_file: StudyOption = None,
     workers: Workers = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
-    """Estimate a probability down to 1e-9 by subset simulation: some thousand joints a level, level after level.
+    """Estimate a rare exceedance by subset simulation.
 
-    Each level starts from the joints of the one before with the largest loads. All joints are kept in a result file;
-    stopped with Ctrl-C or killed, the same command goes on where it was. For what the interval does not cover, see
-    docs/questions/rare.md.
+    Estimates P(load > level) down to 1e-9. Each level of the simulation starts from the joints of the previous level
+    with the largest loads. docs/questions/rare.md states what the interval does not cover.
+
+    Prints threshold and share of each level, and the probability with its 95 % interval. Writes all joints to a result
+    file. To resume after an interruption, run the same command again.
+
+    Example: tolstat rare studies/iso2768_f.toml --limit "cross1.F > 15 kN"
     """
     from tolstat.campaign import run as campaign
     from tolstat.campaign.executors import WorkerDied
@@ -62,9 +76,9 @@ def rare(
     given = {"n": n, "p0": p0, "seed": seed, "unresolved": None if unresolved is None else unresolved.value}
     given = {name: value for name, value in given.items() if value is not None}
     if source.suffix == ".toml":
-        plan, path = _plan(source, limit, given), out or Path(f"{source.stem}_rare.h5")
+        plan, path = _read_study(source, limit, given), out or Path(f"{source.stem}_rare.h5")
     else:
-        plan, path = _recalled(source, study_file, [limit, out, *given.values()]), source
+        plan, path = _recall(source, study_file, [limit, out, *given.values()]), source
     announce_compilation()
     try:
         found = simulation.run(plan, path, workers, say)
@@ -74,23 +88,23 @@ def rare(
     except WorkerDied as error:
         say(f"error: {error}")
         raise typer.Exit(1) from error
-    asked = found.sampling
-    levels = tables.table(found.levels, asked.load)
+    sampling = found.sampling
+    levels = tables.table(found.levels, sampling.load)
     if as_json:
         typer.echo(as_text(_summary(found) | {"levels": text.records(levels)}))
     else:
         typer.echo(text.plain(levels))
-        typer.echo(tables.sentence(found.estimate, asked.load, asked.above))
-    _talk(found, path)
+        typer.echo(tables.sentence(found.estimate, sampling.load, sampling.above))
+    _print_messages(found, path)
 
 
-def _plan(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
+def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
     from tolstat import study
     from tolstat.questions.rare.query import parse_limit, subset_study
 
     faults: list[Fault] = []
     if limit is None:
-        faults.append(Fault("--limit", "is missing", 'write --limit "cross1.F > 900 N"'))
+        faults.append(Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"'))
     else:
         with gather(faults):
             parse_limit(limit)
@@ -101,16 +115,18 @@ def _plan(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
     return subset_study(plan, limit, **given)
 
 
-def _recalled(source: Path, study_file: Path | None, given: list[Any]) -> Study:
+def _recall(source: Path, study_file: Path | None, given: list[Any]) -> Study:
     from tolstat.common.errors import StoreError
     from tolstat.store import ResultStore
 
     with ResultStore.open(source) as store:
         if store.sampling["method"] != "subset":
-            found = "is no file of tolstat rare"
-            raise StoreError(str(Fault(str(source), found, "give the study, with --limit and --out")))
+            found = "is not a result file of tolstat rare"
+            remedy = 'give the study: tolstat rare STUDY --limit "cross1.F > 900 N" --out FILE'
+            raise StoreError(str(Fault(str(source), found, remedy)))
         if any(value is not None for value in given):
-            raise InputError([Fault(str(source), "has its question in it", "give no option but --workers and --json")])
+            found = "already holds limit and settings of its simulation"
+            raise InputError([Fault(str(source), found, f"resume it with: tolstat rare {source}")])
         return store.view(study_file).study
 
 
@@ -123,12 +139,12 @@ def _summary(found: RareEvent) -> dict[str, Any]:
     return head | plain | {"joints": found.joints, "unresolved": found.unresolved}
 
 
-def _talk(found: RareEvent, path: Path) -> None:
+def _print_messages(found: RareEvent, path: Path) -> None:
     say(f"{path}: {found.joints} joints, {found.unresolved} of them failed or not settled")
     if found.reached:
-        say(f"as sure as {found.as_sure_as:.2g} joints drawn at random")
+        say(f"the estimate is as precise as that from {found.as_sure_as:.2g} random joints")
     if found.unresolved_first and found.sampling.unresolved == "below":
         say(
-            f"joints without a valid load are counted below the limit; with all of them above, P is at most "
-            f"{found.upper_if_above:.2g}. --unresolved above counts them there"
+            "joints without a valid load count as below the level; if all of them were above, P would be at most "
+            f"{found.upper_if_above:.2g} (--unresolved above counts them as above)"
         )

@@ -1,4 +1,4 @@
-"""``tolstat replay``: one joint of a campaign again."""
+"""``tolstat replay``: simulate one joint of a campaign again."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tolstat.cli._app import ResultFile, announce_compilation, as_text, say
-from tolstat.cli.simulate import case_text, judge, write_trace
+from tolstat.cli.simulate import case_text, warn_unless_ok, write_trace
 
 if TYPE_CHECKING:
     from tolstat.campaign.replay import Replay
@@ -16,16 +16,20 @@ if TYPE_CHECKING:
 
 def replay(
     file: ResultFile,
-    row: Annotated[int, typer.Option("--row", metavar="I", min=0, help="Row of the campaign: the joint's number.")],
+    row: Annotated[int, typer.Option("--row", metavar="I", min=0, help="Row of the joint in the campaign, from 0.")],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="CSV", help="Write the trace of the last revolution.")
+        Path | None,
+        typer.Option("--out", metavar="CSV", help="Write the load histories of the last revolution as CSV."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
-    """Simulate one joint of a campaign again.
+    """Simulate one joint again and compare with the file.
 
-    Its joint, errors and settings are those in FILE. Says whether every stored value comes out the same to the
-    last bit, as on the machine and with the versions that made the file it must; exit code 1 if not.
+    Uses the joint, errors and settings stored in FILE. Prints the largest force and torque of each bushing, and whether
+    all stored values are identical to the last bit, as they must be on the same machine with the same versions. If they
+    differ, prints the versions that differ and ends with exit code 1.
+
+    Example: tolstat replay iso2768_f.h5 --row 17 --out trace.csv
     """
     from tolstat.campaign import replay as replays
     from tolstat.common.files import check_target
@@ -39,7 +43,7 @@ def replay(
     summary = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     summary |= again.result.summary()
     typer.echo(as_text(summary) if as_json else case_text(summary))
-    judge(summary, again.result.remedy())
+    warn_unless_ok(summary, again.result.remedy())
     if out is not None:
         write_trace(again.result, out)
     say(_verdict(again))
@@ -49,15 +53,15 @@ def replay(
 
 def _verdict(again: Replay) -> str:
     if not again.differences:
-        return f"row {again.row}: equal to what is stored, bit for bit"
+        return f"row {again.row}: identical to the stored results, bit for bit"
     now = again.result.summary()["status"]
     if again.stored.label != now:
-        line = f"row {again.row}: ended as {again.stored.label} in the campaign, as {now} now"
+        line = f"row {again.row}: status {again.stored.label} in the campaign, {now} now"
     else:
         d = max(again.differences, key=lambda d: d.relative)
         line = (
-            f"row {again.row}: {len(again.differences)} stored values differ, by a relative {d.relative:.2g} at most: "
+            f"row {again.row}: {len(again.differences)} values differ, largest relative difference {d.relative:.2g}: "
         )
         line += f"{d.name} {d.stored!r} stored, {d.now!r} now"
-    reason = "the versions are those that made the file: another type of machine, or a damaged file"
+    reason = "all versions are those that made the file: the machine is of another type, or the file is damaged"
     return "\n  ".join([line, *(again.code or [reason])])

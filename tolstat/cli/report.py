@@ -1,4 +1,4 @@
-"""``tolstat report``: tables and figures, or all of a campaign as one page."""
+"""``tolstat report``: tables and figures of a campaign, or one HTML page."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ def report(
         typer.Option(
             "--out",
             metavar="DIR|PAGE.html",
-            help="Folder for the files, made if need be; default that of FILE. Or a page that holds everything.",
+            help="Folder for the files, created if missing (default: folder of FILE), or an HTML page to write.",
         ),
     ] = None,
     accept: Annotated[
         str | None,
         typer.Option(
-            "--accept", metavar="SHARE", help='Judge the limits on the page: "0.1 %" of the joints above, or less.'
+            "--accept",
+            metavar="SHARE",
+            help='With an HTML page: accepted share of joints above a limit: "0.1 %", "1000 ppm" or 0.001.',
         ),
     ] = None,
     again: Annotated[
@@ -36,17 +38,20 @@ def report(
             "--replay",
             metavar="N",
             min=0,
-            help="Joints that the page looks at over the shaft angle; simulated again if FILE has no histories.",
+            help="With an HTML page: number of joints evaluated over the input angle; simulated again if FILE has no "
+            "load histories.",
         ),
     ] = 1000,
 ) -> None:
-    """Print and draw which loads are exceeded, or put all that FILE tells on one page.
+    """Report the share of joints above each load.
 
-    Prints the share of joints above each of the study's limits; writes curves and pictures beside FILE. A
-    study without limits gets the quantiles of every bushing load, a sweep its loads against the swept value.
+    Prints the share of joints above each limit; without limits, the quantiles of each bushing load; for a sweep, the
+    loads against the swept value. Writes the curves as PNG, SVG and CSV.
 
-    With --out PAGE.html one file with everything inside, for reading and sharing: verdict, exceedance, capability,
-    causes, worst joints, fatigue, contact modes, errors, failures, and where the numbers come from.
+    With --out PAGE.html, writes a single page instead, with verdict, exceedance, capability, causes, worst joints,
+    fatigue, contact modes, numerical error, failed joints and provenance.
+
+    Example: tolstat report iso2768_f.h5 --out page.html --accept "1 %"
     """
     if out is not None and out.suffix.lower() in PAGES:
         _page(file, out, accept, again)
@@ -55,9 +60,9 @@ def report(
     from tolstat.store import ResultStore
 
     if accept is not None:
-        raise InputError([Fault("--accept", "is for a page", "add --out PAGE.html")])
+        raise InputError([Fault("--accept", "is used with an HTML page only", "add --out page.html")])
     if out is not None:
-        ResultStore.open(file).close()  # a file that cannot be read leaves no folder behind
+        ResultStore.open(file).close()  # check the file before the folder is created
         make_folder(out)
     tell(build(file, out))
 
@@ -65,7 +70,7 @@ def report(
 def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
     from tolstat.campaign.executors.common import THREAD_VARIABLES
 
-    for name in THREAD_VARIABLES:  # many small products: threads of BLAS cost more than they give
+    for name in THREAD_VARIABLES:  # for many small products, BLAS threads only cost time
         os.environ.setdefault(name, "1")
     from tolstat.common.files import check_target
     from tolstat.report import page
@@ -77,7 +82,7 @@ def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
         check_target(out, file)
     accepted = float("nan")
     with gather(faults):
-        accepted = share_of(accept) if accept is not None else accepted
+        accepted = parse_share(accept) if accept is not None else accepted
     if faults:
         raise InputError(faults)
     with ResultStore.open(file) as store:
@@ -86,13 +91,13 @@ def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
     say(f"wrote {page.write(file, out, accepted, again)}")
 
 
-def share_of(text: str) -> float:
-    """Share that ``"0.1 %"``, ``"1000 ppm"`` or ``"1e-3"`` stands for.
+def parse_share(text: str) -> float:
+    """Parse a share such as ``"0.1 %"``, ``"1000 ppm"`` or ``"1e-3"``.
 
     Raises
     ------
     InputError
-        When it is something else, or not between 0 and 1.
+        When the text is not a share between 0 and 1.
     """
     from pydantic_core import PydanticCustomError
 
@@ -103,5 +108,13 @@ def share_of(text: str) -> float:
     except PydanticCustomError:
         share = -1.0
     if not 0.0 < share < 1.0:
-        raise InputError([Fault("--accept", f"{text!r} is no share", 'write "0.1 %", "1000 ppm" or 0.001')])
+        raise InputError(
+            [
+                Fault(
+                    "--accept",
+                    f"{text!r} is not a share between 0 and 1",
+                    'write --accept "0.1 %", --accept "1000 ppm" or --accept 0.001',
+                )
+            ]
+        )
     return share

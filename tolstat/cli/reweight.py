@@ -1,4 +1,4 @@
-"""``tolstat reweight``: other tolerances without new runs."""
+"""``tolstat reweight``: exceedance for other tolerances, by likelihood-ratio reweighting."""
 
 from __future__ import annotations
 
@@ -6,23 +6,29 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, say
-from tolstat.cli.extend import StudyFile
+from tolstat.cli._app import ResultFile, StudyOption, as_text, say
 
 
 def reweight(
     file: ResultFile,
     settings: Annotated[
         list[str],
-        typer.Option("--set", metavar="KEY=VALUE", help='As "pin*.offset_t.plus_minus=0.05 mm"; repeat for more.'),
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help='Tolerance to change: "pin*.offset_t.plus_minus=0.05 mm"; repeatable.'
+        ),
     ],
-    study_file: StudyFile = None,
+    study_file: StudyOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
-    """Estimate the shares above the limits for other tolerances, from the joints of the file.
+    """Estimate exceedances for changed tolerances.
 
-    Each joint is weighted by how much more often the new tolerances make it. Where few joints have most of the weight
-    the verdict is "needs new runs", and the table is not to be trusted.
+    Simulates nothing: each joint in FILE gets a weight, the density of its errors under the changed tolerances over
+    that under the tolerances of the campaign (likelihood ratio).
+
+    Prints the share of joints above each limit with its 95 % interval, and a verdict. The verdict is "needs new runs"
+    if few joints have most of the weight; the table is then unreliable.
+
+    Example: tolstat reweight a.h5 --set "pin*.offset_t.plus_minus=0.05 mm"
     """
     from tolstat.display import text
     from tolstat.questions.reweight.query import reweighted

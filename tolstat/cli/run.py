@@ -1,4 +1,4 @@
-"""``tolstat run``: a campaign."""
+"""``tolstat run``: run a campaign."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, say, tell, warn
+from tolstat.cli._app import Workers, announce_compilation, print_warnings, say, tell
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
     from tolstat.store import Counts
     from tolstat.study import Study
 
-SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
-class Kind(StrEnum):
-    """Where joints are simulated, see `execution.Execution`."""
+class Executor(StrEnum):
+    """Where joints are simulated, see `campaign.blocks.Execution`."""
 
     PROCESSES = "processes"
     SERIAL = "serial"
@@ -31,52 +31,74 @@ def run(
     study_file: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="Result file; default STUDY.h5 in the current folder."),
+        typer.Option("--out", metavar="FILE", help="Result file; default: STUDY.h5 in the current folder."),
     ] = None,
     n: Annotated[
-        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints instead of the study's.")
+        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints; default: that of the study.")
     ] = None,
     workers: Workers = None,
     executor: Annotated[
-        Kind,
-        typer.Option("--executor", metavar="WHERE", help="processes; dask; or serial, without guard against crashes."),
-    ] = Kind.PROCESSES,
+        Executor,
+        typer.Option(
+            "--executor", metavar="WHERE", help="processes, dask (cluster), or serial (no protection against crashes)."
+        ),
+    ] = Executor.PROCESSES,
     scheduler: Annotated[
         str | None,
         typer.Option(
-            "--scheduler", metavar="URL", help="Dask scheduler, tcp://...; default a cluster of this machine."
+            "--scheduler",
+            metavar="URL",
+            help="Address of a Dask scheduler, tcp://HOST:PORT; default: start a cluster on this machine.",
         ),
     ] = None,
     joint_timeout: Annotated[
-        str, typer.Option("--joint-timeout", metavar="TIME", help="A joint that takes longer twice is given up.")
+        str,
+        typer.Option(
+            "--joint-timeout",
+            metavar="TIME",
+            help="Time limit of a joint, with unit s, min or h; if exceeded twice, its status is timeout.",
+        ),
     ] = "300 s",
     retry: Annotated[
         str | None,
-        typer.Option("--retry", metavar="STATES", help="Simulate joints again that are newton_failed,timeout or so."),
+        typer.Option(
+            "--retry", metavar="STATES", help="Statuses of joints to simulate again, such as newton_failed,timeout."
+        ),
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="With --retry: another setting, solver.steps_per_rev=360."),
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="With --retry: changed setting, solver.steps_per_rev=360; repeatable."
+        ),
     ] = None,
     rows: Annotated[
         str | None,
         typer.Option(
-            "--rows", metavar="A:B", help="Make FILE a slice of the campaign: rows A to B-1, for tolstat merge."
+            "--rows", metavar="A:B", help="Simulate rows A to B-1 only; FILE is then a slice for tolstat merge."
         ),
     ] = None,
     until: Annotated[
         str | None,
-        typer.Option("--until", metavar="RULE", help='Stop when it holds: "P(cross1.F > 700 N) width < 0.01".'),
+        typer.Option(
+            "--until",
+            metavar="RULE",
+            help='Stop when a 95 % interval is narrow enough: "P(cross1.F > 700 N) width < 0.01".',
+        ),
     ] = None,
     verify: Annotated[
-        bool, typer.Option(help="Check the numerical error on a few joints at the end, one in 400.")
+        bool, typer.Option(help="Check the numerical error on one joint in 400 (1 to 16) at the end.")
     ] = True,
-    report: Annotated[bool, typer.Option(help="Write and print the report at the end.")] = True,
+    report: Annotated[bool, typer.Option(help="Print the report at the end and write its files.")] = True,
 ) -> None:
-    """Simulate the joints of a study, then report.
+    """Simulate the joints of a study and print a report.
 
-    Only joints that FILE does not hold yet are simulated: stopped with Ctrl-C or killed, the same command goes on
-    where it was.
+    Simulates the joints that are pending in the result file, which is created if missing. To resume after an
+    interruption (Ctrl-C, kill, power failure), run the same command again.
+
+    Prints the share of joints above each limit (see tolstat report). Writes the result file, and beside it the curves
+    as PNG, SVG and CSV.
+
+    Example: tolstat run studies/iso2768_f.toml --n 4096 --out large.h5
     """
     from tolstat import study
     from tolstat.campaign.blocks import Execution
@@ -85,65 +107,65 @@ def run(
     faults: list[Fault] = []
     limit, part, again = 0.0, None, None
     with gather(faults):
-        limit = seconds_of(joint_timeout)
+        limit = parse_time(joint_timeout)
     with gather(faults):
-        part = None if rows is None else slice_of(rows)
+        part = None if rows is None else parse_rows(rows)
     if rows is not None and until is not None:
-        faults.append(Fault("--until", "does not go with --rows", "give one of the two"))
+        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
     if until is not None and retry is not None:
-        faults.append(Fault("--until", "does not go with --retry", "give one of the two"))
-    if scheduler is not None and executor is not Kind.DASK:
-        faults.append(Fault("--scheduler", "is for a Dask cluster", "add --executor dask"))
+        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
+    if scheduler is not None and executor is not Executor.DASK:
+        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     if settings and retry is None:
-        faults.append(Fault("--set", "is for joints that are simulated again", "add --retry, or edit the study"))
+        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
     with gather(faults):
         plan = study.load(study_file, n=n)
         again = None if retry is None else parse(retry, settings or (), plan)
     if faults:
         raise InputError(faults)
-    warn(study_file, plan.joints, plan.variants)
+    print_warnings(study_file, plan.joints, plan.variants)
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:
-        carry_out(plan, path, report, execution=execution, check=verify, rows=part, retry=again)
+        run_and_report(plan, path, report, execution=execution, check=verify, rows=part, retry=again)
     else:
-        carry_out(plan, path, report, until, execution=execution, check=verify)
+        run_and_report(plan, path, report, until, execution=execution, check=verify)
 
 
-def seconds_of(text: str, option: str = "--joint-timeout") -> float:
-    """Time that ``"60 s"`` of an option stands for, in seconds.
+def parse_time(text: str, option: str = "--joint-timeout") -> float:
+    """Parse the time of an option, such as ``"60 s"``; returns seconds.
 
     Raises
     ------
     InputError
-        When it is something else, or not above zero.
+        When the text is not a time above zero.
     """
     number, _, unit = text.partition(" ")
     try:
-        seconds = float(number) * SECONDS[unit.strip()]
+        seconds = float(number) * SECONDS_PER_UNIT[unit.strip()]
     except (KeyError, ValueError):
         seconds = 0.0
     if not 0 < seconds < float("inf"):
-        raise InputError([Fault(option, f"{text!r} is no time", 'write "60 s", "5 min" or "1 h"')])
+        raise InputError([Fault(option, f"{text!r} is not a time", f'write {option} "60 s", "5 min" or "1 h"')])
     return seconds
 
 
-def slice_of(text: str) -> range:
-    """Rows that ``"5000:10000"`` stands for: the first one, and the one after the last.
+def parse_rows(text: str) -> range:
+    """Parse a range of rows, ``"5000:10000"``: the first row, and the row after the last.
 
     Raises
     ------
     InputError
-        When it is something else.
+        When the text is not a range with at least one row.
     """
     first, colon, last = text.partition(":")
     if not (colon and first.isdecimal() and last.isdecimal() and int(first) < int(last)):
-        raise InputError([Fault("--rows", f"{text!r} is no part of the rows", "write --rows 5000:10000")])
+        raise InputError([Fault("--rows", f"{text!r} is not a range of rows", "write --rows 5000:10000")])
     return range(int(first), int(last))
 
 
-def carry_out(plan: Study, path: Path, report: bool, until: str | None = None, **choices: Any) -> None:
-    """Simulate what is pending, with progress on stderr, and report; `choices` go to `campaign.run`."""
+def run_and_report(plan: Study, path: Path, report: bool, until: str | None = None, **choices: Any) -> None:
+    """Run a campaign with progress on standard error, then print its report; `choices` go to `campaign.run`."""
     from tolstat.campaign import run as campaign
     from tolstat.campaign.executors import WorkerDied
 
@@ -185,9 +207,9 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
     n_looks = len(outcome.looks)
     say(
         f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
-        f"{look.above} above, {look.n_unresolved} failed or not settled (counted both ways)\n"
-        f"{stop_rule.CONFIDENCE:.0%} interval {look.lower:.5f} to {look.upper:.5f}, "
-        f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; those of the report are not"
+        f"{look.above} above, {look.n_unresolved} failed or not settled\n"
+        f"{stop_rule.CONFIDENCE:.0%} interval {look.lower:.5f} to {look.upper:.5f} (failed and unsettled joints below, then above), "
+        f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; the intervals in the report are not corrected"
     )
     with ResultStore.open(path) as store:
         return store.counts()

@@ -1,4 +1,4 @@
-"""``tolstat simulate``: one joint."""
+"""``tolstat simulate``: simulate one joint."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import announce_compilation, as_text, say, warn, writing
+from tolstat.cli._app import announce_compilation, as_text, output_file, print_warnings, say
 
 if TYPE_CHECKING:
     from tolstat.campaign.trace import CaseResult
@@ -16,13 +16,17 @@ if TYPE_CHECKING:
 def simulate(
     case: Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML): one joint with its errors.")],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="CSV", help="Write the trace of the last revolution.")
+        Path | None,
+        typer.Option("--out", metavar="CSV", help="Write the load histories of the last revolution as CSV."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
     """Simulate one joint and print its largest loads.
 
-    The loads are those of the last revolution, cross bushings 1 to 4 and fork bushings 1 to 4.
+    Prints status and course of the simulation, and for each bushing the largest force (N) and torque (N m) of the last
+    revolution.
+
+    Example: tolstat simulate case.toml --out trace.csv
     """
     from tolstat import study
     from tolstat.campaign import trace
@@ -31,18 +35,18 @@ def simulate(
     if out is not None:
         check_target(out, case)
     loaded = study.load_case(case)
-    warn(case, [loaded.joint])
+    print_warnings(case, [loaded.joint])
     announce_compilation()
     result = trace.simulate_case(loaded)
     summary = result.summary()
     typer.echo(as_text(summary) if as_json else case_text(summary))
-    judge(summary, result.remedy())
+    warn_unless_ok(summary, result.remedy())
     if out is not None:
         write_trace(result, out)
 
 
 def case_text(summary: dict[str, Any]) -> str:
-    """Text of `CaseResult.summary`."""
+    """Format `CaseResult.summary` as text."""
     from tolstat.display.text import align
 
     def value(load: float | None) -> str:
@@ -54,8 +58,8 @@ def case_text(summary: dict[str, Any]) -> str:
     return f"{facts}\n{align(rows)}"
 
 
-def judge(summary: dict[str, Any], remedy: str) -> None:
-    """Warn of a joint without valid results."""
+def warn_unless_ok(summary: dict[str, Any], remedy: str) -> None:
+    """Print the meaning of a status other than ok, and the remedy."""
     from tolstat.common.tables import STATUS_TEXT, Status
 
     state = Status[str(summary["status"]).upper()]
@@ -64,7 +68,7 @@ def judge(summary: dict[str, Any], remedy: str) -> None:
 
 
 def write_trace(result: CaseResult, out: Path) -> None:
-    """Write the trace of the last revolution as CSV."""
-    with writing(out) as temporary:
+    """Write the load histories of the last revolution as CSV."""
+    with output_file(out) as temporary:
         result.to_pandas().to_csv(temporary, index=False, lineterminator="\n")
     say(f"wrote {out}")

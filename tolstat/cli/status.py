@@ -1,4 +1,4 @@
-"""``tolstat status``: what became of the joints."""
+"""``tolstat status``: number of joints by status."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 
 def status(
     file: ResultFile,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of lines.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
-    """Print what became of the joints of a campaign.
+    """Print the number of joints by status.
 
-    One line for each status with the number of joints, and the share above each limit so far, with its 95 %
-    interval. A campaign under way can be looked at: it is not disturbed, and its rate and time to go are printed, too.
+    Prints one line per status, and the share of joints above each limit so far with its 95 % interval. During a run,
+    prints also its rate and the remaining time; reading the file does not disturb the run.
+
+    Example: tolstat status iso2768_f.h5
     """
     from tolstat.store import ResultStore
 
@@ -37,7 +39,7 @@ def status(
 
 
 def _summary(store: ResultStore) -> dict[str, Any]:
-    """Everything that the command prints, read in blocks; blocks of pending rows are not read."""
+    """Collect the counts and shares, some rows at a time; blocks of pending rows are skipped."""
     import numpy as np
 
     from tolstat.common.loads import LOADS
@@ -67,7 +69,7 @@ def _summary(store: ResultStore) -> dict[str, Any]:
 
 
 def _pace(store: ResultStore, pending: int) -> dict[str, Any]:
-    """Joints a second and seconds to go of a run under way, as soon as there are any."""
+    """Return rate and remaining time of the run in progress, once it has finished joints."""
     session = store.session()
     if session is None:
         return {"running": False}

@@ -7,29 +7,36 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, filling, make_folder, say
+from tolstat.cli._app import ResultFile, as_text, make_folder, output_folder, say
 
 
 def time_above(
     file: ResultFile,
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="LOAD", help="cross1.F, fork2.T_e; repeat for more. Default: loads with limits."),
+        typer.Option(
+            "--by",
+            metavar="LOAD",
+            help="Load or component, such as cross1.F or fork2.T_e; repeatable; default: loads with limits.",
+        ),
     ] = None,
     level: Annotated[
         list[str] | None,
-        typer.Option("--level", metavar="LEVEL", help='"700 N"; repeat for more. Default: the limits.'),
+        typer.Option("--level", metavar="LEVEL", help='Level, such as "700 N"; repeatable; default: the limits.'),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for curves (PNG, SVG, CSV), made if need be.")
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Write curves (PNG, SVG, CSV) to this folder, created if missing."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
-    """Estimate for which share of a revolution loads are above a level.
+    """Print how much of a revolution loads are above a level.
 
-    Every joint has such a share: printed are its mean over the joints, and the share that half, 90 % and 99 % of the
-    joints do not exceed. A further column gives the share of the joints that are above the level at any time. For files
-    whose study keeps load histories, in full or as harmonics.
+    Prints the time above, a share of the revolution of each joint, as its mean and its 50, 90 and 99 % quantiles over
+    the joints; and the exceedance, the share of joints that are above the level at any time. The study must keep load
+    histories (output.histories "full" or "harmonics").
+
+    Example: tolstat time-above a.h5 --by cross1.F --level "1500 N"
     """
     from tolstat.display import table, text
     from tolstat.questions.time_above import query, rendering
@@ -45,7 +52,7 @@ def time_above(
     say(rendering.note(found))
     if out is not None:
         make_folder(out)
-        with filling(out):
+        with output_folder(out):
             files = rendering.write(found, out / file.stem)
         for path in files:
             say(f"wrote {path}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, as_text, say, writing
+from tolstat.cli._app import Workers, announce_compilation, as_text, output_file, say
 
 if TYPE_CHECKING:
     from tolstat.store.verification import Verification
@@ -15,23 +15,26 @@ if TYPE_CHECKING:
 
 def verify(
     what: Annotated[Path, typer.Argument(metavar="STUDY|FILE", help="Study file (TOML) or result file (HDF5).")],
-    joints: Annotated[
-        str, typer.Option("--joints", metavar="N|all", help="Number of joints, or all that settled.")
-    ] = "24",
+    joints: Annotated[str, typer.Option("--joints", metavar="N|all", help="Number of joints to check, or all.")] = "24",
     seed: Annotated[
-        int | None, typer.Option("--seed", metavar="S", min=0, help="Chooses the joints; default the study's seed.")
+        int | None,
+        typer.Option("--seed", metavar="S", min=0, help="Seed of the choice of joints; default: that of the study."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="CSV", help="Write every joint, check and load as a table.")
+        Path | None, typer.Option("--out", metavar="CSV", help="Write the errors of each joint, check and load as CSV.")
     ] = None,
     workers: Workers = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
-    """Measure the numerical error on joints of a campaign.
+    """Estimate the numerical error on some joints.
 
-    They are simulated again with half the step, tighter Newton, from another start, by another method, and by a tight
-    reference (scipy's Radau). Prints how far the largest loads are off, relative to the largest of the kind in the
-    joint. Of a result file the joints are those that it holds, and what is found is kept in it for the report.
+    Simulates joints again with half the step, with a smaller Newton tolerance, from another initial state, with another
+    integration method, and with a tight reference solution (scipy's Radau). Prints the distribution of the errors of
+    the largest loads, relative to the largest load of the kind in the joint.
+
+    Of a result file, checks settled joints and stores the checks in the file for the report.
+
+    Example: tolstat verify iso2768_f.h5 --joints 24 --out errors.csv
     """
     from tolstat.campaign import progress
     from tolstat.campaign import verify as verification
@@ -52,13 +55,13 @@ def verify(
         typer.echo(aligned(rendering.ERRORS, query.distribution(found)))
     say(rendering.note(found))
     if out is not None:
-        with writing(out) as temporary:
+        with output_file(out) as temporary:
             query.joints(found).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")
 
 
 def _summary(found: Verification) -> dict[str, Any]:
-    """Distributions as plain values, None where nothing is known: by check and kind of load, and by load."""
+    """Return the distributions of errors as plain values, by kind of load and by load; None for unknown values."""
     from tolstat.questions.accuracy import query
 
     facts: dict[str, Any] = {"rows": found.rows.tolist(), "seed": found.seed}

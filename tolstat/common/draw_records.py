@@ -63,8 +63,9 @@ def check_equal_weights(sampling: Mapping[str, Any], path: Path, weighted: bool 
         For a subset simulation, and for importance sampling unless `weighted`; the hint names what can be used.
     """
     if sampling["method"] == "subset":
-        remedy = f"ask for its probability with: tolstat rare {path}"
-        raise StoreError(str(Fault(str(path), "holds the levels of a subset simulation, no sample", remedy)))
+        remedy = f"print its probability: tolstat rare {path}"
+        raise StoreError(str(Fault(str(path), "holds the levels of a subset simulation, no random sample", remedy)))
     if sampling["method"] == "importance" and not weighted:
-        found = "holds joints that count differently (importance sampling), which this statistic does not go by"
-        raise StoreError(str(Fault(str(path), found, 'use tolstat report, or sampling.method = "random"')))
+        found = "holds weighted joints (importance sampling), which this statistic does not support"
+        remedy = f'use tolstat report {path}, or write sampling.method = "random" in the study'
+        raise StoreError(str(Fault(str(path), found, remedy)))

@@ -28,11 +28,13 @@ def check_target(path: Path, *inputs: Path) -> None:
     """
     place = str(path)
     if path.is_dir():
-        raise InputError([Fault(place, "cannot be written: is a folder", "give the path of a file")])
+        raise InputError([Fault(place, "cannot be written: is a folder", "give the path of a file in it")])
     if not path.parent.is_dir():
-        raise InputError([Fault(place, "cannot be written: no such folder", "make the folder first")])
+        raise InputError(
+            [Fault(place, "cannot be written: no such folder", f"create the folder: mkdir -p {path.parent}")]
+        )
     if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
-        raise InputError([Fault(place, "cannot be written: it is the input", "give another name")])
+        raise InputError([Fault(place, "cannot be written: it is the input", "give the output another name")])
 
 
 @contextmanager

@@ -42,7 +42,7 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
     except tomllib.TOMLDecodeError as error:
-        raise InputError([Fault(str(path), f"is not TOML: {error}", "mend the syntax at that place")]) from error
+        raise InputError([Fault(str(path), f"is not TOML: {error}", "correct the syntax there")]) from error
 
 
 def dotted(location: Sequence[int | str]) -> str:
@@ -104,7 +104,7 @@ _REMEDIES = {
     "greater_than_equal": "give a value of at least {ge}",
     "less_than": "give a value below {lt}",
     "less_than_equal": "give a value of at most {le}",
-    "too_short": "give at least {min_length}",
+    "too_short": "give at least {min_length} entries",
     "int_type": "write a whole number, without quotes",
     "int_from_float": "write a whole number",
     "bool_type": "write true or false, without quotes",
@@ -128,7 +128,7 @@ def _fault(e: Any, model: type[BaseModel], place: str, prefix: tuple[int | str, 
         return Fault(where, "missing key", f"add {path}")
     if e["type"] in ("literal_error", "enum"):
         return Fault(where, f"{e['input']!r} is not allowed", f"write one of {context['expected']}")
-    remedy = _REMEDIES.get(e["type"], "give a value of the kind asked for").format(**context)
+    remedy = _REMEDIES.get(e["type"], "give a value of the expected type").format(**context)
     return Fault(where, f"{e['input']!r}: {e['msg'].removeprefix('Input ')}", remedy)
 
 

@@ -27,7 +27,7 @@ from tolstat.joint.sections import (
     Pin,
     Ratio,
     Stiffness,
-    needed,
+    require,
 )
 
 QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
@@ -71,7 +71,7 @@ class Stations(NamedTuple):
     weight: Array
 
 
-def _on_the_pin(ratio: float) -> float:
+def _check_position(ratio: float) -> float:
     if not abs(ratio) <= 0.5:
         raise refuse(f"{ratio:g} is beyond the end of the contact", "give a number from -0.5 to 0.5")
     return ratio
@@ -80,21 +80,21 @@ def _on_the_pin(ratio: float) -> float:
 class Station(Strict):
     """One contact station of the law ``"stations"``."""
 
-    s_over_z: Annotated[units.Number, AfterValidator(_on_the_pin)]
+    s_over_z: Annotated[units.Number, AfterValidator(_check_position)]
     k1: QuadraticStiffness
     k2: Annotated[units.Stiffness, NOT_NEGATIVE]
     weight: Ratio
 
 
-def _carries(stations: tuple[Station, ...] | None) -> tuple[Station, ...] | None:
+def _check_stations(stations: tuple[Station, ...] | None) -> tuple[Station, ...] | None:
     if stations is not None and not 1 <= len(stations) <= MAX_STATIONS:
-        raise refuse(f"has {len(stations)} stations", f"give 1 to {MAX_STATIONS}")
+        raise refuse(f"has {len(stations)} stations", f"give 1 to {MAX_STATIONS} stations")
     if stations is not None and not any(station.k2 > 0.0 for station in stations):
-        raise refuse("no station has k2 > 0", "give one at least a linear coefficient")
+        raise refuse("no station has k2 > 0", "give at least one station k2 > 0")
     return stations
 
 
-def of_its_law(contact: Mapping[str, Any], law: object) -> dict[str, Any]:
+def keys_valid_for(contact: Mapping[str, Any], law: object) -> dict[str, Any]:
     """Keys of a contact section that remain valid when an override sets `law`."""
     other = COEFFICIENTS if law == "stations" else ("stations",)
     return {key: value for key, value in contact.items() if key not in other}
@@ -108,7 +108,7 @@ class Contact(Strict):
 
     law: Literal["mode", "uniform", "point", "sliced", "stations"]
     n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = OPTIONAL
-    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_carries)] = OPTIONAL
+    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = OPTIONAL
     D_H: Length
     D_P: Length
     z: Length
@@ -130,14 +130,14 @@ class Contact(Strict):
     def _fits(cls, value: float, info: ValidationInfo) -> float:
         hole = info.data.get("D_H")
         if hole is not None and value > hole:
-            raise refuse(f"a pin of {value:g} m does not go into a hole of {hole:g} m", "give D_P <= D_H")
+            raise refuse(f"a pin of {value:g} m does not fit into a hole of {hole:g} m", "give D_P <= D_H")
         return value
 
     @field_validator(*COEFFICIENTS)
     @classmethod
     def _without_stations(cls, value: object, info: ValidationInfo) -> object:
         if value is not None and info.data.get("law") == "stations":
-            raise refuse('has no meaning with law = "stations"', "remove it: each station has its own coefficients")
+            raise refuse('has no effect with law = "stations"', "remove it: each station has its own coefficients")
         return value
 
     @field_validator("stations")
@@ -145,7 +145,7 @@ class Contact(Strict):
     def _of_their_law(cls, value: object, info: ValidationInfo) -> object:
         law = info.data.get("law", "stations")  # an invalid law has a fault of its own
         if value is not None and law != "stations":
-            raise refuse(f'has no meaning with law = "{law}"', 'write law = "stations"')
+            raise refuse(f'has no effect with law = "{law}"', 'write law = "stations"')
         return value
 
     @field_validator("coefficients")
@@ -160,7 +160,7 @@ class Contact(Strict):
     @field_validator(*NEEDED)
     @classmethod
     def _needed(cls, value: float | None, info: ValidationInfo) -> float | None:
-        needed(value, info, *NEEDED[str(info.field_name)])
+        require(value, info, *NEEDED[str(info.field_name)])
         return value
 
     @field_validator("k1p", "k2p")

@@ -14,7 +14,7 @@ from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import data_dir
 from tolstat.common.strict import Strict, refuse
-from tolstat.joint.contact import Contact, of_its_law
+from tolstat.joint.contact import Contact, keys_valid_for
 from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
 
 
@@ -129,7 +129,7 @@ def overridden(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, An
     """Replace keys of a joint by those of `over`; where `over` sets a contact law, remove the keys of other laws."""
     contact, own = data.get("contact"), over.get("contact")
     if isinstance(contact, Mapping) and isinstance(own, Mapping) and "law" in own:
-        data = {**data, "contact": of_its_law(contact, own["law"])}
+        data = {**data, "contact": keys_valid_for(contact, own["law"])}
     return merged(data, over)
 
 

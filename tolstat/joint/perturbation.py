@@ -27,9 +27,9 @@ ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
 """Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
 
 
-def _steep(alpha: float) -> float:
+def _check_misalignment(alpha: float) -> float:
     if not abs(alpha) < np.pi / 2:
-        raise refuse(f"{np.degrees(alpha):g} deg cannot be run by a Cardan joint", "give less than 90 deg")
+        raise refuse(f"a Cardan joint cannot turn at {np.degrees(alpha):g} deg", "give less than 90 deg")
     return alpha
 
 
@@ -39,7 +39,7 @@ class Operation(Strict):
     Speed and torque may be negative: the joint then turns the other way, the torque drives the output shaft.
     """
 
-    alpha: Annotated[units.Angle, AfterValidator(_steep)]
+    alpha: Annotated[units.Angle, AfterValidator(_check_misalignment)]
     speed: Annotated[units.Speed, AfterValidator(units.not_zero)]
     torque: units.Torque
 

@@ -36,21 +36,21 @@ Ratio = Annotated[units.Number, NOT_NEGATIVE]
 
 def _poisson(nu: float) -> float:
     if not 0.0 <= nu < 0.5:
-        raise refuse(f"{nu:g} is no Poisson's ratio of a metal", "give a number from 0 to below 0.5")
+        raise refuse(f"{nu:g} is not a Poisson's ratio of a metal", "give a number from 0 to below 0.5")
     return nu
 
 
 def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
     """Refuse moments of inertia that no body has: one exceeds the sum of the two others."""
     if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
-        raise refuse(f"no body has the moments of inertia {inertia}", "none may exceed the other two's sum")
+        raise refuse(f"no body has the moments of inertia {inertia}", "give none above the sum of the others")
     return inertia
 
 
 Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
 
 
-def needed(value: object, info: ValidationInfo, selector: str, word: str, instead: str) -> None:
+def require(value: object, info: ValidationInfo, selector: str, word: str, instead: str) -> None:
     """Raise when a key is missing although the key `selector` of its section has the value `word`."""
     if value is None and info.data.get(selector) == word:
         remedy = f'add {info.field_name}, or write {selector} = "{instead}"'
@@ -162,5 +162,5 @@ class Bushing(Strict):
     @field_validator("cross", "fork")
     @classmethod
     def _given(cls, value: BeamAxes | None, info: ValidationInfo) -> BeamAxes | None:
-        needed(value, info, "stiffness", "given", "beam")
+        require(value, info, "stiffness", "given", "beam")
         return value

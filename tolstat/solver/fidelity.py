@@ -76,7 +76,7 @@ def choose(
     budget: float,
     loads: Sequence[str],
     simulate: Callable[..., Simulation],
-    least_steps: int = 0,
+    min_steps: int = 0,
 ) -> Choice:
     """Choose a rung by a pilot of joints.
 
@@ -96,7 +96,7 @@ def choose(
         Loads asked for: ``cross1.F``, ``fork3.T``, ``pin1.contact``, ``psi``; all forces and torques if none.
     simulate : callable
         (n,) table PARAM, Options -> Simulation.
-    least_steps : int
+    min_steps : int
         Minimum number of steps a revolution, as load histories need it.
 
     Returns
@@ -107,7 +107,7 @@ def choose(
     truth = simulate(params, _at(options, REFERENCE)).results
     table = []
     for rung in RUNGS:
-        if rung.steps_per_rev >= least_steps:
+        if rung.steps_per_rev >= min_steps:
             table.append(_entry(rung, simulate(params, _at(options, rung)).results, truth, names))
     good = [entry for entry in table if _meets(entry, budget)]
     met = bool(good)
@@ -134,7 +134,7 @@ def apply(options: Options, record: Mapping[str, Any]) -> Options:
 
 def describe(record: Mapping[str, Any]) -> str:
     """Format the choice and its table as aligned text, one line per rung."""
-    lines = [str(record["reason"]), "  rung                    error worst     q95    cost  other states"]
+    lines = [str(record["reason"]), "  rung                    error worst     q95    cost  other status"]
     for entry in record["table"]:
         name = f"{entry['fidelity']} {entry['steps_per_rev']}"
         error = f"{_figure(entry['worst']):>14} {_figure(entry['q95']):>7}"

@@ -156,7 +156,7 @@ def _start_faults(q: NDArray[Any], v: NDArray[Any], matrix: NDArray[Any] | None)
         if matrix.shape != (q.size, q.size) or not np.isfinite(matrix).all():
             faults.append(f"mass must be a finite matrix of shape {(q.size, q.size)}, not of {matrix.shape}")
         elif np.linalg.slogdet(matrix)[0] == 0:
-            faults.append("mass is singular; every unknown needs one")
+            faults.append("mass is singular; every unknown needs mass")
     return faults
 
 
@@ -165,7 +165,7 @@ def _grid_faults(t_span: tuple[float, float], steps: int, max_substeps: int) -> 
     faults = []
     span = np.asarray(t_span, float)
     if span.shape != (2,) or not np.isfinite(span).all() or not span[1] > span[0]:
-        faults.append(f"t_span {t_span} must be two finite times that grow")
+        faults.append(f"t_span {t_span} must be two finite, increasing times")
     if not isinstance(steps, int | np.integer) or steps < 1:
         faults.append(f"steps {steps!r} must be a whole number of at least 1")
     if not isinstance(max_substeps, int | np.integer) or max_substeps < 0:

@@ -18,7 +18,7 @@ KEPT = 16
 GATE = 1e-4
 """Cycles up to this fraction of the joint's largest force or torque are not counted: the default of
 ``solver.settle_tol`` allows loads to differ by as much between two revolutions."""
-LEAST_SAMPLES = 90
+MIN_SAMPLES = 90
 """Minimum number of samples a revolution where tolstat chooses the steps: errors of peaks of a load with four cycles
 are within 1 %."""
 

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
-MOST_KEPT = 12_000
+MAX_KEPT_SAMPLES = 12_000
 """Maximum number of samples in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
 
 NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
-"""Stands for the statistics of single revolutions where none are asked for."""
+"""Empty statistics of single revolutions, if they are not needed."""
 
 
 def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
@@ -198,8 +198,8 @@ def _together(
     from tolstat.kernel.revolution.settle import make_samples
 
     batch, tally = lanes(options), np.zeros(3, np.int64)
-    most = max(1, MOST_KEPT // options.steps_per_rev) if keep else len(params)
-    for here in _groups(params, most):
+    max_size = max(1, MAX_KEPT_SAMPLES // options.steps_per_rev) if keep else len(params)
+    for here in _groups(params, max_size):
         part = np.ascontiguousarray(params[here])
         batch.par.n_stations = part["n_stations"][0]
         words = part.view(np.float64).reshape(len(part), -1)
@@ -214,12 +214,12 @@ def _together(
         yield from zip(here.tolist(), samples, strict=False)
 
 
-def _groups(params: NDArray[np.void], most: int) -> Iterator[NDArray[np.intp]]:
-    """Yield the indices of joints with equal numbers of contact stations, `most` at a time."""
+def _groups(params: NDArray[np.void], max_size: int) -> Iterator[NDArray[np.intp]]:
+    """Yield the indices of joints with equal numbers of contact stations, at most `max_size` at a time."""
     for stations in np.unique(params["n_stations"]):
         rows = np.flatnonzero(params["n_stations"] == stations)
-        for first in range(0, len(rows), most):
-            yield rows[first : first + most]
+        for first in range(0, len(rows), max_size):
+            yield rows[first : first + max_size]
 
 
 def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:

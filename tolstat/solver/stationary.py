@@ -1,7 +1,7 @@
 """Stationary joints: their motion never repeats, but the distribution of their largest loads does not change.
 
-Such a joint is watched for some revolutions. The largest loads of each revolution (block maxima) tell how large the
-largest of ``solver.duration`` revolutions is: values above a threshold follow a generalised Pareto distribution
+Such a joint is watched for some revolutions. The largest loads of each revolution (block maxima) predict the
+largest of ``solver.duration`` revolutions: values above a threshold follow a generalised Pareto distribution
 (Pickands 1975), fitted by probability-weighted moments (Hosking and Wallis 1987). Heavy tails are excluded from the
 fit: a driven joint with losses has bounded loads.
 """
@@ -15,22 +15,22 @@ from numpy.typing import NDArray
 
 from tolstat.common.tables import LARGEST, VALID, Motion, Status
 
-SETTLING = 1 / 3
+DISCARDED_SHARE = 1 / 3
 """Share of the revolutions watched that is discarded at their beginning."""
-FEWEST = 16
+MIN_REVOLUTIONS = 16
 """Minimum number of revolutions, without those discarded, to call a joint stationary."""
-ALIKE, SPREAD_ALIKE = 3.5, 3.0
+MAX_STANDARD_ERRORS, MAX_SPREAD_RATIO = 3.5, 3.0
 """Halves are alike when their means differ by no more than the first number of standard errors, or `NEGLIGIBLE`, and
 when the ratio of their standard deviations is no more than the second, or these are negligible."""
 NEGLIGIBLE = 0.01
 """Relative difference of a load that does not matter."""
-TAIL = 0.4
+TAIL_SHARE = 0.4
 """Share of the revolutions, those with the largest loads, that the tail's distribution is fitted to."""
 DRAWS, SEED = 400, 5
 """Number of bootstrap samples, and the seed: one joint's interval is the same wherever it is computed."""
 CONFIDENCE = 0.95
 """Probability that the interval contains the largest load."""
-STEPS = 0.01
+STEP_ERROR = 0.01
 """Relative error of a load that the time steps may cause: no interval is narrower on either side."""
 
 FloatArray = NDArray[np.float64]
@@ -63,8 +63,8 @@ def classify(results: Table, blocks: Table, duration: int) -> None:
             continue
         made = int(results["revolutions"][i])
         kept = min(made, blocks.shape[1])
-        watched = blocks[i, np.arange(made - kept, made) % blocks.shape[1]][int(SETTLING * kept) :]
-        if len(watched) < FEWEST or not is_stationary(watched):
+        watched = blocks[i, np.arange(made - kept, made) % blocks.shape[1]][int(DISCARDED_SHARE * kept) :]
+        if len(watched) < MIN_REVOLUTIONS or not is_stationary(watched):
             continue
         results["status"][i] = Status.STATIONARY
         for load in LARGEST:
@@ -107,8 +107,8 @@ def _alike(series: FloatArray) -> bool:
     small = NEGLIGIBLE * float(series.max())
     spreads = np.array([first.std(ddof=1), second.std(ddof=1)])
     error = float(np.sqrt((spreads**2).sum() / half))
-    level = abs(float(first.mean() - second.mean())) <= max(ALIKE * error, small)
-    return level and bool(spreads.max() <= max(SPREAD_ALIKE * spreads.min(), small))
+    level = abs(float(first.mean() - second.mean())) <= max(MAX_STANDARD_ERRORS * error, small)
+    return level and bool(spreads.max() <= max(MAX_SPREAD_RATIO * spreads.min(), small))
 
 
 def largest(values: FloatArray, duration: int) -> Interval:
@@ -128,7 +128,7 @@ def largest(values: FloatArray, duration: int) -> Interval:
         fits to samples of the fitted distribution (parametric bootstrap).
     """
     n, m = values.shape
-    count = max(3, round(TAIL * n))
+    count = max(3, round(TAIL_SHARE * n))
     ordered = np.sort(values, axis=0)
     threshold = ordered[n - count - 1]
     scale, shape = _pareto(ordered[n - count :] - threshold)
@@ -139,7 +139,7 @@ def largest(values: FloatArray, duration: int) -> Interval:
     drawn = threshold + _quantile(rng.random((DRAWS, m)) ** (1 / above), scales, shapes)
     tail = 0.5 * (1 - CONFIDENCE)
     lower, median, upper = np.quantile(drawn, [tail, 0.5, 1 - tail], axis=0)
-    off = STEPS * np.abs(median)
+    off = STEP_ERROR * np.abs(median)
     return Interval(median, lower - off, upper + off)
 
 

@@ -14,10 +14,10 @@ from tolstat.common.files import atomic_write
 from tolstat.common.tables import Status
 from tolstat.store.histories import HISTORY_BYTES, HistoryParts, attach_scales, create_dataset, rows_per_chunk
 from tolstat.store.reader import Reader, parts_folder
-from tolstat.store.result_file import BLOCK, campaign_digest, fault, fill
+from tolstat.store.result_file import BLOCK, campaign_digest, fill, store_error
 
 
-class Differing(Exception):
+class DifferingResults(Exception):
     """Two files hold different results for the same joint.
 
     Attributes
@@ -67,7 +67,7 @@ def assemble(
 
     Raises
     ------
-    Differing
+    DifferingResults
         When two sources hold different results of one row.
     StoreError
         When `path` exists and must not be replaced, or cannot be written.
@@ -82,10 +82,12 @@ def assemble(
             else:
                 _histories_inside(file, n, sources)
     except FileExistsError as error:
-        raise fault(path, "exists already", "delete it, or use another --out") from error
+        raise store_error(path, "exists already", "delete it, or give another file: --out OTHER.h5") from error
     except OSError as error:
         reason = error.strerror or str(error)
-        raise fault(path, f"cannot be written: {reason}", "check the folder, its permissions and space") from error
+        raise store_error(
+            path, f"cannot be written: {reason}", "check that the folder is writable and the disk has space"
+        ) from error
 
 
 def _copy_results(file: h5py.File, source: Reader) -> None:
@@ -101,7 +103,7 @@ def _copy_results(file: h5py.File, source: Reader) -> None:
             same = _bytes(values[both]) == _bytes(before[both])
             if not same.all():
                 row = np.flatnonzero(both)[np.argmin(same.all(axis=1))]
-                raise Differing(int(there.start + row), name)
+                raise DifferingResults(int(there.start + row), name)
             before[new] = values[new]
             dataset[there] = before
         for name, dataset in file["ledger"].items():
@@ -158,8 +160,10 @@ def check_free(path: Path) -> None:
         When the file or a folder of its histories exists, or its parent folder does not exist.
     """
     if path.exists():
-        raise fault(path, "exists already", "delete it, or use another --out")
+        raise store_error(path, "exists already", "delete it, or give another file: --out OTHER.h5")
     if parts_folder(path).exists():
-        raise fault(parts_folder(path), "holds histories of another campaign", "delete it or use another --out")
+        raise store_error(
+            parts_folder(path), "holds histories of another campaign", "delete it, or give another file: --out OTHER.h5"
+        )
     if not path.parent.is_dir():
-        raise fault(path, "cannot be written: no such folder", "make the folder first")
+        raise store_error(path, "cannot be written: no such folder", f"create the folder: mkdir -p {path.parent}")

@@ -18,15 +18,15 @@ from tolstat.common import selected_results
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.tables import HistorySpec
 from tolstat.store import integrity
-from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, descriptions, fault, text
+from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, descriptions, store_error, text
 
-DAMAGED = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
+DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
 """Exceptions that reading a damaged file raises, in h5py or in code that relies on the file's attributes."""
-MOST_COMPRESSED = 1100
+MAX_COMPRESSION = 1100
 """Largest compression ratio accepted (deflate cannot exceed 1032): a dataset that claims more is incomplete."""
-MOST_SAMPLES = 50_000_000
+MAX_SAMPLES = 50_000_000
 """Largest number of values in a history of one joint: more than the finest solution of all loads has."""
-MOST_TEXT = 64_000_000
+MAX_TEXT_BYTES = 64_000_000
 """Largest size of a JSON attribute that is read, bytes."""
 
 
@@ -43,13 +43,17 @@ def check_schema(path: Path, file: h5py.File) -> None:
     filetype = text(file.attrs, "filetype") if "filetype" in file.attrs else None
     if filetype != FILETYPE:
         found = f"is HDF5, but of type {filetype!r} instead of {FILETYPE!r}"
-        raise fault(path, found, "give a file that tolstat run has made")
+        raise store_error(path, found, "give a result file made by tolstat run")
     version = integer(file, "schema_version")
     if version != SCHEMA_VERSION:
-        remedy = "use a newer tolstat" if version > SCHEMA_VERSION else "run its study again"
-        raise fault(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)
+        remedy = (
+            "use a newer tolstat"
+            if version > SCHEMA_VERSION
+            else "run its study again: tolstat run STUDY --out OTHER.h5"
+        )
+        raise store_error(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)
     if not integrity.is_sealed(file):
-        raise ValueError("its attributes are not as they were written")
+        raise ValueError("its attributes do not match their checksum")
 
 
 def integer(file: h5py.File, name: str, default: int | None = None) -> int:
@@ -66,7 +70,7 @@ def integer(file: h5py.File, name: str, default: int | None = None) -> int:
         return default
     value = file.attrs[name]
     if not isinstance(value, (int, np.integer)) or value < 0:
-        raise ValueError(f"attribute {name} is {value!r}, not a whole number of zero or more")
+        raise ValueError(f"attribute {name} is {value!r}, not a whole number of at least 0")
     return int(value)
 
 
@@ -78,14 +82,14 @@ def mapping(file: h5py.File, name: str) -> dict[str, Any]:
     KeyError
         When it is missing.
     ValueError
-        When it is not a JSON object, or longer than `MOST_TEXT`.
+        When it is not a JSON object, or longer than `MAX_TEXT_BYTES`.
     """
     held = file.attrs.get_id(name)
-    if held.get_storage_size() > MOST_TEXT:
+    if held.get_storage_size() > MAX_TEXT_BYTES:
         raise ValueError(f"attribute {name} is too long")
     value = json.loads(text(file.attrs, name))
     if not isinstance(value, dict):
-        raise ValueError(f"attribute {name} is no JSON object")
+        raise ValueError(f"attribute {name} is not a JSON object")
     return value
 
 
@@ -100,7 +104,7 @@ def history_specs(file: h5py.File) -> dict[str, HistorySpec]:
     specs = {}
     for name, (shape, dtype, unit, description, *axes) in mapping(file, "histories").items():
         spec = HistorySpec(tuple(shape), dtype, unit, description, *(tuple(names) for names in axes))
-        if not all(isinstance(size, int) and size > 0 for size in spec.shape) or math.prod(spec.shape) > MOST_SAMPLES:
+        if not all(isinstance(size, int) and size > 0 for size in spec.shape) or math.prod(spec.shape) > MAX_SAMPLES:
             raise ValueError(f"history {name} has the shape {shape}")
         if spec.dtype not in ("f4", "f8", "u1", "u2"):
             raise ValueError(f"history {name} has the type {spec.dtype}")
@@ -139,7 +143,7 @@ def check_tables(file: h5py.File) -> int:
 
 
 def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> None:
-    """Check that histories, if the file includes them yet, have the shapes and types that its attributes state.
+    """Check that histories, if the file includes them, have the shapes and types that its attributes state.
 
     Raises
     ------
@@ -152,18 +156,18 @@ def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> N
         dataset = _dataset(file, "histories", name)
         if dataset.shape != (n, *spec.shape) or dataset.dtype != np.dtype(spec.dtype):
             raise ValueError(f"{dataset.name} has the shape {dataset.shape} and type {dataset.dtype}")
-        if dataset.nbytes > MOST_COMPRESSED * dataset.id.get_storage_size():
-            raise ValueError(f"{dataset.name} is not whole")
+        if dataset.nbytes > MAX_COMPRESSION * dataset.id.get_storage_size():
+            raise ValueError(f"{dataset.name} is incomplete")
 
 
 def _dataset(file: h5py.File, group: str, name: str) -> h5py.Dataset:
     """Return a dataset of a group; reject soft or external links and data stored in other files."""
     for holder, key in ((file, group), (file[group], name)):
         if not isinstance(holder, h5py.Group) or not isinstance(holder.get(key, getlink=True), h5py.HardLink):
-            raise ValueError(f"/{group}/{name} is not in the file itself")
+            raise ValueError(f"/{group}/{name} is missing, or a link to another place")
     dataset = file[group][name]
     if not isinstance(dataset, h5py.Dataset):
-        raise ValueError(f"/{group}/{name} is no dataset")
+        raise ValueError(f"/{group}/{name} is not a dataset")
     if dataset.is_virtual or dataset.external:
         raise ValueError(f"{dataset.name} has its data in another file")
     return dataset
@@ -174,6 +178,6 @@ def _check_column(dataset: h5py.Dataset, n: int, dtype: str) -> None:
         raise ValueError(f"{dataset.name} is {dataset.shape} of {dataset.dtype}, not {(n,)} of {np.dtype(dtype)}")
     offset, size = dataset.id.get_offset(), dataset.id.get_storage_size()
     if dataset.chunks is not None or offset is None or size != dataset.nbytes:
-        raise ValueError(f"{dataset.name} is not stored in one piece")
+        raise ValueError(f"{dataset.name} is not stored contiguously")
     if offset + size > dataset.file.id.get_filesize():
         raise ValueError(f"{dataset.name} reaches beyond the end of the file")

@@ -47,12 +47,14 @@ def to_xarray(store: Reader) -> xarray.Dataset:
     try:
         import xarray
     except ImportError as error:
-        fault = Fault(str(store.path), "xarray is not installed", "pip install xarray, or take to_pandas()")
+        fault = Fault(
+            str(store.path), "xarray is not installed", "install it with: pip install xarray, or use to_pandas()"
+        )
         raise InputError([fault]) from error
     frame = to_pandas(store)
     columns = (*draw_records.columns(store.sampling), *ERROR_COLUMNS, *store.columns)
-    told = {c.name: {"units": c.unit, "description": c.description} for c in columns}
-    data = {name: ("row", frame[name].to_numpy(), told.get(str(name), {})) for name in frame}
+    described = {c.name: {"units": c.unit, "description": c.description} for c in columns}
+    data = {name: ("row", frame[name].to_numpy(), described.get(str(name), {})) for name in frame}
     return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": store.study_name})
 
 

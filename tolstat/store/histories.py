@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.files import atomic_write
 from tolstat.common.tables import HistorySpec
-from tolstat.store.result_file import fault, put_attributes
+from tolstat.store.result_file import put_attributes, store_error
 
 CHUNK_BYTES = 1 << 16
 """Approximate size of one chunk of a history before compression, bytes."""
@@ -206,8 +206,8 @@ class HistoryParts:
         """Raise an error if finished joints have lost their histories, instead of returning NaN for them."""
         lost = np.count_nonzero(part < 0)
         if lost:
-            remedy = "bring the folder back, or run the campaign again: these joints will be simulated again"
-            raise fault(self.folder, f"lacks the histories of {lost} joints that are done", remedy)
+            remedy = "restore the folder, or simulate these joints again: run the same tolstat run command"
+            raise store_error(self.folder, f"lacks the histories of {lost} finished joints", remedy)
 
     def _gather(self, name: str, rows: NDArray[np.intp], index: Index) -> NDArray[Any]:
         out = self.specs[name].blank(len(rows))
@@ -224,11 +224,15 @@ class HistoryParts:
         try:
             with h5py.File(path, "r", locking=False) as file:
                 if file.attrs.get("campaign") != self.campaign:
-                    raise fault(path, "holds histories of another campaign", "delete the folder or use another --out")
+                    raise store_error(
+                        path,
+                        "holds histories of another campaign",
+                        "delete the folder, or give another file: --out OTHER.h5",
+                    )
                 yield file
         except (OSError, KeyError) as error:
-            remedy = "delete it and run the campaign again: its rows will be simulated again"
-            raise fault(path, "is damaged", remedy) from error
+            remedy = "delete it, and simulate its joints again: run the same tolstat run command"
+            raise store_error(path, "is damaged", remedy) from error
 
     def remove(self) -> None:
         """Delete the folder with all parts."""

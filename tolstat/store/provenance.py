@@ -11,7 +11,7 @@ from pathlib import Path
 import tolstat
 
 LIBRARIES = ("numpy", "numba", "scipy", "h5py")
-DECIDING = (
+RESULT_SOURCES = (
     *("kernel", "joint", "common/tables.py", "sampling.py", "study/tolerances", "study/design.py", "study/proposal.py"),
     *("solver/simulation.py", "solver/refinement.py", "solver/stationary.py", "solver/rainflow.py"),
 )
@@ -28,7 +28,7 @@ def source_hash() -> str:
     """Hash of the sources that determine results: during development, code changes without a new version number."""
     package = Path(tolstat.__file__).parent
     digest = hashlib.sha256()
-    for name in DECIDING:
+    for name in RESULT_SOURCES:
         found = package / name
         for path in sorted(found.rglob("*.py")) if found.is_dir() else [found]:
             digest.update(path.relative_to(package).as_posix().encode())

@@ -21,7 +21,16 @@ from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
 from tolstat.store.histories import HistoryParts
 from tolstat.store.numbering import Numbering
-from tolstat.store.result_file import BLOCK, campaign_digest, descriptions, fault, is_locked, open_hdf5, text
+from tolstat.store.result_file import (
+    BLOCK,
+    RUN_AGAIN,
+    campaign_digest,
+    descriptions,
+    is_locked,
+    open_hdf5,
+    store_error,
+    text,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +52,7 @@ class Reader(Numbering):
         self._file = file
         attrs = file.attrs
         checks.check_schema(path, file)
-        self._read_judgement()
+        self._read_study_attributes()
         self.created = text(attrs, "created")
         self.git_commit = text(attrs, "git_commit")
         self.identity = checks.mapping(file, "identity")
@@ -148,13 +157,13 @@ class Reader(Numbering):
             When the study does not list its joints, or the table is damaged.
         """
         if "design" not in self._file:
-            remedy = 'give the file of a study with sampling.method = "cases"'
-            raise fault(self.path, "has no list of cases and variants", remedy)
+            remedy = 'give the result file of a study with sampling.method = "cases"'
+            raise store_error(self.path, "has no list of cases and variants", remedy)
         table = self._described("design", slice(None))
         for name, end in (("variant", len(self.variants)), ("case", len(self.case_names))):
             if table[name].min() < 0 or table[name].max() >= end:
-                remedy = "run the campaign again with another --out"
-                raise fault(self.path, f"is damaged: there are {end} of design/{name}", remedy)
+                found = f"is damaged: design/{name} is not between 0 and {end - 1}"
+                raise store_error(self.path, found, RUN_AGAIN)
         self._check_errors(slice(None), self._errors(slice(None)))
         return table
 
@@ -167,8 +176,8 @@ class Reader(Numbering):
             When the sampling method has no such table, or it is damaged.
         """
         if "origin" not in self._file:
-            remedy = 'give a file with sampling.method = "importance", or one of tolstat rare'
-            raise fault(self.path, "does not tell how its joints were drawn", remedy)
+            remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
+            raise store_error(self.path, "has no record of how its joints were drawn", remedy)
         self.errors(rows)  # checks this table too: it enters the checksums of the errors
         return self._described("origin", rows)
 
@@ -234,8 +243,8 @@ class Reader(Numbering):
         """
         if name not in self.history_specs:
             held = ", ".join(self.history_specs) or "none"
-            remedy = 'set histories = "full" or "harmonics" in [output] of the study and run it anew'
-            raise fault(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
+            remedy = f'write histories = "full" or "harmonics" in [output] of the study, and {RUN_AGAIN}'
+            raise store_error(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
         rows = np.arange(self.n) if rows is None else np.asarray(rows, dtype=np.intp)
         if "histories" not in self._file:
             done = self.status()[rows] != Status.PENDING  # read first: histories are written before the status
@@ -271,7 +280,7 @@ class Reader(Numbering):
         """Export errors and results along ``row``, with units and descriptions; raises InputError without xarray."""
         return to_xarray(self)
 
-    def _read_judgement(self) -> None:
+    def _read_study_attributes(self) -> None:
         attrs = self._file.attrs
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
@@ -301,8 +310,7 @@ class Reader(Numbering):
 
     def _check_status(self, found: NDArray[np.uint8]) -> None:
         if found.size and found.max() > max(Status):
-            remedy = "run the campaign again with another --out"
-            raise fault(self.path, f"is damaged: a joint has the status {found.max()}", remedy)
+            raise store_error(self.path, f"is damaged: a joint has the unknown status {found.max()}", RUN_AGAIN)
 
     def _described(self, group: str, rows: slice) -> NDArray[np.void]:
         return self._read(group, *descriptions(self._file)[group], rows)
@@ -325,16 +333,16 @@ class Reader(Numbering):
         described = [(c, self._read(name, c, dtype, rows)) for name, (c, dtype) in descriptions(self._file).items()]
         right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", rows)
         if not right.all():
-            found = f"is damaged: the errors of row {first + int(np.argmin(right))} are not as they were written"
-            remedy = "take a copy of it, or run the campaign again with another --out"
-            raise fault(self.path, found, remedy)
+            found = f"is damaged: the errors of row {first + int(np.argmin(right))} do not match their checksum"
+            raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
 
     def _check_history(self, name: str, rows: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
         held = self.column("ledger", f"{name}_check", slice(None))[rows[done]]
         wrong = integrity.history_checks(values[done], self.row(rows[done])) != held
         if wrong.any():
-            found = f"is damaged: the history {name} of row {self.rows[rows[done][np.argmax(wrong)]]} is not as written"
-            raise fault(self.path, found, "take a copy of it, or run the campaign again with another --out")
+            row = self.rows[rows[done][np.argmax(wrong)]]
+            found = f"is damaged: the history {name} of row {row} does not match its checksum"
+            raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
 
     def _in_blocks(
         self, read: Callable[[slice], NDArray[np.void]], rows: slice, dtype: np.dtype[np.void], fields: Sequence[str]
@@ -374,11 +382,10 @@ class Reader(Numbering):
         """
         try:
             return np.asarray(self._file[group][name][rows])
-        except checks.DAMAGED as error:
+        except checks.DAMAGE_ERRORS as error:
             if not self._file:
                 raise
-            remedy = "run the campaign again with another --out"
-            raise fault(self.path, f"is damaged: {group}/{name} cannot be read", remedy) from error
+            raise store_error(self.path, f"is damaged: {group}/{name} cannot be read", RUN_AGAIN) from error
 
 
 def parts_folder(path: Path) -> Path:

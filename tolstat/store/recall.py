@@ -50,8 +50,9 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         study = replace(study, solver=_solver(store, study))
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     if differing:
-        found = "\n    ".join(["its study is not as it was when the file was made", *differing])
-        raise StoreError(str(Fault(str(store.path), found, "give the study file as it was then with --study")))
+        lines = ["does not match the study that was read for it", *differing]
+        found = "\n    ".join(lines)
+        raise StoreError(str(Fault(str(store.path), found, "give the study file of the campaign: --study STUDY")))
     if n is None:
         return study
     return replace(load(source, n=n, text=text), solver=study.solver)

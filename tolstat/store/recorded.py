@@ -52,8 +52,10 @@ def options_of(store: Reader, row: int) -> Options:
     held = store.retries[attempt - 1]["options"] if attempt else store.options
     unknown = held.keys() - set(Options._fields)
     if unknown:
-        found = f"has options of the solver that this tolstat does not know: {', '.join(sorted(unknown))}"
-        raise InputError([Fault(str(store.path), found, "use the version that made it")])
+        found = f"has solver options that this version of tolstat does not know: {', '.join(sorted(unknown))}"
+        raise InputError(
+            [Fault(str(store.path), found, f"use the version that made it: {store.versions.get('tolstat')}")]
+        )
     return Options(**held)
 
 

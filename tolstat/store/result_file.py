@@ -30,12 +30,14 @@ if TYPE_CHECKING:
 
 FILETYPE = "tolstat campaign"
 SCHEMA_VERSION = 4
-LONGEST_FIXED = 32_000
+MAX_FIXED_TEXT = 32_000
 """Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
-OVERHEAD = 800
+COLUMN_OVERHEAD = 800
 """Bytes that HDF5 needs per column beside its values."""
 BLOCK = 1 << 16
 """Rows read or written at a time, so that no table of a large campaign need be in memory."""
+RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
+"""Remedy for a file that cannot be repaired."""
 
 
 def campaign_digest(file: h5py.File) -> str:
@@ -46,7 +48,7 @@ def campaign_digest(file: h5py.File) -> str:
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
 
 
-def judgement(study: Study) -> dict[str, str]:
+def study_attributes(study: Study) -> dict[str, str]:
     """Return the attributes of a study that do not affect results and may change between runs of a campaign."""
     return {"study": study.text, "study_name": study.name, "limits": json.dumps(study.limits, allow_nan=False)}
 
@@ -90,7 +92,7 @@ def attributes(
         "git_commit": git_commit(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    plain |= judgement(study)
+    plain |= study_attributes(study)
     return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
 
 
@@ -98,7 +100,7 @@ def size_of_new(n: int, results: tuple[Column, ...]) -> int:
     """Approximate upper bound on the size of a new file of `n` rows, bytes, without long attributes."""
     groups = (DESIGN_COLUMNS, ERROR_COLUMNS, results, LEDGER_COLUMNS)
     columns = [np.dtype(c.dtype).itemsize for group in groups for c in group]
-    return n * sum(columns) + OVERHEAD * len(columns)
+    return n * sum(columns) + COLUMN_OVERHEAD * len(columns)
 
 
 def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:
@@ -106,7 +108,7 @@ def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str |
     for name, value in values.items():
         data: Any = value
         dtype = None
-        if isinstance(value, str) and len(value.encode()) <= LONGEST_FIXED:
+        if isinstance(value, str) and len(value.encode()) <= MAX_FIXED_TEXT:
             data = value.encode()
             dtype = h5py.string_dtype("utf-8", max(1, len(data)))
         holder.attrs.create(name, data, dtype=dtype)
@@ -127,7 +129,7 @@ def text(attrs: h5py.AttributeManager, name: str) -> str:
         return value.decode("utf-8")
     if isinstance(value, str):
         return value
-    raise ValueError(f"attribute {name} is no text")
+    raise ValueError(f"attribute {name} is not a text")
 
 
 def fill(
@@ -290,29 +292,35 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
         When the file is missing, not HDF5, damaged, not permitted or locked by a writer; the message says which.
     """
     if path.is_dir():
-        raise fault(path, "is a folder", "give the path of a file")
+        raise store_error(path, "is a folder", "give the path of a file")
     if mode != "r" and path.is_file() and not h5py.is_hdf5(path):
         # h5py would turn an empty file that it opens for writing into an HDF5 file
-        raise fault(path, "is not an HDF5 file", "give a file that tolstat run has made")
+        raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
     try:
         # Readers take no lock: a writer only changes numbers in place, so a campaign under way can be read.
         file = h5py.File(path, mode, locking=False if mode == "r" else "best-effort")
     except OSError as error:
         if not path.is_file():
-            raise fault(path, "is not there", "check the path, or make it with: tolstat run") from error
+            raise store_error(
+                path, "does not exist", f"check the path, or create it: tolstat run STUDY --out {path}"
+            ) from error
         if error.errno in (errno.EAGAIN, errno.EWOULDBLOCK) or "unable to lock" in str(error):
-            raise fault(path, "is being written by another process", "wait for it or stop it") from error
+            raise store_error(
+                path, "is being written by another process", "wait until that process ends, or stop it"
+            ) from error
         if "already open" in str(error) or "don't match" in str(error):
-            raise fault(path, "is open in this process in another way", "close that one first") from error
+            raise store_error(path, "is open in this process in another mode", "close it first") from error
         if not os.access(path, os.R_OK if mode == "r" else os.R_OK | os.W_OK):
-            raise fault(path, "cannot be opened: no permission", "change its permissions") from error
+            raise store_error(
+                path, "cannot be opened: no permission", f"change its permissions: chmod u+rw {path}"
+            ) from error
         if not h5py.is_hdf5(path):
-            raise fault(path, "is not an HDF5 file", "give a file that tolstat run has made") from error
-        raise fault(path, f"is damaged: {error}", "run the campaign again with another --out") from error
+            raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run") from error
+        raise store_error(path, f"is damaged: {error}", RUN_AGAIN) from error
     if mode != "r" and not is_at(file, path):
-        # opened before another process replaced the file, locked afterwards: this file has no name any more
+        # another process replaced the file between opening and locking: the open file is not at `path`
         file.close()
-        raise fault(path, "is being written by another process", "wait for it or stop it")
+        raise store_error(path, "is being written by another process", "wait until that process ends, or stop it")
     return file
 
 
@@ -380,6 +388,6 @@ def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], gr
     return copy
 
 
-def fault(path: Path, found: str, remedy: str) -> StoreError:
-    """Make the error that says what is wrong with a file and what to do about it."""
+def store_error(path: Path, found: str, remedy: str) -> StoreError:
+    """Return the error of a file: what is wrong, and the remedy."""
     return StoreError(str(Fault(str(path), found, remedy)))

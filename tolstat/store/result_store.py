@@ -23,23 +23,24 @@ from tolstat.common import selected_results
 from tolstat.common.errors import StoreError
 from tolstat.common.files import atomic_write, check_disk_space
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
-from tolstat.store.checks import DAMAGED
+from tolstat.store.checks import DAMAGE_ERRORS
 from tolstat.store.histories import HISTORY_BYTES
 from tolstat.store.integrity import history_checks, results_hash
 from tolstat.store.reader import Reader, parts_folder
 from tolstat.store.result_file import (
+    RUN_AGAIN,
     attributes,
     copy_open,
-    fault,
     fill,
     get,
     is_at,
-    judgement,
     open_hdf5,
     put,
     put_attributes,
     replace,
     size_of_new,
+    store_error,
+    study_attributes,
     text,
 )
 from tolstat.store.view import View
@@ -139,9 +140,11 @@ class ResultStore(Reader):
         specs = {name: HistorySpec(*spec) for name, spec in (histories or {}).items()}
         parts = parts_folder(path)
         if parts.exists():
-            raise fault(parts, "holds histories of another campaign", "delete it or use another --out")
+            raise store_error(
+                parts, "holds histories of another campaign", "delete it, or give another file: --out OTHER.h5"
+            )
         if not path.parent.is_dir():
-            raise fault(path, "cannot be written: no such folder", "make the folder first")
+            raise store_error(path, "cannot be written: no such folder", f"create the folder: mkdir -p {path.parent}")
         held = range(study.rows) if rows is None else rows
         try:
             check_disk_space(path, size_of_new(len(held), selected_results.columns(study.identity())))
@@ -151,11 +154,13 @@ class ResultStore(Reader):
                 attrs = attributes(study, specs, dimensions or {}, options, fidelity)
                 fill(file, attrs, held, blocks, design, origin)
         except FileExistsError as error:
-            raise fault(path, "exists already", "go on with it, delete it, or use another --out") from error
+            raise store_error(
+                path, "exists already", "resume or delete it, or give another file: --out OTHER.h5"
+            ) from error
         except OSError as error:
             reason = error.strerror or str(error)
-            remedy = "check the folder, its permissions and space"
-            raise fault(path, f"cannot be written: {reason}", remedy) from error
+            remedy = "check that the folder is writable and the disk has space"
+            raise store_error(path, f"cannot be written: {reason}", remedy) from error
         return cls.open(path, "r+")
 
     @classmethod
@@ -185,12 +190,12 @@ class ResultStore(Reader):
         except StoreError:
             file.close()
             raise
-        except DAMAGED as error:
+        except DAMAGE_ERRORS as error:
             file.close()
-            raise fault(path, f"is damaged: {error}", "run the campaign again with another --out") from error
+            raise store_error(path, f"is damaged: {error}", RUN_AGAIN) from error
         if mode == "r+":
             store._make_pending(store.damaged())
-            store._forget_lost_histories()
+            store._reset_rows_without_histories()
         return store
 
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
@@ -219,15 +224,15 @@ class ResultStore(Reader):
             for column in self.columns:
                 if column.name != "status":
                     self._put(column.name, rows, column.of(results))
-            self._put_checks(rows, simulation)
+            self._put_checksums(rows, simulation)
             self._sync()
             self._put("status", rows, results["status"])
             self._sync()
-            self._check_there()
+            self._check_path()
         except OSError as error:
             reason = error.strerror or str(error)
-            remedy = "make room and run the campaign again: finished joints are kept"
-            raise fault(self.path, f"cannot be written: {reason}", remedy) from error
+            remedy = "free disk space, and run the same command again; finished joints are kept"
+            raise store_error(self.path, f"cannot be written: {reason}", remedy) from error
 
     def begin_session(self, done: int) -> None:
         """Record for readers of the file that a run begins with `done` joints finished."""
@@ -255,8 +260,8 @@ class ResultStore(Reader):
             self._replace(self._parts.gather_into, self._parts.size())
         self._parts.remove()
 
-    def judge_by(self, study: Study) -> None:
-        """Adopt the attributes that do not affect results (limits, text, name) from a study of the same identity.
+    def update_study(self, study: Study) -> None:
+        """Replace the attributes that do not affect results (limits, text, name) by those of a study of equal identity.
 
         Does nothing if the file has them already.
 
@@ -265,12 +270,12 @@ class ResultStore(Reader):
         StoreError
             When there is no room for a second copy of the file.
         """
-        wanted = judgement(study)
+        wanted = study_attributes(study)
         if any(text(self._file.attrs, name) != value for name, value in wanted.items()):
             self._replace(lambda file: put_attributes(file, wanted))
-            self._read_judgement()
+            self._read_study_attributes()
 
-    def note_stop(self, stop: Mapping[str, Any]) -> None:
+    def record_stop(self, stop: Mapping[str, Any]) -> None:
         """Record why the campaign ends before all rows are simulated; does nothing if `stop` is recorded already.
 
         Raises
@@ -320,13 +325,13 @@ class ResultStore(Reader):
             self._file = replace(self.path, self._file, change, growth)
         except OSError as error:
             reason = error.strerror or str(error)
-            remedy = "make room for a second copy and run the campaign again: finished joints are kept"
-            raise fault(self.path, f"cannot be replaced: {reason}", remedy) from error
+            remedy = "free disk space for a second copy, and run the same command again; finished joints are kept"
+            raise store_error(self.path, f"cannot be replaced: {reason}", remedy) from error
 
     def _put(self, name: str, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
         put(self._file["results"][name], rows, values)
 
-    def _check_there(self) -> None:
+    def _check_path(self) -> None:
         """Restore the file if it was deleted or replaced; its contents exist as long as it is open.
 
         Raises
@@ -341,12 +346,11 @@ class ResultStore(Reader):
         with atomic_write(path, overwrite=False) as temporary:
             copy_open(self._file, temporary)
         found = "was replaced by another file" if taken else "was deleted"
-        remedy = f"{path} holds all finished joints; run the campaign again to go on" + (
-            f" with --out {path}" if taken else ""
-        )
-        raise fault(self.path, f"{found} while the campaign went on", remedy)
+        remedy = f"{path} holds all finished joints; to resume, run the same command again"
+        remedy += f" with --out {path}" if taken else ""
+        raise store_error(self.path, f"{found} during the campaign", remedy)
 
-    def _put_checks(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
+    def _put_checksums(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
         ledger = self._file["ledger"]
         for name in self.history_specs:
             checks = history_checks(simulation.histories[name], self.row(rows))
@@ -358,7 +362,7 @@ class ResultStore(Reader):
         self._file.flush()
         os.fsync(self._file.id.get_vfd_handle())
 
-    def _forget_lost_histories(self) -> None:
+    def _reset_rows_without_histories(self) -> None:
         """Mark rows as pending whose histories are missing, e.g. because the file was moved without its parts."""
         if not self.history_specs or "histories" in self._file:
             return

@@ -13,6 +13,7 @@ from tolstat.common.tables import BUSHINGS
 from tolstat.joint import perturb
 from tolstat.solver.simulation import restore, simulate_rows, warm_up
 from tolstat.store.recorded import joint_of, options_of
+from tolstat.store.result_file import RUN_AGAIN
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -67,7 +68,7 @@ def blocks(n: int) -> Iterator[slice]:
         yield slice(first, min(first + JOINTS_PER_BLOCK, n))
 
 
-def read(store: Reader, slots: NDArray[np.intp], most_angles: int = ANGLES) -> Revolutions:
+def read(store: Reader, slots: NDArray[np.intp], max_angles: int = ANGLES) -> Revolutions:
     """Return the loads of joints over the input angle.
 
     Parameters
@@ -76,7 +77,7 @@ def read(store: Reader, slots: NDArray[np.intp], most_angles: int = ANGLES) -> R
         A campaign whose joints are drawn from tolerances.
     slots : ndarray of int, shape (m,)
         File slots, ascending; none pending.
-    most_angles : int
+    max_angles : int
         Approximate number of samples per revolution to keep; the samples are thinned evenly.
 
     Returns
@@ -90,7 +91,7 @@ def read(store: Reader, slots: NDArray[np.intp], most_angles: int = ANGLES) -> R
     """
     origin = held(store) or AGAIN
     steps = int(store.options["steps_per_rev"])
-    every = max(1, steps // most_angles)
+    every = max(1, steps // max_angles)
     angles = 2.0 * np.pi * np.arange(0, steps, every) / steps
     moduli = np.empty((2, len(slots), angles.size, 8))
     apart = 0.0
@@ -131,7 +132,7 @@ def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:
     if "loads" in store.history_specs:
         return store.histories("loads", slots)
     if "coefficients_real" not in store.history_specs:
-        remedy = 'set histories = "harmonics" or "full" in [output] of the study and run it anew'
+        remedy = f'write histories = "harmonics" or "full" in [output] of the study, and {RUN_AGAIN}'
         raise StoreError(str(Fault(str(store.path), "holds no load histories", remedy)))
     real, imag = (store.histories(f"coefficients_{part}", slots) for part in ("real", "imag"))
     return np.moveaxis(restore(real, imag, int(store.options["steps_per_rev"])), 0, 1)

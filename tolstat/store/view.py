@@ -309,7 +309,7 @@ class View:
         for first in range(0, self.n, BLOCK):
             here = np.flatnonzero((samples >= first) & (samples < first + BLOCK))
             if here.size:
-                # a few joints are read one by one, many with their block
+                # of a block, only the part that holds the samples is read
                 begin, end = int(samples[here[0]]), int(samples[here[-1]]) + 1
                 block = self._errors(begin, end, names)
                 for name in names:

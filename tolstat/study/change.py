@@ -1,4 +1,4 @@
-"""Changed tolerances of a study, as ``--set`` on the command line gives them."""
+"""Tolerances of a study with the changes that ``--set`` gives on the command line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.kinds import distribution
 
-INSTEAD = {
+REPLACED_KEYS = {
     **dict.fromkeys(("plus_minus",), ("lower", "upper", "iso2768", "nominal")),
     **dict.fromkeys(("lower", "upper"), ("plus_minus", "iso2768", "nominal")),
     **dict.fromkeys(("iso2768", "nominal"), ("plus_minus", "lower", "upper")),
@@ -65,14 +65,14 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
             names = selection.select(setting.pattern, study.tolerances)
             if not names:
                 remedy = did_you_mean(setting.pattern, list(study.tolerances))
-                raise InputError([Fault(f"--set {text!r}", "selects no error that the study scatters", remedy)])
+                raise InputError([Fault(f"--set {text!r}", "selects no error that has a tolerance", remedy)])
             for name in names:
-                kept = {k: v for k, v in entries[name].items() if k not in INSTEAD.get(setting.key, ())}
+                kept = {k: v for k, v in entries[name].items() if k not in REPLACED_KEYS.get(setting.key, ())}
                 entries[name] = kept | {setting.key: setting.value}
                 touched[name] = text
     found = dict(study.tolerances)
     units = selection.UNITS | selection.RADIAL_UNITS
-    told: set[tuple[str, ...]] = set()
+    reported: set[tuple[str, ...]] = set()
     for name, text in touched.items():
         center = nominal_value(name, study.operation)
         assert center is not None
@@ -81,9 +81,9 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
             found[name] = distribution(entries[name], site, f"--set {text!r}", ("tolerances", name))
         except InputError as error:
             key = (text, *(fault.found for fault in error.faults))
-            if key not in told:  # report a fault once for all errors of a pattern
+            if key not in reported:  # report a fault once for all errors of a pattern
                 faults.extend(error.faults)
-            told.add(key)
+            reported.add(key)
     if faults:
         raise InputError(faults)
     return found
@@ -103,7 +103,7 @@ def _parse(text: str) -> _Setting:
     path, equals, value = text.partition("=")
     pattern, dot, key = path.strip().rpartition(".")
     if not (equals and dot and pattern and key and value.strip()):
-        raise InputError([Fault(f"--set {text!r}", "is no setting", EXAMPLE)])
+        raise InputError([Fault(f"--set {text!r}", "is not a setting", EXAMPLE)])
     try:
         read = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:

@@ -56,7 +56,7 @@ class CostEntry(Strict):
     @model_validator(mode="after")
     def _in_order(self) -> CostEntry:
         if self.fixed > self.cost:
-            raise refuse("fixed is more than cost", "give the fixed part of the cost")
+            raise refuse("fixed is larger than cost", "give fixed <= cost")
         if self.least is not None and self.most is not None and not self.least < self.most:
             raise refuse("least is not below most", "give least < most")
         return self
@@ -141,12 +141,14 @@ def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError([Fault(str(path), f"cannot be read: {error}", "give a TOML or CSV file")]) from error
     if not rows or "tolerance" not in rows[0]:
-        raise InputError([Fault(str(path), "has no column tolerance", "head it: tolerance,cost,fixed,at,power")])
+        raise InputError(
+            [Fault(str(path), "has no column tolerance", "write the header line: tolerance,cost,fixed,at,power")]
+        )
     return {row.pop("tolerance"): {key: _value(cell) for key, cell in row.items() if cell} for row in rows}
 
 
 def _value(cell: str) -> object:
-    """Cell of a CSV file as the value that TOML would give."""
+    """Convert a cell of a CSV file to the value that TOML would give."""
     if cell in ("true", "false"):
         return cell == "true"
     try:

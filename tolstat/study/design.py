@@ -56,7 +56,7 @@ class Design:
         return np.asarray(self.table["group"], np.intp) % len(self.points)
 
     def identity(self) -> dict[str, Any]:
-        """Everything in it that decides the numbers, nested by key."""
+        """Return all parts of the design that determine results, nested by key."""
         families = [[name, len(list(members))] for name, members in groupby(v.family for v in self.variants)]
         return {
             "grid": list(self.points),

@@ -89,7 +89,7 @@ class StudyFile:
     def model(self, section: str, model: type[ModelT], *, required: bool = False) -> ModelT | None:
         """Read a section that is one model; the model has its defaults where the file lacks the section."""
         if required and section not in self.data:
-            one_joint = "; a case of one joint is run with: tolstat simulate" if section == "sampling" else ""
+            one_joint = f"; to simulate one joint: tolstat simulate {self.place}" if section == "sampling" else ""
             self._fault((section,), "missing table", f"add [{section}]{one_joint}")
             return None
         with gather(self._faults):
@@ -198,30 +198,30 @@ class StudyFile:
         needed = used[0]
         if not self.data.get(needed):
             header = "[[case]]" if needed == "case" else f"[{needed}]"
-            found = "missing table: nothing scatters" if needed == "tolerances" else "missing table"
-            self._fault((needed,), found, f"add {header}, or another sampling.method")
+            found = "missing table: no error has a tolerance" if needed == "tolerances" else "missing table"
+            self._fault((needed,), found, f"add {header}, or set another sampling.method")
         known = dict.fromkeys((*SCATTER, *(name for names in SECTIONS_OF.values() for name in names)))
         for section in known:
             if section not in used and section in self.data:
-                remedy = "remove it, or write another sampling.method"
+                remedy = "remove it, or set another sampling.method"
                 self._fault((section,), f"has no effect with {sampling.method!r}", remedy)
         if sampling.method == "cases" and self.data.get("limits"):
             self._fault(("limits",), "has no effect with 'cases'", "remove it: listed joints have no exceedance")
         if sampling.method == "subset":
             remedy = 'write "random", and run: tolstat rare STUDY --limit "cross1.F > 900 N"'
-            self._fault(("sampling", "method"), "'subset' is what tolstat rare makes of a study", remedy)
+            self._fault(("sampling", "method"), "'subset' is set by tolstat rare, not in a study", remedy)
         if sampling.method == "importance" and not self.data.get("proposal"):
             remedy = "add [[proposal]] with share, and widen or shift"
-            self._fault(("proposal",), "missing table: what joints are drawn from beside the tolerances", remedy)
+            self._fault(("proposal",), "missing table: distributions to draw joints from beside the tolerances", remedy)
         points = math.prod(axis.points for axis in sweep)
         if points > MAX_ROWS:
-            self._fault(("sweep",), f"makes {points} joints", f"stay below {MAX_ROWS}")
+            self._fault(("sweep",), f"gives {points} joints", f"give at most {MAX_ROWS}")
 
     def check_one_joint(self, solver: Solver) -> None:
         """Note settings that only a campaign can have."""
         if solver.fidelity == "auto":
             remedy = 'write "dynamic", "quasistatic" or "ideal"'
-            self._fault(("solver", "fidelity"), "'auto' needs the joints of a campaign to choose by", remedy)
+            self._fault(("solver", "fidelity"), "'auto' needs the joints of a campaign, a case has one joint", remedy)
 
     def check_histories(self, output: Output, solver: Solver, listed: Design | None) -> None:
         """Note histories of different lengths, and more harmonics than the steps per revolution resolve.
@@ -230,27 +230,27 @@ class StudyFile:
         """
         different = {s.steps_per_rev for s in listed.solvers} if listed else set()
         if output.histories != "none" and len(different) > 1:
-            found = f"histories of {', '.join(map(str, sorted(different)))} steps a revolution"
-            remedy = "give all variants the same solver.steps_per_rev, or keep no histories"
+            found = f"variants have different steps per revolution: {', '.join(map(str, sorted(different)))}"
+            remedy = 'give all variants the same solver.steps_per_rev, or write histories = "none"'
             self._fault(("output", "histories"), found, remedy)
         steps = FINEST_STEPS if solver.fidelity == "auto" else solver.steps_per_rev
         most = (steps - 1) // 2
         if "harmonics" in output.histories and output.harmonics > most:
-            found = f"{output.harmonics} harmonics from {steps} steps a revolution"
-            self._fault(("output", "harmonics"), found, f"give at most {most}, or more solver.steps_per_rev")
+            found = f"{steps} steps per revolution do not resolve {output.harmonics} harmonics"
+            self._fault(("output", "harmonics"), found, f"give at most {most}, or a larger solver.steps_per_rev")
 
     def check_fatigue(self, output: Output) -> None:
         """Note a fatigue section where no cycles are stored."""
         if "fatigue" in self.data and output.histories == "none":
-            self._fault(("fatigue",), "has no effect without cycles", 'write histories = "cycles" in [output]')
+            self._fault(("fatigue",), "has no effect without histories", 'write histories = "cycles" in [output]')
 
     def check_limits(self, output: Output, limits: Mapping[str, float]) -> None:
         """Note limits of loads that are not stored."""
         held = {c.name for c in output.columns}
         lacking = [name for load in limits for name in LOADS[load].columns if name not in held]
         if lacking:
-            found = f"leaves out what [limits] judges by: {', '.join(lacking)}"
-            self._fault(("output", "results"), found, "add these, or remove their limits")
+            found = f"leaves out columns that [limits] needs: {', '.join(lacking)}"
+            self._fault(("output", "results"), found, "add these columns, or remove their limits")
 
     def _list(self, section: str, model: type[ModelT]) -> list[ModelT]:
         """Read a section that is a list of tables; return the valid ones."""

@@ -86,7 +86,7 @@ def read(data: Mapping[str, Any], nominal: Nominal | None, place: str, folder: P
     points = tuple(_points(axes))
     rows = len(points) * sum(len(one.run) for one in variants)
     if rows > MAX_ROWS:
-        faults.append(Fault(f"{place}: variant", f"makes {rows} joints", f"stay below {MAX_ROWS}"))
+        faults.append(Fault(f"{place}: variant", f"gives {rows} joints", f"give at most {MAX_ROWS}"))
     if faults:
         raise InputError(faults)
     if nominal is None:
@@ -128,8 +128,8 @@ def _cases(section: Any, axes: list[Axis], place: str, faults: list[Fault]) -> d
         name = item.get("name") if isinstance(item, Mapping) else None
         if isinstance(name, str):
             if name in cases or name == IDEAL:
-                remedy = "leave it out, it is always run" if name == IDEAL else "give each case its own name"
-                faults.append(Fault(f"{place}: case[{number}].name", f"there is a case {name!r} already", remedy))
+                remedy = "remove it: it is always run" if name == IDEAL else "give each case its own name"
+                faults.append(Fault(f"{place}: case[{number}].name", f"a case {name!r} exists already", remedy))
             cases[name] = {}
         with gather(faults):
             entry = strict.validate(CaseEntry, item, place, prefix=("case", number))
@@ -144,7 +144,7 @@ def _clashes(section: list[Any], axes: list[Axis], place: str) -> list[Fault]:
     """Keys of the operating point that a variant and the grid both give."""
     taken = {name for axis in axes for name in axis.names}
     return [
-        Fault(f"{place}: variant[{number}].operation.{key}", "is decided by grid already", "leave one of the two out")
+        Fault(f"{place}: variant[{number}].operation.{key}", "is set by grid already", "remove one of the two")
         for number, item in enumerate(section)
         for key in item.get("operation", {})
         if f"operation.{key}" in taken
@@ -222,7 +222,7 @@ class _Variants:
             operation = strict.validate(Operation, keys, self._place, prefix=(*at, "operation"))
         if entry.solver.get("fidelity") == "auto":
             where = f"{self._place}: {strict.dotted((*at, 'solver', 'fidelity'))}"
-            faults.append(Fault(where, "'auto' is for all joints of a study", "write it in [solver]"))
+            faults.append(Fault(where, "'auto' cannot be set for one variant", "write it in [solver]"))
         with gather(faults):
             keys = solver.model_dump(exclude_unset=True) | entry.solver
             solver = strict.validate(Solver, keys, self._place, prefix=(*at, "solver"))
@@ -242,9 +242,11 @@ class _Variants:
         for key in ranges:
             where = f"{self._place}: {strict.dotted(at)}.{key}"
             if not isinstance(low[key], float):
-                faults.append(Fault(where, f"{low[key]!r} is no quantity that can vary", "write one variant for each"))
+                faults.append(
+                    Fault(where, f"{low[key]!r} is not a quantity that can vary", "write one variant for each value")
+                )
             elif low[key] == high[key]:
-                faults.append(Fault(where, "from and to are equal", "a value that does not move belongs to joint"))
+                faults.append(Fault(where, "from and to are equal", "write a constant value in joint"))
         if faults:
             raise InputError(faults)
         text = dict(flat(start.model_dump(mode="json")))

@@ -64,9 +64,11 @@ class Solver(Strict):
     def _auto(self) -> Self:
         auto = self.fidelity == "auto"
         if not auto and "error_budget" in self.model_fields_set:
-            raise refuse(f"error_budget is given with fidelity {self.fidelity!r}", 'leave it out, or write "auto"')
+            raise refuse(
+                f"error_budget is given with fidelity {self.fidelity!r}", 'remove it, or write fidelity = "auto"'
+            )
         if auto and "steps_per_rev" in self.model_fields_set:
-            raise refuse("steps_per_rev is given with fidelity 'auto'", "leave it out: auto chooses it")
+            raise refuse("steps_per_rev is given with fidelity 'auto'", "remove it: auto chooses it")
         return self
 
     def options(self) -> Options:
@@ -140,11 +142,13 @@ class Sampling(Strict):
         if drawn and self.n is None:
             raise refuse("missing key n", "add n, the number of joints, for example n = 1024")
         if self.method == "lhs" and self.n is not None and self.n > MAX_ROWS:
-            raise refuse(f"a Latin hypercube of {self.n} joints", f"stay at {MAX_ROWS}, or draw them another way")
+            raise refuse(f"a Latin hypercube of {self.n} joints", f"give at most n = {MAX_ROWS}, or another method")
         if self.method != "pick_freeze" and "groups" in self.model_fields_set:
-            raise refuse(f"groups is given with {self.method!r}", 'leave it out: it is for method = "pick_freeze"')
+            raise refuse(f"groups is given with {self.method!r}", 'remove it, or write method = "pick_freeze"')
         if self.method == "cases" and self.nominal_first:
-            raise refuse("nominal_first with 'cases'", "leave it out: each group of joints has the ideal one")
+            raise refuse(
+                "nominal_first is given with 'cases'", "remove it: each group has its own joint without errors"
+            )
         return self
 
     @property
@@ -188,16 +192,17 @@ class Subset(Sampling):
     def _whole_seeds(self) -> Self:
         seeds = self.per_level * self.p0
         if abs(seeds - round(seeds)) > 1e-9 or seeds < 2:
-            raise refuse(f"{self.p0:g} of {self.per_level} joints are {seeds:g} seeds", "give a whole number above 1")
+            found = f"p0 x n = {self.p0:g} x {self.per_level} = {seeds:g} seeds"
+            raise refuse(found, "give n and p0 whose product is a whole number of at least 2")
         return self
 
 
-def _selecting(pattern: str) -> str:
+def _check_pattern(pattern: str) -> str:
     if selection.select(pattern, selected_results.NAMES):
         return pattern
     anywhere = f"*.{pattern}"
     halves = selection.select(anywhere, selected_results.NAMES)
-    remedy = f"did you mean {anywhere!r}?" if halves else selection.instead(pattern, selected_results.NAMES)
+    remedy = f"did you mean {anywhere!r}?" if halves else selection.suggestion(pattern, selected_results.NAMES)
     raise refuse(f"{pattern!r} selects nothing", remedy)
 
 
@@ -214,12 +219,12 @@ class Output(Strict):
         Fourier coefficients up to this order, where `histories` has them.
     """
 
-    results: Annotated[list[Annotated[str, AfterValidator(_selecting)]], Field(min_length=1)] | None = None
+    results: Annotated[list[Annotated[str, AfterValidator(_check_pattern)]], Field(min_length=1)] | None = None
     histories: Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"] = "none"
     harmonics: Annotated[int, Field(strict=True, ge=0, le=10_000)] = 16
 
     def identity(self) -> dict[str, Any]:
-        """Settings that decide the stored numbers: names in place of patterns, no names where all results are kept."""
+        """Settings that determine what is stored: names instead of patterns, no names if all results are kept."""
         selected = [
             name for pattern in self.results or () for name in selection.select(pattern, selected_results.NAMES)
         ]
@@ -290,7 +295,7 @@ class VariantEntry(Strict):
             given, lacking = ("vary", "points") if self.vary else ("points", "vary")
             raise refuse(f"{given} without {lacking}", f"add {lacking}")
         if self.seed and self.design != "sobol":
-            raise refuse("seed without a random design", 'leave it out, or write design = "sobol"')
+            raise refuse("seed without a random design", 'remove it, or write design = "sobol"')
         return self
 
 
@@ -304,7 +309,7 @@ class SweepEntry(Strict):
     @model_validator(mode="after")
     def _moves(self) -> Self:
         if self.start == self.stop:
-            raise refuse("from and to are equal", "a value that does not move belongs to [errors]")
+            raise refuse("from and to are equal", "write a constant value in [errors]")
         return self
 
 

@@ -28,9 +28,9 @@ from tolstat.study.selection import columns_of, entries, select
 
 Array = NDArray[np.float64]
 
-LEAST_NOMINAL = 0.05
+MIN_NOMINAL_SHARE = 0.05
 """Minimum share of joints drawn from the tolerances themselves: it limits weights to twenty."""
-FARTHEST, WIDEST = 10.0, 10.0
+MAX_SHIFT, MAX_WIDEN = 10.0, 10.0
 """Largest shift, in standard deviations, and largest factor `widen` (its reciprocal is the smallest)."""
 
 
@@ -138,17 +138,17 @@ def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: t
         if (means[name], widths[name]) != (0.0, 1.0)
     }
     if not scores and not faults:
-        faults.append(Fault(f"{place}: {dotted(path)}", "is the tolerances themselves", "give widen or shift"))
+        faults.append(Fault(f"{place}: {dotted(path)}", "does not differ from the tolerances", "add widen or shift"))
     if faults:
         raise InputError(faults)
     return Proposal(entry.share, scores)
 
 
 def _number(value: object, key: str, where: str) -> float:
-    low, high = (1.0 / WIDEST, WIDEST) if key == "widen" else (-FARTHEST, FARTHEST)
+    low, high = (1.0 / MAX_WIDEN, MAX_WIDEN) if key == "widen" else (-MAX_SHIFT, MAX_SHIFT)
     number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
     if not low <= number <= high:
-        raise InputError([Fault(where, f"{value!r} is no {key}", f"give a number from {low:g} to {high:g}")])
+        raise InputError([Fault(where, f"{value!r} is not a valid {key}", f"give a number from {low:g} to {high:g}")])
     return number
 
 
@@ -158,10 +158,10 @@ def check_shares(proposals: Sequence[Proposal], place: str) -> None:
     Raises
     ------
     InputError
-        When less than `LEAST_NOMINAL` is left for them.
+        When less than `MIN_NOMINAL_SHARE` is left for them.
     """
     left = 1.0 - math.fsum(p.share for p in proposals)
-    if left < LEAST_NOMINAL - 1e-12:
-        found = f"leave {left:.3g} of the joints to the tolerances themselves"
-        remedy = f"give shares with a sum of at most {1.0 - LEAST_NOMINAL:g}"
+    if left < MIN_NOMINAL_SHARE - 1e-12:
+        found = f"shares leave {left:.3g} of the joints to the tolerances"
+        remedy = f"give shares with a sum of at most {1.0 - MIN_NOMINAL_SHARE:g}"
         raise InputError([Fault(f"{place}: proposal.share", found, remedy)])

@@ -64,7 +64,7 @@ def parse(text: str, what: str, option: str, example: str) -> Statement:
     """
     found = _STATEMENT.fullmatch(text)
     if found is None or found["what"] != what:
-        raise InputError([Fault(option, f"{text!r} is no rule", example)])
+        raise InputError([Fault(option, f"{text!r} is not a rule", example)])
     faults: list[Fault] = []
     loads, level, bound = [], math.nan, math.nan
     entry = Entry(found["load"], (found["load"],), found["level"])
@@ -77,7 +77,7 @@ def parse(text: str, what: str, option: str, example: str) -> Statement:
     with suppress(ValueError):
         bound = float(found["bound"])
     if not 0.0 < bound < 1.0:
-        faults.append(Fault(option, f"{what} {found['bound']} does not lie between 0 and 1".strip(), example))
+        faults.append(Fault(option, f"{what} {found['bound']} is not between 0 and 1".strip(), example))
     if faults:
         raise InputError(faults)
     return Statement(text.strip(), tuple(loads), level, bound)

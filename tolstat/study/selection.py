@@ -94,7 +94,7 @@ def fixed_errors(
         Key path of the table in its file.
     place : str
         File name shown in faults.
-    claims : Claims
+    claims : Assignments
         Errors that earlier entries set; those of this table are added.
 
     Returns
@@ -165,7 +165,7 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
     selected = select(entry.pattern, units)
     where = f"{place}: {dotted(entry.path)}"
     if not selected:
-        raise InputError([Fault(where, "selects nothing", instead(entry.pattern, list(units)))])
+        raise InputError([Fault(where, "selects nothing", suggestion(entry.pattern, list(units)))])
     kinds = sorted({units[name] for name in selected})
     if len(kinds) > 1:
         found = f"selects quantities of different kinds ({', '.join(kinds)})"
@@ -173,7 +173,7 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
     return selected
 
 
-def instead(pattern: str, names: Sequence[str]) -> str:
+def suggestion(pattern: str, names: Sequence[str]) -> str:
     """Remedy for a pattern that selects nothing: a suggestion for the half of it that is wrong."""
     feature, _, key = pattern.partition(".")
     features = list(dict.fromkeys(name.partition(".")[0] for name in names))
@@ -203,12 +203,9 @@ class Assignments:
         self._owner.update((c, entry) for c in claimed if c not in self._owner)
         if clashes:
             where = f"{self._place}: {dotted(entry.path)}"
-            remedy = "leave one of the two out, or narrow the pattern"
+            remedy = "remove one of the two, or narrow the pattern"
             raise InputError(
-                [
-                    Fault(where, f"{column} is decided by {dotted(path)} already", remedy)
-                    for path, column in clashes.items()
-                ]
+                [Fault(where, f"{column} is set by {dotted(path)} already", remedy) for path, column in clashes.items()]
             )
 
 

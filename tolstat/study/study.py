@@ -151,7 +151,7 @@ class Study(Case):
         return [load for load in UNIT_OF_LOAD if selected_results.holds(self.output.columns, load)]
 
     def identity(self) -> dict[str, Any]:
-        """Everything that decides the numbers, as dotted key to JSON value.
+        """All settings that determine results, as dotted key to JSON value.
 
         Limits, comments and the file's name do not belong to it. Two studies of equal identity have the
         same rows with the same results.
@@ -184,7 +184,9 @@ def load_case(path: str | Path) -> Case:
     """
     file = StudyFile(Path(path), ("joint", "operation", "errors", "solver"))
     if "sampling" in file.data:
-        raise InputError([Fault(file.place, "is a study, not a case of one joint", "run it with: tolstat run")])
+        raise InputError(
+            [Fault(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")]
+        )
     joint = file.joint()
     operation = file.model("operation", Operation, required=True)
     solver = file.model("solver", Solver)

@@ -37,12 +37,12 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
     """
     faults: list[Fault] = []
     if not study.tolerances:
-        remedy = 'give a study with [tolerances], as of sampling.method = "random"'
-        faults.append(Fault(str(study.path), "has no tolerances that joints are drawn from", remedy))
+        remedy = 'give a study with [tolerances] and sampling.method = "random"'
+        faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
     load = LOADS[str(sampling["load"])]
     if not selected_results.holds(study.output.columns, load.name):
         remedy = f"add {', '.join(load.columns)}"
-        faults.append(Fault(f"{study.path}: output.results", f"leaves out {load.name} of --limit", remedy))
+        faults.append(Fault(f"{study.path}: output.results", f"leaves out {load.name}, which --limit needs", remedy))
     own = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
     with gather(faults):
         read = validate(Subset, own | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")

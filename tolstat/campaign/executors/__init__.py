@@ -2,6 +2,6 @@
 
 from tolstat.campaign.executors.common import Lost, Work, WorkerDied, available_workers
 from tolstat.campaign.executors.processes import map_in_processes
-from tolstat.campaign.executors.serial import map_here
+from tolstat.campaign.executors.serial import map_serially
 
-__all__ = ["Lost", "Work", "WorkerDied", "available_workers", "map_here", "map_in_processes"]
+__all__ = ["Lost", "Work", "WorkerDied", "available_workers", "map_in_processes", "map_serially"]

@@ -15,7 +15,16 @@ from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from tolstat.campaign.executors.common import POLL_S, BlockT, Lost, ResultT, Work, WorkerDied, available_workers, never
+from tolstat.campaign.executors.common import (
+    POLL_S,
+    BlockT,
+    Lost,
+    ResultT,
+    Work,
+    WorkerDied,
+    available_workers,
+    never_stop,
+)
 from tolstat.campaign.executors.processes import map_in_processes, one_thread_each, signals_blocked
 from tolstat.campaign.executors.worker import alarm
 from tolstat.common.errors import Fault, InputError
@@ -44,7 +53,7 @@ def map_on_cluster(
     scheduler: str | None,
     workers: int,
     fingerprint: Fingerprint,
-    stop: Callable[[], bool] = never,
+    stop: Callable[[], bool] = never_stop,
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
     """Apply the function to every block on a Dask cluster and yield the results as they arrive.
 
@@ -98,7 +107,7 @@ class _Cluster:
         self.running: dict[Future, Any] = {}
         self.ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self.suspects: list[Any] = []
-        self.works = False
+        self.succeeded = False
 
     def run(self, stop: Callable[[], bool]) -> Iterator[tuple[Any, Any]]:
         more = True
@@ -111,7 +120,9 @@ class _Cluster:
                 future = self.ended.get(timeout=POLL_S)
             except queue.Empty:
                 if self.client.status != "running":
-                    raise WorkerDied("the Dask scheduler is gone\n  hint: start it again") from None
+                    raise WorkerDied(
+                        "the Dask scheduler has ended\n  hint: start it again with: dask scheduler"
+                    ) from None
                 continue
             yield from self._take(future)
 
@@ -122,7 +133,7 @@ class _Cluster:
             block = next(self.blocks, None)
             if block is None:
                 return False
-            future = self.client.submit(do, self.work, self.fingerprint, self.expected, block, pure=False)
+            future = self.client.submit(process_block, self.work, self.fingerprint, self.expected, block, pure=False)
             self._watch(future, block)
         return True
 
@@ -136,21 +147,22 @@ class _Cluster:
             self._watch(future, block)
             return
         if future.status not in ("finished", "error"):
-            raise WorkerDied("the Dask scheduler has dropped a block\n  hint: see whether it was started anew")
+            raise WorkerDied("the Dask scheduler has dropped a block\n  hint: check whether it was restarted")
         try:
             result = future.result(timeout=FETCH_S)
         except InputError:
             raise
         except Exception as error:  # workers died on the block or with its result, or it raised this
             self.suspects.append(block)
-            if not self.works and len(self.suspects) >= MAX_FAILURES:
-                raise WorkerDied(f"the Dask cluster does no block: {error!r}\n  hint: see its logs") from error
+            if not self.succeeded and len(self.suspects) >= MAX_FAILURES:
+                found = f"the first {len(self.suspects)} blocks failed on the Dask cluster: {error!r}"
+                raise WorkerDied(f"{found}\n  hint: read the logs of its workers") from error
             return
-        self.works = True
+        self.succeeded = True
         yield block, result
 
 
-def do(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
+def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
     """Process a block in a worker, one block at a time."""
     check(expected, _own(fingerprint), "a Dask worker")
     with _ONE_AT_A_TIME:
@@ -186,21 +198,26 @@ def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> 
         With all differences.
     """
     lines = [
-        f"{name}: {value} here, {found.get(name)} there" for name, value in expected.items() if found.get(name) != value
+        f"{name}: {value} here, {found.get(name)} on the worker"
+        for name, value in expected.items()
+        if found.get(name) != value
     ]
     if lines:
-        differing = "\n    ".join([f"{where} has other versions", *lines])
-        raise InputError([Fault("--executor dask", differing, "install the same ones, and start the workers anew")])
+        differing = "\n    ".join([f"{where} has other software versions", *lines])
+        raise InputError(
+            [Fault("--executor dask", differing, "install the same versions there, and restart the workers")]
+        )
 
 
 def _check_fingerprints(client: Client, fingerprint: Fingerprint) -> None:
     try:
         client.wait_for_workers(1, timeout=FIRST_WORKER_S)
     except TimeoutError as error:
-        raise WorkerDied(f"the Dask cluster has no worker after {FIRST_WORKER_S:g} s\n  hint: start some") from error
+        found = f"the Dask cluster has no worker after {FIRST_WORKER_S:g} s"
+        raise WorkerDied(f"{found}\n  hint: start workers with: dask worker tcp://HOST:PORT") from error
     for address, found in client.run(fingerprint, on_error="return").items():
         if isinstance(found, BaseException):
-            remedy = "install tolstat there, and start the workers anew"
+            remedy = "install tolstat there, and restart the workers"
             raise InputError([Fault("--executor dask", f"the worker {address} cannot run tolstat: {found!r}", remedy)])
         check(dict(fingerprint()), found, f"the worker {address}")
 
@@ -222,6 +239,8 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         client = Client(scheduler, timeout=CONNECT_S)
     except (OSError, ValueError) as error:
         found = f"{scheduler} does not answer: {error}"
-        raise InputError([Fault("--scheduler", found, "give the address that dask scheduler prints")]) from error
+        raise InputError(
+            [Fault("--scheduler", found, "give the address that dask scheduler prints: --scheduler tcp://HOST:PORT")]
+        ) from error
     with client:
         yield client

@@ -43,13 +43,13 @@ class Lost(NamedTuple):
     reason: str
 
 
-def whole(block: BlockT) -> Sequence[BlockT]:
-    """Do not split a block."""
+def unsplit(block: BlockT) -> Sequence[BlockT]:
+    """Return a block as its only piece."""
     return [block]
 
 
-def nothing() -> None:
-    """Prepare nothing."""
+def no_preparation() -> None:
+    """Do nothing before the first block."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ class Work(Generic[BlockT, ResultT]):
     """
 
     function: Callable[[BlockT], ResultT]
-    split: Callable[[BlockT], Sequence[BlockT]] = whole
-    prepare: Callable[[], object] = nothing
+    split: Callable[[BlockT], Sequence[BlockT]] = unsplit
+    prepare: Callable[[], object] = no_preparation
     limit_s: float | None = None
 
 
@@ -81,6 +81,6 @@ def available_workers() -> int:
     return os.cpu_count() or 1
 
 
-def never() -> bool:
-    """Do not stop."""
+def never_stop() -> bool:
+    """Return False: no stop is requested."""
     return False

@@ -28,12 +28,21 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any, Generic, Literal, NamedTuple
 
-from tolstat.campaign.executors.common import POLL_S, THREAD_VARIABLES, BlockT, Lost, ResultT, Work, WorkerDied, never
+from tolstat.campaign.executors.common import (
+    POLL_S,
+    THREAD_VARIABLES,
+    BlockT,
+    Lost,
+    ResultT,
+    Work,
+    WorkerDied,
+    never_stop,
+)
 from tolstat.campaign.executors.worker import RAISED, READY, serve
 
-TRIES = 2
+MAX_FAILURES = 2
 """Number of failures at which a single piece is given up."""
-DOUBT = 3
+LOSSES_BEFORE_CONTROL = 3
 """Number of consecutive failures after which a block that succeeded before is repeated, to test the workers."""
 MAX_FAILED_STARTS = 3
 """Number of consecutive workers ending before they are ready at which `WorkerDied` is raised."""
@@ -41,13 +50,13 @@ START_LIMIT_S = 600.0
 """Time limit for a worker to get ready, s: it may have to compile."""
 
 HINT = (
-    "hint: use fewer workers if memory is short; in a script of your own, start the campaign "
-    'under: if __name__ == "__main__"'
+    "hint: if memory is short, use fewer workers: --workers 1; in a Python script, start the campaign under: "
+    'if __name__ == "__main__":'
 )
 
 
 def map_in_processes(
-    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], workers: int, stop: Callable[[], bool] = never
+    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], workers: int, stop: Callable[[], bool] = never_stop
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
     """Apply the function to every block in worker processes and yield the results as they arrive.
 
@@ -126,14 +135,14 @@ class _Team(Generic[BlockT, ResultT]):
             if not any(worker.task for worker in self.workers) and not self._has_task():
                 break
             # Read all messages, then hand out blocks, then yield: the caller may take long with the results.
-            finished = [result for worker in self._heard_from() for result in self._listen(worker)]
+            finished = [result for worker in self._wait_for_workers() for result in self._receive(worker)]
             self._hand_out()
             yield from finished
         yield from self.given_up
 
     def end(self) -> None:
         for worker in self.workers:
-            self._bury(worker)
+            self._end_worker(worker)
 
     def _drop_tasks(self) -> None:
         self.fresh, self.ahead = iter(()), None
@@ -144,7 +153,7 @@ class _Team(Generic[BlockT, ResultT]):
         task, self.ahead = self.ahead, None
         if task is not None:
             return task
-        in_doubt = self.given_up or self.losses >= DOUBT
+        in_doubt = self.given_up or self.losses >= LOSSES_BEFORE_CONTROL
         if in_doubt and self.control and not any(w.task and w.task.control for w in self.workers):
             return self.control
         task = next(self.fresh, None)
@@ -170,32 +179,32 @@ class _Team(Generic[BlockT, ResultT]):
         worker.task = task
         limit = self.work.limit_s
         worker.deadline = time.monotonic() + limit if limit else float("inf")
-        with suppress(OSError):  # the worker has died: `_listen` will find its pipe closed
+        with suppress(OSError):  # the worker has died: `_receive` will find its pipe closed
             worker.connection.send(task.block)
 
-    def _heard_from(self) -> list[_Worker[BlockT]]:
+    def _wait_for_workers(self) -> list[_Worker[BlockT]]:
         """Wait for workers and return those with a message, a closed pipe (the worker died) or an expired deadline."""
         nearest = min(worker.deadline for worker in self.workers) - time.monotonic()
         ready = wait([w.connection for w in self.workers], timeout=max(0.0, min(POLL_S, nearest)))
         now = time.monotonic()
         return [w for w in self.workers if w.connection in ready or w.deadline <= now]
 
-    def _listen(self, worker: _Worker[BlockT]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
+    def _receive(self, worker: _Worker[BlockT]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
         if not worker.connection.poll():
             limit = self.work.limit_s if worker.ready else START_LIMIT_S
-            self._lose(worker, "timeout", f"took more than {limit:g} s")
+            self._drop_worker(worker, "timeout", f"took more than {limit:g} s")
             return
         try:
             kind, content = worker.connection.recv()
         except (EOFError, OSError):
             worker.process.join(1.0)
-            self._lose(worker, "crashed", _cause(worker.process.exitcode))
+            self._drop_worker(worker, "crashed", _cause(worker.process.exitcode))
             return
         task, worker.task, worker.deadline = worker.task, None, float("inf")
         if kind == READY:
             worker.ready, self.failed_starts = True, 0
         elif kind == RAISED and task is not None:
-            self._suspect(task, Lost("crashed", f"{type(content).__name__}: {content}"), content)
+            self._handle_failure(task, Lost("crashed", f"{type(content).__name__}: {content}"), content)
         elif task is not None:
             yield from self._succeed(task, content)
 
@@ -208,35 +217,35 @@ class _Team(Generic[BlockT, ResultT]):
         yield from self.given_up
         self.given_up.clear()
 
-    def _lose(self, worker: _Worker[BlockT], kind: Literal["crashed", "timeout"], reason: str) -> None:
-        self._bury(worker)
+    def _drop_worker(self, worker: _Worker[BlockT], kind: Literal["crashed", "timeout"], reason: str) -> None:
+        self._end_worker(worker)
         self.workers.remove(worker)
         if worker.ready and worker.task is not None:
-            self._suspect(worker.task, Lost(kind, reason), None)
+            self._handle_failure(worker.task, Lost(kind, reason), None)
             return
         self.failed_starts += 1
         if self.failed_starts >= MAX_FAILED_STARTS:
-            times = f"{self.failed_starts} times in a row"
-            raise WorkerDied(f"a worker process died before it had begun, {times}: {reason}\n  {HINT}")
+            found = f"{self.failed_starts} worker processes in a row died at their start: {reason}"
+            raise WorkerDied(f"{found}\n  {HINT}")
 
-    def _suspect(self, task: _Task[BlockT], lost: Lost, error: Exception | None) -> None:
+    def _handle_failure(self, task: _Task[BlockT], lost: Lost, error: Exception | None) -> None:
         self.losses += 1
         if self.losses >= self.max_losses:
             if error is not None:
                 raise error
-            found = f"{self.losses} times in a row a worker process died over its block, and none was finished"
-            raise WorkerDied(f"{found}; the last one: {lost.reason}\n  {HINT}")
+            found = f"{self.losses} worker processes in a row died, each at a block, and no block was finished"
+            raise WorkerDied(f"{found}; the last worker: {lost.reason}\n  {HINT}")
         if task.control:
             return
         pieces = self.work.split(task.block)
         if len(pieces) > 1:
             self.suspects.extend(_Task(piece) for piece in pieces)
-        elif task.failures + 1 < TRIES:
+        elif task.failures + 1 < MAX_FAILURES:
             self.suspects.append(task._replace(failures=task.failures + 1))
         else:
             self.given_up.append((task.block, lost))
 
-    def _bury(self, worker: _Worker[BlockT]) -> None:
+    def _end_worker(self, worker: _Worker[BlockT]) -> None:
         worker.process.kill()
         worker.process.join()
         worker.connection.close()

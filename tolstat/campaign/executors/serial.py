@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
 
-from tolstat.campaign.executors.common import BlockT, ResultT, Work, never
+from tolstat.campaign.executors.common import BlockT, ResultT, Work, never_stop
 
 
-def map_here(
-    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], stop: Callable[[], bool] = never
+def map_serially(
+    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], stop: Callable[[], bool] = never_stop
 ) -> Generator[tuple[BlockT, ResultT], None, None]:
     """Apply the function to every block and yield the results in the order of the blocks.
 

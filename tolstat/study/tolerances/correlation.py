@@ -17,7 +17,7 @@ from tolstat.study.selection import select
 
 Array = NDArray[np.float64]
 
-SMALLEST_EIGENVALUE = 1e-9
+MIN_EIGENVALUE = 1e-9
 """A correlation matrix with a smaller eigenvalue does not count as positive definite."""
 
 
@@ -104,13 +104,13 @@ def assemble(entries: Sequence[Correlation], toleranced: dict[str, str], place: 
                 names.update(dict.fromkeys(_named(pattern, toleranced, where)))
         members = list(names)
         if len(members) < 2 and not faults:
-            faults.append(Fault(where, f"names one error only, {members[0]}", "name at least two"))
+            faults.append(Fault(where, f"names only one error, {members[0]}", "name at least two"))
         order.update(names)
         pairs = [frozenset((a, b)) for i, a in enumerate(members) for b in members[:i]]
         for pair in pairs:
             if pair in rho:
                 text = " and ".join(sorted(pair))
-                faults.append(Fault(where, f"{text} are correlated by an earlier entry", "keep one of the two"))
+                faults.append(Fault(where, f"{text} are correlated by an earlier entry", "remove one of the two"))
             rho[pair] = entry.rho
     if faults:
         raise InputError(faults)
@@ -121,10 +121,12 @@ def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
     """Errors of one name or pattern in `between`."""
     if pattern.endswith(".offset_radial"):
         remedy = "give offset_t and offset_z tolerances of their own, and correlate those"
-        raise InputError([Fault(where, f"{pattern} has no correlation of its own", remedy)])
+        raise InputError([Fault(where, f"{pattern} cannot be correlated", remedy)])
     names = select(pattern, toleranced)
     if not names:
-        raise InputError([Fault(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or leave it out")])
+        raise InputError(
+            [Fault(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or remove it here")]
+        )
     return names
 
 
@@ -136,10 +138,10 @@ def _positive_definite(names: tuple[str, ...], rho: dict[frozenset[str], float],
         matrix[i, j] = matrix[j, i] = value
     if names:
         values, vectors = np.linalg.eigh(matrix)
-        if values[0] < SMALLEST_EIGENVALUE:
+        if values[0] < MIN_EIGENVALUE:
             part = np.abs(vectors[:, 0])
             guilty = [name for name, share in zip(names, part, strict=True) if share > 0.1 * part.max()]
-            found = f"not positive definite: those of {', '.join(guilty)} contradict each other"
-            remedy = "make rho smaller in size, or give the pairs that are left out (they count as rho = 0)"
+            found = f"not positive definite: the correlations of {', '.join(guilty)} contradict each other"
+            remedy = "give a smaller |rho|, or add the missing pairs (they have rho = 0)"
             raise InputError([Fault(f"{place}: correlation", found, remedy)])
     return Copula(names, matrix)

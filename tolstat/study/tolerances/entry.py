@@ -80,7 +80,7 @@ class HalfBand(ToleranceEntry):
         if self.iso2768 is None or self.nominal is None:
             return self.plus_minus
         if self.plus_minus is not None:
-            raise refuse("the band is given by plus_minus and by iso2768", "keep one of them")
+            raise refuse("the band is given by plus_minus and by iso2768", "remove one of them")
         if site.name.startswith(("operation.", "material.")):
             raise refuse(f"ISO 2768 has no tolerance for {site.name}", "give plus_minus")
         kind = "angular" if site.unit == "rad" else "linear"
@@ -105,7 +105,7 @@ class Banded(HalfBand):
             given, lacking = ("upper", "lower") if self.lower is None else ("lower", "upper")
             raise refuse(f"{given} without {lacking}", f"add {lacking}")
         if half is not None:
-            raise refuse("the band is given by lower and upper and by its width", "keep one of them")
+            raise refuse("the band is given by lower and upper and by its width", "remove one of them")
         if not self.lower < self.upper:
             raise refuse("lower is not below upper", "give lower < upper")
         return self.lower, self.upper

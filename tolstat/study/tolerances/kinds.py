@@ -47,10 +47,10 @@ class NormalEntry(Banded):
     def _from_std(self, std: float, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
         band = self.band(site)
         if self.cpk is not None:
-            raise refuse("std and cpk both say how wide the scatter is", "keep one of them")
+            raise refuse("std and cpk both define the standard deviation", "remove one of them")
         if self.truncate != (band is not None):
             raise refuse(
-                "truncate and a band go together when std is given",
+                "with std, a band and truncate need each other",
                 "give a band and truncate = true, or neither",
             )
         middle = site.center if band is None else 0.5 * sum(band)
@@ -104,12 +104,12 @@ class LogNormalEntry(Banded):
         if by_moments == (band is not None):
             raise refuse(
                 "needs either a band or mean and std",
-                "give one of the two; mean and std are those of the value",
+                "give one of the two; mean and std are those of the error, not of its logarithm",
             )
         if band is not None:
             return self._from_band(*band)
         if self.mean is None or self.std is None:
-            raise refuse("mean and std belong together", "give both")
+            raise refuse("mean without std, or std without mean", "give both")
         if self.cpk is not None or self.truncate:
             raise refuse("cpk and truncate need a band", "give a band instead of mean and std")
         if not self.mean > self.threshold:
@@ -120,7 +120,7 @@ class LogNormalEntry(Banded):
 
     def _from_band(self, lower: float, upper: float) -> tolerance.LogNormal:
         if not lower > self.threshold:
-            raise refuse("the band reaches down to threshold", "give threshold < lower")
+            raise refuse("the band is not above threshold", "give threshold < lower")
         low, high = math.log(lower - self.threshold), math.log(upper - self.threshold)
         mean = 0.5 * (low + high)
         sigma = tolerance.sigma_of(low, high, mean, 1.0 if self.cpk is None else self.cpk)
@@ -154,13 +154,13 @@ class RayleighEntry(HalfBand):
         if self.sigma is None and radius is None:
             raise refuse("no band", "add plus_minus, or iso2768 and nominal, or sigma")
         if self.sigma is not None and self.cpk is not None:
-            raise refuse("sigma and cpk both say how wide the scatter is", "keep one of them")
+            raise refuse("sigma and cpk both define the standard deviation", "remove one of them")
         if radius is None:
             if self.truncate:
                 raise refuse("truncate needs a band", "add plus_minus")
             return tolerance.Rayleigh(self.sigma or 0.0)
         if self.sigma is not None and not self.truncate:
-            raise refuse("the band has no effect beside sigma", "leave it out, or add truncate = true")
+            raise refuse("the band has no effect beside sigma", "remove it, or add truncate = true")
         sigma = self.sigma or tolerance.sigma_of(-radius, radius, 0.0, self.cpk or 1.0)
         return tolerance.Rayleigh(sigma, radius if self.truncate else None)
 
@@ -257,6 +257,6 @@ def distribution(data: object, site: Site, place: str, path: tuple[int | str, ..
     if not isinstance(kind, str) or kind not in kinds:
         also = " (rayleigh is for offset_radial)" if kind == "rayleigh" else ""
         remedy = strict.did_you_mean(str(kind), list(kinds))
-        raise InputError([Fault(f"{where}.distribution", f"{kind!r} is not possible here{also}", remedy)])
+        raise InputError([Fault(f"{where}.distribution", f"{kind!r} is not allowed here{also}", remedy)])
     entry = strict.validate(kinds[kind], data, place, prefix=path, context={"site": site})
     return entry.build(site)

@@ -16,8 +16,8 @@ from tolstat.benchmarks.work_precision import competitors, measure, page, setup,
 from tolstat.benchmarks.work_precision.competitors import Competitor
 from tolstat.benchmarks.work_precision.measure import TRUTH, Run
 from tolstat.common.errors import InputError
-from tolstat.common.tables import RESULT, Options, Status
-from tolstat.solver.reference import FirstOrder, Largest, first_order
+from tolstat.common.tables import RESULT, SPAN, Options, Status
+from tolstat.solver.reference import FirstOrder, first_order
 
 STUDY = REFERENCE.parents[1] / "studies" / "work_precision.toml"
 EVERY = [Competitor(code, jacobian) for code in ("Radau", "BDF", "LSODA", "CVODE") for jacobian in (False, True)]
@@ -29,13 +29,19 @@ def _setups_may_name_cvode(monkeypatch):
     monkeypatch.setattr(setup, "check_installed", lambda codes: None)
 
 
+def largest_loads(force, torque, contact, psi):
+    """Largest loads with one value for all of each kind; 1 of other kinds."""
+    values = {"F": force, "T": torque, "contact": contact, "psi": psi}
+    return np.concatenate([np.full(span.stop - span.start, values.get(kind, 1.0)) for kind, span in SPAN.items()])
+
+
 def circle(rate=None):
     """x'' = -x from x = 1: the largest force is that of cos, and velocity -sin."""
     matrix = np.array([[0.0, 1.0], [-1.0, 0.0]])
 
     def largest(times, states):
         assert len(times) == len(states)
-        return Largest(states[:, 0].max(keepdims=True), states[:, 1].max(keepdims=True), np.zeros((4, 2)), times[0])
+        return largest_loads(states[:, 0].max(), states[:, 1].max(), 0.0, times[0])
 
     return FirstOrder(
         rate or (lambda t, y: matrix @ y),
@@ -55,10 +61,10 @@ def test_every_competitor_solves_and_is_counted(competitor):
         pytest.importorskip("sksundae")
     loose, tight = (competitors.solve(circle(), competitor, rtol, 2, 60.0) for rtol in (1e-3, 1e-7))
     assert loose.outcome == tight.outcome == "ok"
-    assert tight.largest.F[0] == pytest.approx(1.0, abs=1e-4)
-    assert tight.largest.T[0] == pytest.approx(1.0, abs=1e-4)
-    assert tight.largest.psi > 2 * np.pi  # loads are those of the second revolution
-    assert abs(loose.largest.F[0] - 1) > abs(tight.largest.F[0] - 1)
+    assert tight.largest[SPAN["F"]][0] == pytest.approx(1.0, abs=1e-4)
+    assert tight.largest[SPAN["T"]][0] == pytest.approx(1.0, abs=1e-4)
+    assert tight.largest[SPAN["psi"]][0] > 2 * np.pi  # loads are those of the second revolution
+    assert abs(loose.largest[SPAN["F"]][0] - 1) > abs(tight.largest[SPAN["F"]][0] - 1)
     assert tight.rates > loose.rates > 10
     assert (tight.jacobians > 0) == (competitor.jacobian and competitor.code != "LSODA")  # LSODA: not stiff
     assert tight.seconds > 0
@@ -101,7 +107,7 @@ def test_joint_begins_where_the_solver_does(params):
 
 
 def row(contender, setting, joint, force, ms, ours=True, **kwargs):
-    largest = None if force is None else Largest(np.array([force]), np.array([1.0]), np.ones((4, 2)), 1e-4)
+    largest = None if force is None else largest_loads(force, 1.0, 1.0, 1e-4)
     outcome = kwargs.pop("outcome", "ok" if largest is not None else "failed")
     return Run(contender, ours, setting, joint, outcome, 1e-3 * ms, largest, **kwargs)
 
@@ -182,7 +188,7 @@ def test_own_job_times_each_setting_and_keeps_what_is_measured(params):
     runs = measure.OwnJob("A", options, rows, 0, 3, 2).runs()
     assert [(r.setting, r.joint, r.outcome) for r in runs] == [(n, i, "ok") for n in (36.0, 60.0) for i in (0, 1)]
     assert all(0 < r.seconds < 1 for r in runs)
-    assert runs[0].largest.F[0] == runs[1].largest.F[0] > 500
+    assert runs[0].largest[0] == runs[1].largest[0] > 500
 
 
 def test_other_job_leaves_out_what_is_tighter_than_what_took_too_long(params):
@@ -193,7 +199,7 @@ def test_other_job_leaves_out_what_is_tighter_than_what_took_too_long(params):
     assert runs[1].seconds == 0.02
     done = job._replace(rtols=(1e-2,), limit=60.0).runs()[0]
     assert done.outcome == "ok"
-    assert done.largest.F.max() == pytest.approx(620, rel=0.1)
+    assert done.largest[SPAN["F"]].max() == pytest.approx(620, rel=0.1)
 
 
 def test_a_job_whose_process_dies_has_failed(params):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tolstat.benchmarks.work_precision.competitors import Competitor, Outcome, solve
 from tolstat.benchmarks.work_precision.setup import Setup, measured
 from tolstat.campaign.executors import Lost, Work, available_workers, map_in_processes
+from tolstat.common import loads
 from tolstat.common.tables import SIMULATED, Fidelity, Method, Options, Status
 from tolstat.solver.reference import FirstOrder, Largest, first_order, reference_rows
 from tolstat.solver.simulation import simulate_rows, warm_up
@@ -142,9 +143,7 @@ Job = OwnJob | OtherJob | TruthJob
 
 def largest_of(row: np.void) -> Largest | None:
     """Largest loads of a row of RESULT; None where it has none."""
-    if Status(row["status"]) not in SIMULATED:
-        return None
-    return Largest(row["F_max"].copy(), row["T_max"].copy(), row["contact_max"].copy(), float(row["psi_max"]))
+    return loads.largest(np.array([row]))[0] if Status(row["status"]) in SIMULATED else None
 
 
 def prepare(system: FirstOrder) -> None:

@@ -17,8 +17,6 @@ REFERENCE_CASES = sorted(path.stem for path in REFERENCE.glob("*.toml"))
 
 Params = Callable[..., np.recarray]
 
-LAWS = ("mode", "uniform", "point", "sliced")
-
 
 def with_law(par: np.recarray, law: str) -> np.recarray:
     """Give joints of PARAM the contact stations that `law` names; returns them."""

@@ -1,6 +1,7 @@
-"""The field tables of docs/result_format.md, made from `tolstat.common.tables`.
+"""The tables of docs/result_format.md and docs/model.md, and the page of the present schema in docs/schemas/.
 
-``python -m tests.format_tables`` brings the document up to date; a test compares the two.
+They are made from `tolstat.common.tables` and `tolstat.joint.contact`. ``python -m tests.format_tables`` brings the
+documents up to date; a test compares.
 """
 
 from __future__ import annotations
@@ -10,8 +11,23 @@ from pathlib import Path
 
 from tolstat.common import draw_records, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
+from tolstat.joint.contact import LAWS
 
-DOCUMENT = Path(__file__).parent.parent / "docs" / "result_format.md"
+DOCS = Path(__file__).parent.parent / "docs"
+FORMAT, MODEL = DOCS / "result_format.md", DOCS / "model.md"
+SCHEMA = DOCS / "schemas" / f"schema{tables.SCHEMA_VERSION}.md"
+PAGE = """# Columns of a result file of schema {version}
+
+Datasets of the groups `/errors` and `/results`; what they are about is in [the result file](../result_format.md).
+
+## `/errors`
+
+{errors}
+
+## `/results`
+
+{results}
+"""
 
 
 def field_table(columns: tuple[Column, ...]) -> str:
@@ -36,22 +52,38 @@ def motion_table() -> str:
     return "\n".join(lines + [f"| {m.value} | `{m.label}` | {tables.MOTION_TEXT[m]} |" for m in tables.Motion])
 
 
-def updated(text: str) -> str:
-    """`text` of the document with its tables made anew."""
-    content = {
-        "design": field_table(DESIGN_COLUMNS),
-        **{f"origin {method}": field_table(draw_records.columns({"method": method})) for method in draw_records.FIELDS},
-        "errors": field_table(ERROR_COLUMNS),
-        "results": field_table(RESULT_COLUMNS),
-        "ledger": field_table(LEDGER_COLUMNS),
-        "status": status_table(),
-        "motion": motion_table(),
-    }
+def law_table() -> str:
+    """Markdown table of the contact laws, a line for each kind of station."""
+    lines = ["| law | stations at s | k1, k2 of a station | weight |", "|---|---|---|---|"]
+    for name, law in LAWS.items():
+        for i, row in enumerate(law.rows):
+            lines.append(" | ".join(["|" if i else f"| `{name}`", *row]) + " |")
+    return "\n".join(lines)
+
+
+def updated(text: str, content: dict[str, str]) -> str:
+    """`text` of a document with its tables made anew; each is between a comment with its name and one of its end."""
     for name, table in content.items():
         pattern = rf"(<!-- table: {name} -->\n).*?(<!-- end -->)"
-        text = re.sub(pattern, lambda m, table=table: m[1] + table + "\n" + m[2], text, flags=re.DOTALL)
+        text, n = re.subn(pattern, lambda m, table=table: m[1] + table + "\n" + m[2], text, flags=re.DOTALL)
+        assert n == 1, name
     return text
 
 
+def documents() -> dict[Path, str]:
+    """Up-to-date text of each document."""
+    origin = {f"origin {method}": draw_records.columns({"method": method}) for method in draw_records.FIELDS}
+    parts = {"design": DESIGN_COLUMNS, "ledger": LEDGER_COLUMNS} | origin
+    content = {name: field_table(columns) for name, columns in parts.items()}
+    content |= {"status": status_table(), "motion": motion_table()}
+    page = {"errors": field_table(ERROR_COLUMNS), "results": field_table(RESULT_COLUMNS)}
+    return {
+        FORMAT: updated(FORMAT.read_text(encoding="utf-8"), content),
+        MODEL: updated(MODEL.read_text(encoding="utf-8"), {"laws": law_table()}),
+        SCHEMA: PAGE.format(version=tables.SCHEMA_VERSION, **page),
+    }
+
+
 if __name__ == "__main__":
-    DOCUMENT.write_text(updated(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
+    for path, text in documents().items():
+        path.write_text(text, encoding="utf-8")

@@ -11,7 +11,8 @@ import h5py
 import numpy as np
 
 from tests.support import fakes
-from tolstat.store import ResultStore, integrity, result_file
+from tolstat.common.tables import SCHEMA_VERSION
+from tolstat.store import ResultStore, integrity
 
 FOLDER = Path(__file__).parent / "golden"
 
@@ -21,7 +22,7 @@ def make(folder: Path) -> Path:
     study = fakes.Study(n=3, output=fakes.Output("full"))
     errors = fakes.draw(study)
     errors["operation.alpha"] = [0.5, 2.5, -0.5]
-    path = folder / f"schema{result_file.SCHEMA_VERSION}.h5"
+    path = folder / f"schema{SCHEMA_VERSION}.h5"
     rows = np.arange(3)
     with ResultStore.create(path, study, errors, fakes.specs_of("full"), {"pin1.offset_e": 0}) as store:
         store.write(rows, fakes.simulate(fakes.perturb(study.joint, errors), fakes.Options(), "full", 0))

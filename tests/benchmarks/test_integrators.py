@@ -7,11 +7,12 @@ import time
 import numpy as np
 import pytest
 
+from tests.support.loads import largest_loads
 from tolstat.benchmarks import integrators
 from tolstat.benchmarks.integrators import Integrator, both_ways
 from tolstat.benchmarks.runs import OtherJob, OwnJob, failures, largest_of
-from tolstat.common.tables import RESULT, Options, Status
-from tolstat.solver.reference import FirstOrder, Largest, first_order
+from tolstat.common.tables import RESULT, SPAN, Options, Status
+from tolstat.solver.reference import FirstOrder, first_order
 
 EVERY = both_ways(("Radau", "BDF", "LSODA", "CVODE"))
 
@@ -22,7 +23,7 @@ def circle(rate=None):
 
     def largest(times, states):
         assert len(times) == len(states)
-        return Largest(states[:, 0].max(keepdims=True), states[:, 1].max(keepdims=True), np.zeros((4, 2)), times[0])
+        return largest_loads(states[:, 0].max(), states[:, 1].max(), 0.0, times[0])
 
     return FirstOrder(
         rate or (lambda t, y: matrix @ y),
@@ -42,10 +43,10 @@ def test_every_integrator_solves_and_is_counted(integrator):
         pytest.importorskip("sksundae")
     loose, tight = (integrators.solve(circle(), integrator, rtol, 2, 60.0) for rtol in (1e-3, 1e-7))
     assert loose.outcome == tight.outcome == "ok"
-    assert tight.largest.F[0] == pytest.approx(1.0, abs=1e-4)
-    assert tight.largest.T[0] == pytest.approx(1.0, abs=1e-4)
-    assert tight.largest.psi > 2 * np.pi  # loads are those of the second revolution
-    assert abs(loose.largest.F[0] - 1) > abs(tight.largest.F[0] - 1)
+    assert tight.largest[SPAN["F"]][0] == pytest.approx(1.0, abs=1e-4)
+    assert tight.largest[SPAN["T"]][0] == pytest.approx(1.0, abs=1e-4)
+    assert tight.largest[SPAN["psi"]][0] > 2 * np.pi  # loads are those of the second revolution
+    assert abs(loose.largest[SPAN["F"]][0] - 1) > abs(tight.largest[SPAN["F"]][0] - 1)
     assert tight.rates > loose.rates > 10
     assert (tight.jacobians > 0) == (integrator.jacobian and integrator.code != "LSODA")  # LSODA: not stiff
     assert tight.seconds > 0
@@ -93,7 +94,7 @@ def test_own_job_times_each_setting_and_keeps_what_is_measured(params):
     runs = OwnJob("A", options, rows, 0, 3, 2).runs()
     assert [(r.setting, r.joint, r.outcome) for r in runs] == [(n, i, "ok") for n in (36.0, 60.0) for i in (0, 1)]
     assert all(0 < r.seconds < 1 for r in runs)
-    assert runs[0].largest.F[0] == runs[1].largest.F[0] > 500
+    assert runs[0].largest[0] == runs[1].largest[0] > 500
 
 
 def test_other_job_leaves_out_what_is_tighter_than_what_took_too_long(params):
@@ -104,7 +105,7 @@ def test_other_job_leaves_out_what_is_tighter_than_what_took_too_long(params):
     assert runs[1].seconds == 0.02
     done = job._replace(rtols=(1e-2,), limit=60.0).runs()[0]
     assert done.outcome == "ok"
-    assert done.largest.F.max() == pytest.approx(620, rel=0.1)
+    assert done.largest[SPAN["F"]].max() == pytest.approx(620, rel=0.1)
 
 
 def test_a_job_whose_process_dies_has_failed(params):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.support.loads import largest_loads
 from tolstat.benchmarks import points as table
 from tolstat.benchmarks.runs import TRUTH, Run
 from tolstat.common.errors import InputError
-from tolstat.solver.reference import Largest
 
 
 def row(contender, setting, joint, force, ms, ours=True, **kwargs):
-    largest = None if force is None else Largest(np.array([force]), np.array([1.0]), np.ones((4, 2)), 1e-4)
+    largest = None if force is None else largest_loads(force, 1.0, 1.0, 1e-4)
     outcome = kwargs.pop("outcome", "ok" if largest is not None else "failed")
     return Run(contender, ours, setting, joint, outcome, 1e-3 * ms, largest, **kwargs)
 

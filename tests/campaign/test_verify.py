@@ -16,7 +16,7 @@ from tolstat.analysis import accuracy
 from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.tables import LARGEST, Method, Options, Start, Status
+from tolstat.common.tables import LOAD_KINDS, Method, Options, Start, Status
 from tolstat.questions.accuracy import query as tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.exceedance import query as exceedance
@@ -255,7 +255,7 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
         assert part["value"].tolist() == kept.checks["reference"].results["T_max"][:, 5].tolist()
     lines = call("verify", plan_path, "--joints", 1).stdout.splitlines()
     assert lines[0].split() == ["load", "error", "joints", "median", "95", "%", "below", "worst"]
-    assert len(lines) == 1 + len(LARGEST) * (len(verify.ALL_CHECKS) + 1)
+    assert len(lines) == 1 + len(LOAD_KINDS) * (len(verify.ALL_CHECKS) + 1)
 
 
 def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.conftest import LAWS, with_law
+from tests.conftest import with_law
 from tests.measure import stability
 from tests.support.environment import ROOT
 from tolstat import joint as joints
-from tolstat.common.tables import RESULT, RESULTANT, Options
+from tolstat.common.tables import RESULT, RESULTANT, SPAN, Options
+from tolstat.joint.contact import FROM_COEFFICIENTS
 from tolstat.kernel.mechanics import dynamics, rotation
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PIN
 from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, V_NORMAL, make_work
@@ -56,7 +57,7 @@ def generalised(q, work):
     return force.ravel()
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", FROM_COEFFICIENTS)
 def test_contact_forces_are_minus_the_gradient_of_the_stations_energy(params, random_errors, law):
     par, q = contacts_alone(params, random_errors, law)
     work = make_work()
@@ -83,7 +84,7 @@ def blended(stations, uniform, point):
     return w * law[0] + (1 - w) * law[1]
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", FROM_COEFFICIENTS)
 def test_contacts_do_no_work_around_a_loop(params, random_errors, law):
     """Four pins go around loops of position and tilt; the work falls with the quadrature, that of a blend does not."""
     par, middle = contacts_alone(params, random_errors, law)
@@ -164,7 +165,7 @@ def test_samples_know_which_stations_carry_and_see_an_end_touch_beside_the_middl
         dynamics.forces(t, sample["q"], sample["v"], par[0], work)
         for j in range(3):
             bits[k] |= (work.station[:, j, FORCE] > 0).astype(int) << j
-        np.testing.assert_allclose(sample["contact"], work.contact, rtol=1e-5, atol=1e-2)
+        np.testing.assert_allclose(sample["value"][SPAN["contact"]], work.contact.ravel(), rtol=1e-5, atol=1e-2)
     assert (samples["pressed"] == bits).mean() > 0.99
     rows = samples.view(np.recarray)
     alone = (samples["pressed"] ^ np.roll(samples["pressed"], 1, axis=0)) & 0b101

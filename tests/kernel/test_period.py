@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolstat.common.tables import RESULT, Method, Motion, Options, Status
+from tolstat.common.tables import KERNEL_RESULT, SPAN, Method, Motion, Options, Status
 from tolstat.kernel.revolution.trail import Trail, closure_trend, combine, lag_closure, make_trails, note_closure
 from tolstat.solver.simulation import simulate_rows
 
@@ -104,30 +104,31 @@ def test_trend_is_the_line_through_the_logarithms():
 def test_closure_over_several_revolutions_finds_the_period():
     trail = make_trail(36, 10)
     rng = np.random.default_rng(2)
-    three = rng.uniform(1, 2, (3, 36, 8, 2))
+    three = rng.uniform(1, 2, (3, 36, 16))
     for r in range(20):
         trail.modulus[r % 10] = three[r % 3]
     closures = [lag_closure(19, lag, trail) for lag in range(1, 9)]
     assert [c == 0 for c in closures] == [False, False, True, False, False, True, False, False]
-    change = [np.abs(three[1] - three[0])[..., k].max() / three[1][..., k].max() for k in (0, 1)]
+    kinds = [SPAN["F"], SPAN["T"]]
+    change = [np.abs(three[1] - three[0])[:, kind].max() / three[1][:, kind].max() for kind in kinds]
     assert closures[0] == pytest.approx(max(change))
-    trail.modulus[19 % 10, 5, 3, 1] = np.nan
+    trail.modulus[19 % 10, 5, 11] = np.nan
     assert np.isnan(lag_closure(19, 3, trail))
 
 
 def test_combined_statistics_are_those_of_all_revolutions():
     trail = make_trail(36, 10)
     rng = np.random.default_rng(3)
-    samples = rng.uniform(1, 2, (5, 36, 8))
+    samples = rng.uniform(1, 2, (5, 36, 16))
     for r, values in zip(range(15, 20), samples, strict=True):
         row = trail.revolution[r % 10]
-        row.F_max[:], row.F_mean[:], row.F_range[:] = values.max(0), values.mean(0), np.ptp(values, axis=0)
-        row.psi_max, row.mode_share[:] = r, 0.25
-    out = np.zeros(1, RESULT).view(np.recarray)[0]
+        row.largest[:16], row.average[:], row.reach[:] = values.max(0), values.mean(0), np.ptp(values, axis=0)
+        row.largest[16:], row.mode_share[:] = r, 0.25
+    out = np.zeros(1, KERNEL_RESULT).view(np.recarray)[0]
     combine(19, 5, trail, out)
-    whole = samples.reshape(-1, 8)
-    np.testing.assert_allclose(out.F_max, whole.max(0))
-    np.testing.assert_allclose(out.F_mean, whole.mean(0))
-    np.testing.assert_allclose(out.F_range, np.ptp(whole, axis=0))
-    assert out.psi_max == 19
+    whole = samples.reshape(-1, 16)
+    np.testing.assert_allclose(out.largest[:16], whole.max(0))
+    np.testing.assert_allclose(out.average, whole.mean(0))
+    np.testing.assert_allclose(out.reach, np.ptp(whole, axis=0))
+    assert (out.largest[16:] == 19).all()
     np.testing.assert_allclose(out.mode_share, 0.25)

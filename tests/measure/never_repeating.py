@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
-from tolstat.common.tables import RESULT, Method, Motion, Options, Status
+from tolstat.common.tables import RESULT, SPAN, Method, Motion, Options, Status
 from tolstat.kernel.revolution import resolve
 from tolstat.solver import refinement
 from tolstat.solver.reference import first_order
@@ -101,7 +101,7 @@ def exponent(params: NDArray[np.void]) -> Exponent:
         found = scipy.integrate.solve_ivp(rate, (t, end), y, "RK45", rtol=1e-6, atol=atol)
         t, y = end, found.y[:, -1]
         peak = system.largest(found.t, found.y[:n].T)
-        largest.append((peak.F.max(), peak.T.max()))
+        largest.append((peak[SPAN["F"]].max(), peak[SPAN["T"]].max()))
         apart = float(np.linalg.norm(turn * (y[n:] - y[:n])))
         growth.append(np.log(apart / APART))
         y[n:] = y[:n] + APART / apart * (y[n:] - y[:n])

@@ -17,7 +17,7 @@ from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
 from tolstat.benchmarks.integrators import Code, Integrator, solve
 from tolstat.benchmarks.runs import largest_of
-from tolstat.common.tables import Method, Options
+from tolstat.common.tables import SPAN, Method, Options
 from tolstat.solver.reference import FirstOrder, Largest, first_order
 from tolstat.solver.simulation import simulate_rows
 
@@ -44,7 +44,9 @@ def error(found: Largest | None, true: Largest) -> float:
     """Largest error of a largest load, relative to the largest of its kind."""
     if found is None:
         return np.nan
-    return max(float(np.abs(a - b).max() / b.max()) for a, b in ((found.F, true.F), (found.T, true.T)))
+    return max(
+        float(np.abs(a - b).max() / b.max()) for a, b in ((found[SPAN[kind]], true[SPAN[kind]]) for kind in "FT")
+    )
 
 
 def show(name: str, errors: list[float], seconds: list[float]) -> None:

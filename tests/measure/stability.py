@@ -17,6 +17,7 @@ import numpy as np
 
 from tolstat import joint, sampling, study
 from tolstat.common.tables import RESULT, SIMULATED, Options, Status
+from tolstat.joint.contact import FROM_COEFFICIENTS
 from tolstat.kernel.integrators import first_order
 from tolstat.kernel.integrators.integrate import reset
 from tolstat.kernel.integrators.state import CV_FACTORISED, H_OLD, make_state_record
@@ -32,7 +33,6 @@ Table = np.ndarray[tuple[int], np.dtype[np.void]]
 
 ANGLES = 36
 """Angles of a revolution at which eigenvalues are taken."""
-LAWS = ("mode", "uniform", "point", "sliced")
 ALIGNING = 4
 """Revolutions in which the neighbour turns to the direction that grows."""
 
@@ -169,7 +169,7 @@ def main() -> None:
     parser.add_argument("study", type=Path)
     parser.add_argument("--joints", type=int, default=128)
     parser.add_argument("--torque", type=float, nargs="*", default=[None], metavar="N_M")
-    parser.add_argument("--law", nargs="*", default=["mode"], choices=LAWS)
+    parser.add_argument("--law", nargs="*", default=["mode"], choices=FROM_COEFFICIENTS)
     parser.add_argument("--exponents", type=int, default=0, metavar="K", help="of K joints that are ok, all others too")
     parser.add_argument("--steps", type=int, default=2880, help="steps a revolution of the exponents")
     given = parser.parse_args()

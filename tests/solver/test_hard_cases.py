@@ -13,7 +13,7 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
 from tolstat.campaign.remedy import remedy
 from tolstat.common.errors import InputError
-from tolstat.common.tables import FAILED, LARGEST, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
+from tolstat.common.tables import FAILED, LOAD_KINDS, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
 from tolstat.report import build, cases
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultStore, verification
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 STUDIES = ROOT / "studies"
 FLOATS = [f.name for f in RESULT_FIELDS if f.dtype == "f8"]
-ENDS = {f"{load}_{end}" for load in LARGEST for end in ("lower", "upper")}
+ENDS = {field.name for kind in LOAD_KINDS for field in kind.ends()}
 MAY_BE_NAN = {"closure_trend", "lyapunov", "failed_theta", "refinement_change", "step_error"} | ENDS
 
 

@@ -306,7 +306,7 @@ import numpy as np
 from tolstat import joint
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.revolution import simulate
-from tolstat.common.tables import RESULT, Options
+from tolstat.common.tables import KERNEL_RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), joint.nominal_errors(1, operation))
 par = par.view(np.recarray)
@@ -342,7 +342,7 @@ def test_nothing_is_allocated_per_step():
 from numba.core.runtime import _nrt_python, rtsys
 _nrt_python.memsys_enable_stats()
 alone = simulate.make_scratch(Options())
-out = np.zeros(1, RESULT).view(np.recarray)
+out = np.zeros(1, KERNEL_RESULT).view(np.recarray)
 counts = []
 for revolutions in (2, 2, 4):
     before = rtsys.get_allocation_stats().alloc

@@ -22,7 +22,18 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Stages
 from tolstat.common import selected_results
 from tolstat.common.columns import Column
-from tolstat.common.tables import DESIGN, ERROR, ERROR_FIELDS, PARAM, RESULT, HistorySpec, Options, Simulation, Status
+from tolstat.common.tables import (
+    DESIGN,
+    ERROR,
+    ERROR_FIELDS,
+    PARAM,
+    RESULT,
+    RESULT_FIELDS,
+    HistorySpec,
+    Options,
+    Simulation,
+    Status,
+)
 from tolstat.solver import stationary
 from tolstat.study.model import Sampling
 
@@ -157,7 +168,7 @@ def simulate(
     results["status"] = np.where(x > 3, Status.NEWTON_FAILED, np.where(x < -3, Status.NOT_SETTLED, Status.OK))
     results["settled"] = results["status"] == Status.OK
     results["steps"] = options.steps_per_rev
-    for i, name in enumerate(n for n in RESULT.names if RESULT[n].base == np.float64):
+    for i, name in enumerate(f.name for f in RESULT_FIELDS if f.dtype == "f8"):
         shape = (len(params),) + (1,) * len(RESULT[name].shape)
         results[name] = np.where(x > 3, np.nan, np.sin(x + i)).reshape(shape)
     stationary.fill_intervals(results)

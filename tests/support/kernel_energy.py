@@ -11,7 +11,7 @@ Deformations are read off the force functions of the joint: a second row of para
 no damper, a third dampers of 1 and no spring.
 """
 
-from tolstat.common.tables import Field, dtype_of
+from tolstat.common.fields import Field, dtype_of
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.dynamics import RAMP, forces, mass_of, resisting_torque

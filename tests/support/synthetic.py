@@ -2,8 +2,18 @@
 
 import numpy as np
 
-from tolstat.common.tables import ERROR, RESULT, Status
+from tolstat.common.tables import ERROR, LOAD_KINDS, RESULT, Status
 from tolstat.solver import stationary
+
+BASE = {
+    "F": [640, 640, 655, 655, 655, 655, 640, 640],
+    "T": [12, 12, 22, 22, 24, 24, 15, 15],
+    "contact": 600.0,
+    "psi": 1e-4,
+}
+"""Loads of the nominal joint; 100 of other kinds."""
+RISE = {"T": 2.5, "contact": np.array([1.0, 0.5, 1.0])}
+"""Factors on the relative rise of loads; 1 for other kinds."""
 
 
 def errors(n, seed=7):
@@ -25,14 +35,14 @@ def results(n, seed=8, failed=0, unsettled=0):
     table["status"], table["settled"] = Status.OK, 1
     scatter = rng.gamma(3.0, 0.03, (n, 8)) * np.array([1, 1, 0.15, 0.15, 0.15, 0.15, 1, 1])
     scatter[0] = 0.0
-    base = {"F": [640, 640, 655, 655, 655, 655, 640, 640], "T": [12, 12, 22, 22, 24, 24, 15, 15]}
-    for letter, values in base.items():
-        table[f"{letter}_max"] = np.array(values) * (1.0 + scatter * (1.0 if letter == "F" else 2.5))
-        table[f"{letter}_mean"] = 0.9 * table[f"{letter}_max"]
-        table[f"{letter}_range"] = 0.2 * table[f"{letter}_max"]
-    table["contact_max"] = 600.0 * (1.0 + scatter[:, :4, None] * [1.0, 0.5, 1.0])
+    for kind in LOAD_KINDS:
+        own = scatter[:, : len(kind.places or (1,))].reshape(n, *kind.shape[:1], *(1 for _ in kind.parts[:1]))
+        own = own * RISE.get(kind.name, 1.0)
+        table[f"{kind.name}_max"] = np.array(BASE.get(kind.name, 100.0)) * (1.0 + own)
+        if kind.course:
+            table[f"{kind.name}_mean"] = 0.9 * table[f"{kind.name}_max"]
+            table[f"{kind.name}_range"] = 0.2 * table[f"{kind.name}_max"]
     table["mode_share"][:, :, 1] = 1.0
-    table["psi_max"] = 1e-4 * (1.0 + scatter[:, 0])
     table["revolutions"], table["steps"], table["closure"] = 2.0, 360, 2e-5
     table["status"][n - unsettled :] = Status.NOT_SETTLED
     table["settled"][n - unsettled :] = 0

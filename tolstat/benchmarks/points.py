@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
 from tolstat.benchmarks.runs import TRUTH, Run
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.tables import SPAN
 from tolstat.solver.reference import Largest
 
-KINDS = ("loads", "force", "torque", "contact", "psi")
+COLUMNS = {kind: {"F": "force", "T": "torque"}.get(kind, kind) for kind in SPAN}
+"""Name of the error of each kind of loads."""
+KINDS = ("loads", *COLUMNS.values())
 
 
 def errors(found: Largest, true: Largest) -> dict[str, float]:
@@ -21,20 +23,12 @@ def errors(found: Largest, true: Largest) -> dict[str, float]:
     Returns
     -------
     dict
-        ``force``, ``torque``: the worst of the eight bushings; ``loads``: the larger of the two; ``contact``: the worst
-        half of a pin; ``psi``.
+        The worst of each kind, named as in `COLUMNS`; ``loads``: the larger of ``force`` and ``torque``.
     """
-
-    def worst(values: ArrayLike, truth: ArrayLike) -> float:
-        a, b = np.abs(values), np.abs(truth)
-        return float(np.max(np.abs(a - b)) / max(float(np.max(b)), 1e-300))
-
-    single = {
-        "force": worst(found.F, true.F),
-        "torque": worst(found.T, true.T),
-        "contact": worst(found.contact, true.contact),
-        "psi": worst(found.psi, true.psi),
-    }
+    single = {}
+    for kind, span in SPAN.items():
+        size = max(float(np.max(true[span])), 1e-300)
+        single[COLUMNS[kind]] = float(np.max(np.abs(found[span] - true[span]))) / size
     return {"loads": max(single["force"], single["torque"]), **single}
 
 

@@ -18,6 +18,7 @@ from tolstat.benchmarks.integrators import Integrator, Outcome, solve
 from tolstat.benchmarks.joints import Params
 from tolstat.benchmarks.timing import in_turn
 from tolstat.campaign.executors import Lost, Work, available_workers, map_in_processes
+from tolstat.common import loads
 from tolstat.common.tables import SIMULATED, Options, Status
 from tolstat.solver.reference import FirstOrder, Largest, first_order, reference_rows
 from tolstat.solver.simulation import simulate_rows, warm_up
@@ -138,9 +139,7 @@ Job = OwnJob | OtherJob | TruthJob
 
 def largest_of(row: np.void) -> Largest | None:
     """Largest loads of a row of RESULT; None where it has none."""
-    if Status(row["status"]) not in SIMULATED:
-        return None
-    return Largest(row["F_max"].copy(), row["T_max"].copy(), row["contact_max"].copy(), float(row["psi_max"]))
+    return loads.largest(np.array([row]))[0] if Status(row["status"]) in SIMULATED else None
 
 
 def prepare(system: FirstOrder) -> None:

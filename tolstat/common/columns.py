@@ -7,17 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import (
-    BUSHINGS,
-    CONTACTS,
-    DESIGN_FIELDS,
-    ERROR_FIELDS,
-    LEDGER_FIELDS,
-    PINS,
-    RESULT_FIELDS,
-    Field,
-    Mode,
-)
+from tolstat.common.fields import Field
+from tolstat.common.tables import DESIGN_FIELDS, ERROR_FIELDS, LEDGER_FIELDS, RESULT_FIELDS
 
 
 class Column(NamedTuple):
@@ -40,29 +31,15 @@ class Column(NamedTuple):
         return values
 
 
-def _result_columns() -> tuple[Column, ...]:
-    columns = []
-    for f in RESULT_FIELDS:
-        for index in np.ndindex(*f.shape):
-            if not f.shape:
-                name = f.name
-            elif f.name[:2] in ("F_", "T_"):
-                name = f"{BUSHINGS[index[0]]}.{f.name}"
-            elif f.name == "contact_max":
-                name = f"{PINS[index[0]]}.contact_{CONTACTS[index[1]]}_max"
-            elif f.name == "mode_share":
-                name = f"{PINS[index[0]]}.share_{Mode(index[1]).name.lower()}"
-            else:
-                name = f.name
-            columns.append(Column(name, f.unit, f.description, f.dtype, f.name, index))
-    return tuple(columns)
+def _flat(fields: tuple[Field, ...]) -> tuple[Column, ...]:
+    return tuple(
+        Column(name, f.unit, f.description, f.dtype, f.name, index)
+        for f in fields
+        for name, index in zip(f.columns or (f.name,), np.ndindex(*f.shape), strict=True)
+    )
 
 
-def _scalar_columns(fields: tuple[Field, ...]) -> tuple[Column, ...]:
-    return tuple(Column(f.name, f.unit, f.description, f.dtype, f.name, ()) for f in fields)
-
-
-DESIGN_COLUMNS = _scalar_columns(DESIGN_FIELDS)
-LEDGER_COLUMNS = _scalar_columns(LEDGER_FIELDS)
-ERROR_COLUMNS = _scalar_columns(ERROR_FIELDS)
-RESULT_COLUMNS = _result_columns()
+DESIGN_COLUMNS = _flat(DESIGN_FIELDS)
+LEDGER_COLUMNS = _flat(LEDGER_FIELDS)
+ERROR_COLUMNS = _flat(ERROR_FIELDS)
+RESULT_COLUMNS = _flat(RESULT_FIELDS)

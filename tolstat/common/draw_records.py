@@ -13,7 +13,7 @@ import numpy as np
 
 from tolstat.common.columns import Column
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.tables import Field, dtype_of
+from tolstat.common.fields import Field, dtype_of
 
 IMPORTANCE_FIELDS = (
     Field("component", "1", "what it was drawn from: 0 the tolerances, k proposal k; -1 the nominal joint", "i4"),

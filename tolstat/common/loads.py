@@ -1,7 +1,7 @@
-"""Registry of the loads of a joint that can have a limit: name, where its values are, unit, kind.
+"""The loads of a joint that can have a limit: name, where its values are, unit, kind.
 
-Limits, reports, checks of the numerical error, selection of results and export read it. Each element of the field of a
-kind is one load.
+They follow from the registry `tables.LOAD_KINDS`: each place of a kind has one load. Limits, reports, checks of the
+numerical error, selection of results and export read them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import BUSHINGS, CONTACTS, LARGEST, PINS
+from tolstat.common.tables import LOAD_KINDS, SPAN
 
 FloatArray = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ class Load(NamedTuple):
     name : str
         As studies and reports name it, ``cross1.F``.
     kind : str
-        Key of `tables.LARGEST`: loads of one kind are compared with the largest of them.
+        Name in `tables.LOAD_KINDS`: loads of one kind are compared with the largest of them.
     unit : str
         SI unit.
     element : int
@@ -57,22 +57,36 @@ def of_kind(results: NDArray[np.void], kind: str) -> FloatArray:
     return values.max(axis=2) if values.ndim == 3 else values
 
 
+def largest(results: NDArray[np.void]) -> FloatArray:
+    """Largest values of all kinds, (n, values), SI, in the order of `tables.SPAN`."""
+    return np.concatenate([results[f"{kind}_max"].reshape(len(results), -1) for kind in KINDS], axis=1)
+
+
+def put_largest(values: FloatArray | float, results: NDArray[np.void]) -> None:
+    """Write largest values, ordered as `largest` returns them, or one value for all, to a table RESULT."""
+    values = np.broadcast_to(values, (len(results), max(span.stop for span in SPAN.values())))
+    for kind, span in SPAN.items():
+        field = results[f"{kind}_max"]
+        field[...] = values[:, span].reshape(field.shape)
+
+
 def _entries() -> list[Load]:
-    found = [
-        Load(f"{bushing}.{kind}", kind, unit, index, (f"{bushing}.{kind}_max",))
-        for index, bushing in enumerate(BUSHINGS)
-        for kind, unit in (("F", "N"), ("T", "N*m"))
-    ]
-    for index, pin in enumerate(PINS):
-        columns = tuple(f"{pin}.contact_{part}_max" for part in CONTACTS)
-        found.append(Load(f"{pin}.contact", "contact", "N", index, columns))
-    return [*found, Load("psi", "psi", "1", 0, ("psi_max",))]
+    found = []
+    for places in dict.fromkeys(kind.places for kind in LOAD_KINDS):
+        kinds = [kind for kind in LOAD_KINDS if kind.places == places]
+        for i, place in enumerate(places or ("",)):
+            for kind in kinds:
+                columns = kind.columns("max")
+                step = len(columns) // len(places or ("",))
+                name = f"{place}.{kind.name}" if place else kind.name
+                found.append(Load(name, kind.name, kind.unit, i, columns[i * step : (i + 1) * step]))
+    return found
 
 
+KINDS = tuple(kind.name for kind in LOAD_KINDS)
+"""Kinds of loads, in the order of reports."""
 LOADS = {load.name: load for load in _entries()}
 """Every load that can have a limit, by name."""
-KINDS = tuple(LARGEST)
-"""Kinds of loads, in the order of reports."""
 UNIT_OF_LOAD = {load.name: load.unit for load in LOADS.values()}
 """SI unit of each load."""
 BUSHING_LOADS = tuple(load.name for load in LOADS.values() if load.kind in ("F", "T"))

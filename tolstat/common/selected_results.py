@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from tolstat.common.columns import RESULT_COLUMNS, Column
 from tolstat.common.loads import LOADS
+from tolstat.common.tables import LOAD_KINDS
 
 KEY = "output.results"
 """Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
-OPTIONAL_FIELDS = ("F_max", "F_mean", "F_range", "T_max", "T_mean", "T_range", "contact_max", "mode_share", "psi_max")
+OPTIONAL_FIELDS = ("mode_share", *(field.name for kind in LOAD_KINDS for field in kind.statistics().values()))
 """Fields of the results that a study may leave out."""
 NAMES = tuple(c.name for c in RESULT_COLUMNS)
 

@@ -1,17 +1,24 @@
 """The tables that every stage reads and writes: row i is joint i in each of them.
 
-A table is described by a tuple of `Field`; from it come the NumPy dtype that the kernel works on, and the columns of
-the result file and of every CSV (`columns`). SI units throughout.
+A table is described by a tuple of `fields.Field`; from it come the NumPy dtype that the kernel works on, and the
+columns of the result file and of every CSV (`columns`). SI units throughout.
 """
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
+from itertools import accumulate, chain
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.fields import Field, Kind, dtype_of
+from tolstat.common.parameters import PARAM_FIELDS
+
+SCHEMA_VERSION = 4
+"""Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
 PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
 HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
@@ -24,8 +31,6 @@ CHANNELS = {
 CONTACTS = ("outer", "inner", "resultant")
 """Contact forces of a pin: normal force of its outermost and of its innermost station, and the resultant of all."""
 OUTER, INNER, RESULTANT = range(3)
-MAX_STATIONS = 16
-"""Maximum number of contact stations of a pin."""
 MAX_ITERATIONS = 40
 """Upper bound on a joint's Newton iterations per step of the longest run allowed, so that no joint blocks a campaign.
 Joints that never settle take some 8 to 10."""
@@ -149,30 +154,6 @@ MOTION_TEXT = {
 }
 
 
-class Field(NamedTuple):
-    """One column, or a small array of columns, of a table.
-
-    Attributes
-    ----------
-    name : str
-        Identifier, the same from TOML key to file and CSV header.
-    unit : str
-        SI unit, ``"1"`` for a pure number.
-    description : str
-        One sentence for the reader of the file.
-    dtype : str
-        NumPy scalar type.
-    shape : tuple of int
-        ``()`` for a scalar column.
-    """
-
-    name: str
-    unit: str
-    description: str
-    dtype: str = "f8"
-    shape: tuple[int, ...] = ()
-
-
 class Options(NamedTuple):
     """Numerical settings of the solver; see `study.Solver`."""
 
@@ -238,11 +219,6 @@ class Simulation(NamedTuple):
     histories: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
 
 
-def dtype_of(fields: tuple[Field, ...]) -> np.dtype[np.void]:
-    """Aligned structured dtype of a table."""
-    return np.dtype([(f.name, f.dtype, f.shape) for f in fields], align=True)
-
-
 def _error_fields() -> tuple[Field, ...]:
     fields = []
     for feature in PINS + HOLES:
@@ -269,68 +245,24 @@ def _error_fields() -> tuple[Field, ...]:
 ERROR_FIELDS = _error_fields()
 """Manufacturing errors (deviations from nominal, zero for the nominal joint) and the operating point."""
 
-PARAM_FIELDS = (
-    Field("alpha", "rad", "misalignment"),
-    Field("omega", "rad/s", "angular velocity of the input shaft"),
-    Field("torque", "N*m", "resisting torque T_r"),
-    Field("Js", "kg*m^2", "inertia of the output shaft"),
-    Field("R", "m", "distance of the pins' and arms' reference points from O"),
-    Field("r_b", "m", "distance of the cross bushings' markers from O"),
-    Field("l_f", "m", "distance of the fork bushings' markers from the hole centre along z"),
-    Field("hub_mass", "kg", "mass of the hub"),
-    Field("hub_inertia", "kg*m^2", "inertia of the hub about x, y, z of C", shape=(3,)),
-    Field("pin_mass", "kg", "mass of a pin"),
-    Field("pin_inertia", "kg*m^2", "inertia of a pin about e, t, z", shape=(3,)),
-    Field("arm_mass", "kg", "mass of an arm"),
-    Field("arm_inertia", "kg*m^2", "inertia of an arm about e, t, z", shape=(3,)),
-    Field("k_cross", "N/m, N*m/rad", "cross bushing stiffness: force e, t, z, torque e, t, z", shape=(6,)),
-    Field("c_cross", "N*s/m, N*m*s/rad", "cross bushing damping, same order", shape=(6,)),
-    Field("k_fork", "N/m, N*m/rad", "fork bushing stiffness, same order", shape=(6,)),
-    Field("c_fork", "N*s/m, N*m*s/rad", "fork bushing damping, same order", shape=(6,)),
-    Field("c_d", "N*s/m", "normal contact damping"),
-    Field("c_t", "N*s/m", "tangential contact damping (lubricant film)"),
-    Field("delta_d", "m", "penetration over which contact damping rises"),
-    Field("n_stations", "1", "contact stations per pin", "i8"),
-    Field("station_s", "m", "signed distance of each station from P along the pin, falling", shape=(MAX_STATIONS,)),
-    Field("station_k1", "N/m^2", "quadratic coefficient of each station's force", shape=(MAX_STATIONS,)),
-    Field("station_k2", "N/m", "linear coefficient of each station's force", shape=(MAX_STATIONS,)),
-    Field("station_weight", "1", "weight of each station's damping and film", shape=(MAX_STATIONS,)),
-    Field("clearance", "m", "radial clearance c of each pin", shape=(4,)),
-    Field("pin_point", "m", "P less the pin's reference point, in axes of C", shape=(4, 3)),
-    Field("pin_axis", "1", "direction of the pin axis, in axes of C", shape=(4, 3)),
-    Field(
-        "hole_point",
-        "m",
-        "hole centre less the arm's reference point, in axes of the arm's frame",
-        shape=(4, 3),
+OVER = "over the revolutions that count"
+LOAD_KINDS = (
+    Kind("F", "bushing force", "N", f"modulus of the bushing force {OVER}", BUSHINGS, course=True),
+    Kind("T", "bushing torque", "N*m", f"modulus of the bushing torque {OVER}", BUSHINGS, course=True),
+    Kind(
+        "contact",
+        "contact force",
+        "N",
+        "contact force of the pin: of its outermost station, of its innermost one, resultant of all stations",
+        PINS,
+        CONTACTS,
     ),
-    Field("hole_axis", "1", "direction of the hole axis, in axes of the arm's frame", shape=(4, 3)),
+    Kind("psi", "|Psi|", "1", "|Psi|, relative error of the speed ratio, eq. (13)", interpolated=False),
 )
-"""Parameters of one joint for the kernel. Pin fields are indexed by pin, hole fields by arm (hole k: arm k)."""
-
-
-LARGEST = {"F": "bushing force", "T": "bushing torque", "contact": "contact force", "psi": "|Psi|"}
-"""Kinds of largest loads: results hold them as ``F_max`` and so on."""
-
-
-def _load_fields() -> list[Field]:
-    fields = []
-    for load, unit, noun in (("F", "N", "force"), ("T", "N*m", "torque")):
-        for stat, text in (("max", "largest"), ("mean", "mean"), ("range", "largest less smallest")):
-            description = f"{text} modulus of the bushing {noun} over the revolutions that count"
-            fields.append(Field(f"{load}_{stat}", unit, description, shape=(8,)))
-    return fields
-
-
-def _ends() -> list[Field]:
-    """Interval of the largest loads of each kind."""
-    fields = []
-    for load, noun in LARGEST.items():
-        for end in ("lower", "upper"):
-            text = f"{end} end of the interval of the largest {noun} of a stationary joint, in units of it; of others 1"
-            fields.append(Field(f"{load}_{end}", "1", text))
-    return fields
-
+"""Registry of the loads: all that can have a limit, kind by kind. `kernel.mechanics.loads` computes them."""
+_ENDS = [*accumulate((kind.size for kind in LOAD_KINDS), initial=0)]
+SPAN = {kind.name: slice(_ENDS[i], _ENDS[i + 1]) for i, kind in enumerate(LOAD_KINDS)}
+"""Elements of each kind in arrays with the values of all loads, kind after kind."""
 
 RESULT_FIELDS = (
     Field("status", "1", "see Status", "u1"),
@@ -352,16 +284,16 @@ RESULT_FIELDS = (
     Field("newton_iterations", "1", "Newton iterations", "i4"),
     Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),
     Field("factorisations", "1", "times that the tangent was factorised", "i4"),
-    *_load_fields(),
+    *(field for kind in LOAD_KINDS if kind.places for field in kind.statistics().values()),
     Field(
-        "contact_max",
-        "N",
-        "largest contact force of the pin: of its outermost station, of its innermost one, resultant of all stations",
-        shape=(4, len(CONTACTS)),
+        "mode_share",
+        "1",
+        "share of the revolutions that count in each contact mode",
+        shape=(len(PINS), len(Mode)),
+        columns=tuple(f"{pin}.share_{mode.name.lower()}" for pin in PINS for mode in Mode),
     ),
-    Field("mode_share", "1", "share of the revolutions that count in each contact mode", shape=(4, 4)),
-    Field("psi_max", "1", "largest |Psi|, relative error of the speed ratio, eq. (13)"),
-    *_ends(),
+    *(field for kind in LOAD_KINDS if not kind.places for field in kind.statistics().values()),
+    *(field for kind in LOAD_KINDS for field in kind.ends()),
 )
 
 DESIGN_FIELDS = (
@@ -381,7 +313,28 @@ LEDGER_FIELDS = (
 DESIGN = dtype_of(DESIGN_FIELDS)
 ERROR = dtype_of(ERROR_FIELDS)
 PARAM = dtype_of(PARAM_FIELDS)
-RESULT = dtype_of(RESULT_FIELDS)
+
+
+def _layouts() -> tuple[np.dtype[np.void], np.dtype[np.void]]:
+    """RESULT, and the same bytes with one array for each statistic of all loads."""
+    arrays = {"max": "largest", "mean": "average", "range": "reach"}
+    of_loads = {
+        array: [kind.statistics()[of] for kind in LOAD_KINDS if of in kind.statistics()] for of, array in arrays.items()
+    }
+    others = [field for field in RESULT_FIELDS if not any(field in fields for fields in of_loads.values())]
+    sizes = {array: sum(math.prod(field.shape) for field in fields) for array, fields in of_loads.items()}
+    joined = [Field(array, "", "", shape=(size,)) for array, size in sizes.items()]
+    return dtype_of([*others, *chain.from_iterable(of_loads.values())]), dtype_of([*others, *joined])
+
+
+RESULT, KERNEL_RESULT = _layouts()
+"""Results of one joint, and how kernels see them: in ``largest``, ``average`` and ``reach`` the statistics of all
+loads, kind after kind as in `SPAN`, in place of ``F_max``, ``F_mean``, ``F_range`` and so on."""
+
+
+def for_kernels(table: NDArray[np.void]) -> np.recarray[Any, np.dtype[np.void]]:
+    """View of a table RESULT, of any shape, as KERNEL_RESULT."""
+    return table.view(np.ndarray).view(KERNEL_RESULT).view(np.recarray)
 
 
 def without_results(n: int, status: Status) -> NDArray[np.void]:

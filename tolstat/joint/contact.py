@@ -1,4 +1,4 @@
-"""The contact section of a joint file: damping of a pin in its hole, and the stations of the contact law.
+"""The contact section of a joint file: damping of a pin in its hole, and the registry of contact laws.
 
 A contact law is a set of stations (model, section 5): places along the pin, each with its own force
 f(delta) = k1 delta^2 + k2 delta and its own weight of damping and film.
@@ -7,15 +7,15 @@ f(delta) = k1 delta^2 + k2 delta and its own weight of damping and film.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import units
+from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import MAX_STATIONS
 from tolstat.joint import material
 from tolstat.joint.sections import (
     NOT_NEGATIVE,
@@ -35,21 +35,6 @@ Damping = Annotated[units.Damping, NOT_NEGATIVE]
 Force = Annotated[float, units.Quantity("N"), POSITIVE]
 OPTIONAL = Field(default=None, validate_default=True)
 """Default of a key that is optional unless another key requires it."""
-
-NEEDED = {
-    "n_stations": ("law", "sliced", "mode"),
-    "stations": ("law", "stations", "mode"),
-    "k1u": ("coefficients", "printed", "fitted"),
-    "k2u": ("coefficients", "printed", "fitted"),
-    "fit_load": ("coefficients", "fitted", "printed"),
-    "c_d": ("damping", "given", "beam"),
-    "xi": ("damping", "beam", "given"),
-}
-"""Keys required by a selector: the selector, its value that requires the key, its value that does not."""
-
-
-COEFFICIENTS = ("coefficients", "k1u", "k2u", "k1p", "k2p", "H", "fit_load", "n_stations")
-"""Keys that define the stations of all laws but ``"stations"``."""
 
 
 class Stations(NamedTuple):
@@ -94,10 +79,128 @@ def _check_stations(stations: tuple[Station, ...] | None) -> tuple[Station, ...]
     return stations
 
 
+class Law(NamedTuple):
+    """A contact law.
+
+    Attributes
+    ----------
+    stations : callable
+        Contact section and material -> stations, at the material's nominal Young's modulus.
+    rows : tuple of tuple of str
+        Lines of the table of laws in docs/model.md: where stations are, their k1 and k2, their weight.
+    needs : tuple of str
+        Keys of the contact section that the law needs, without those of the coefficients.
+    from_coefficients : bool
+        Whether the stations follow from the coefficients of uniform and point contact.
+    middle : bool
+        Whether a station has what two ends in point contact leave of uniform contact; it must not be negative.
+    """
+
+    stations: Callable[[Contact, Material], Stations]
+    rows: tuple[tuple[str, str, str], ...]
+    needs: tuple[str, ...] = ()
+    from_coefficients: bool = True
+    middle: bool = False
+
+
+def _mode(contact: Contact, of: Material) -> Stations:
+    k1u, k2u, k1p, k2p = contact.stiffness(of)
+    ends = contact.ends()
+    return Stations(
+        np.array([ends[0], 0.0, ends[1]]),
+        np.array([k1p, max(k1u - 2.0 * k1p, 0.0), k1p]),
+        np.array([k2p, max(k2u - 2.0 * k2p, 0.0), k2p]),
+        np.array([1.0, 0.0, 1.0]),
+    )
+
+
+def _uniform(contact: Contact, of: Material) -> Stations:
+    k1u, k2u, _, _ = contact.stiffness(of)
+    one = np.ones(2)
+    return Stations(contact.ends(), 0.5 * k1u * one, 0.5 * k2u * one, one)
+
+
+def _point(contact: Contact, of: Material) -> Stations:
+    _, _, k1p, k2p = contact.stiffness(of)
+    one = np.ones(2)
+    return Stations(contact.ends(), k1p * one, k2p * one, one)
+
+
+def _sliced(contact: Contact, of: Material) -> Stations:
+    assert contact.n_stations is not None
+    k1u, k2u, _, _ = contact.stiffness(of)
+    x, weight = np.polynomial.legendre.leggauss(contact.n_stations)
+    weight = weight[::-1]
+    return Stations(0.5 * contact.z * x[::-1], 0.5 * k1u * weight, 0.5 * k2u * weight, weight)
+
+
+def _given(contact: Contact, of: Material) -> Stations:
+    assert contact.stations is not None
+    own = sorted(contact.stations, key=lambda station: -station.s_over_z)
+    return Stations(
+        contact.z * np.array([station.s_over_z for station in own]),
+        np.array([station.k1 for station in own]),
+        np.array([station.k2 for station in own]),
+        np.array([station.weight for station in own]),
+    )
+
+
+DEFAULT, GIVEN = "mode", "stations"
+LAWS = {
+    DEFAULT: Law(
+        _mode,
+        (("pin ends, ±z/2", "k1p, k2p", "1"), ("middle, 0", "k1u − 2 k1p, k2u − 2 k2p, neither below 0", "0")),
+        middle=True,
+    ),
+    "uniform": Law(_uniform, (("pin ends", "k1u/2, k2u/2", "1"),)),
+    "point": Law(_point, (("pin ends", "k1p, k2p", "1"),)),
+    "sliced": Law(
+        _sliced,
+        (("n Gauss–Legendre points on z, weights w_j that sum to 2", "w_j k1u/2, w_j k2u/2", "w_j"),),
+        needs=("n_stations",),
+    ),
+    GIVEN: Law(
+        _given,
+        (("`contact.stations`: 1 to 16 of one's own", "as given", "as given"),),
+        needs=("stations",),
+        from_coefficients=False,
+    ),
+}
+"""Registry of the contact laws, by the word for ``contact.law``."""
+FROM_COEFFICIENTS = tuple(name for name, law in LAWS.items() if law.from_coefficients)
+"""Laws whose stations follow from the coefficients."""
+COEFFICIENTS = (
+    *("coefficients", "k1u", "k2u", "k1p", "k2p", "H", "fit_load"),
+    *dict.fromkeys(key for name in FROM_COEFFICIENTS for key in LAWS[name].needs),
+)
+"""Keys that define the stations of all laws but `GIVEN`."""
+NEEDED = {
+    **{
+        key: ("law", tuple(name for name, law in LAWS.items() if key in law.needs), DEFAULT)
+        for key in dict.fromkeys(key for law in LAWS.values() for key in law.needs)
+    },
+    "k1u": ("coefficients", ("printed",), "fitted"),
+    "k2u": ("coefficients", ("printed",), "fitted"),
+    "fit_load": ("coefficients", ("fitted",), "printed"),
+    "c_d": ("damping", ("given",), "beam"),
+    "xi": ("damping", ("beam",), "given"),
+}
+"""Keys required by a selector: the selector, its values that require the key, a value that does not."""
+
+if TYPE_CHECKING:
+    LawName = str
+else:
+    LawName = Literal[tuple(LAWS)]
+
+
 def keys_valid_for(contact: Mapping[str, Any], law: object) -> dict[str, Any]:
     """Keys of a contact section that remain valid when an override sets `law`."""
-    other = COEFFICIENTS if law == "stations" else ("stations",)
+    other = COEFFICIENTS if law == GIVEN else (GIVEN,)
     return {key: value for key, value in contact.items() if key not in other}
+
+
+def _has_middle(info: ValidationInfo) -> bool:
+    return "law" in info.data and LAWS[info.data["law"]].middle
 
 
 class Contact(Strict):
@@ -106,7 +209,7 @@ class Contact(Strict):
     Validators require keys that may be ``None`` where they are needed; methods assert it for the type checker.
     """
 
-    law: Literal["mode", "uniform", "point", "sliced", "stations"]
+    law: LawName
     n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = OPTIONAL
     stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = OPTIONAL
     D_H: Length
@@ -136,22 +239,22 @@ class Contact(Strict):
     @field_validator(*COEFFICIENTS)
     @classmethod
     def _without_stations(cls, value: object, info: ValidationInfo) -> object:
-        if value is not None and info.data.get("law") == "stations":
+        if value is not None and info.data.get("law") == GIVEN:
             raise refuse('has no effect with law = "stations"', "remove it: each station has its own coefficients")
         return value
 
     @field_validator("stations")
     @classmethod
     def _of_their_law(cls, value: object, info: ValidationInfo) -> object:
-        law = info.data.get("law", "stations")  # an invalid law has a fault of its own
-        if value is not None and law != "stations":
+        law = info.data.get("law", GIVEN)  # an invalid law has a fault of its own
+        if value is not None and law != GIVEN:
             raise refuse(f'has no effect with law = "{law}"', 'write law = "stations"')
         return value
 
     @field_validator("coefficients")
     @classmethod
     def _source(cls, value: str | None, info: ValidationInfo) -> str | None:
-        if value is None and info.data.get("law") not in (None, "stations"):
+        if value is None and info.data.get("law") not in (None, GIVEN):
             raise refuse("missing key", 'write coefficients = "printed" or "fitted"')
         if value == "fitted" and "D_P" in info.data and info.data["D_P"] == info.data.get("D_H"):
             raise refuse("eq. (3) has no value at D_H = D_P", 'give a clearance, or write "printed"')
@@ -166,10 +269,10 @@ class Contact(Strict):
     @field_validator("k1p", "k2p")
     @classmethod
     def _leaves_a_middle(cls, value: float | None, info: ValidationInfo) -> float | None:
-        """Refuse a negative middle station of the law ``"mode"``: uniform less twice the point coefficient."""
+        """Refuse a negative middle station: uniform less twice the point coefficient."""
         name = str(info.field_name)
         uniform = info.data.get(name.replace("p", "u"))
-        in_use = info.data.get("law") == "mode" and info.data.get("coefficients") == "printed"
+        in_use = _has_middle(info) and info.data.get("coefficients") == "printed"
         if in_use and value is not None and uniform is not None and 2.0 * value > uniform:
             found = f"2 {name} exceeds {name[:2]}u = {uniform:g}: the middle station would be negative"
             raise refuse(found, f"give {name} <= {name[:2]}u / 2, or another law")
@@ -178,14 +281,14 @@ class Contact(Strict):
     @field_validator("H")
     @classmethod
     def _point(cls, value: float | None, info: ValidationInfo) -> float | None:
-        law, fitted = info.data.get("law"), info.data.get("coefficients") == "fitted"
+        fitted = info.data.get("coefficients") == "fitted"
         given = info.data.get("k1p", 0.0) is not None and info.data.get("k2p", 0.0) is not None
-        if law == "stations" or (given and not fitted):
+        if info.data.get("law") == GIVEN or (given and not fitted):
             return value
         if value is None:
             raise refuse("missing key, needed where k1p and k2p are not given", "add H, or both k1p and k2p")
         least = 2.0 if fitted or info.data.get("k2p") is None else math.sqrt(2.0)  # k2p = k2u/H, k1p = k1u/H^2
-        if law == "mode" and value < least:
+        if _has_middle(info) and value < least:
             found = f"{value:g} makes two ends stiffer than uniform contact: the middle station would be negative"
             raise refuse(found, f"give at least {least:.4g}, or another law")
         return value
@@ -196,7 +299,7 @@ class Contact(Strict):
         Point coefficients follow from the uniform ones by H where they are not given, and always where the
         uniform ones are fitted. NaN with the law ``"stations"``, which has none.
         """
-        if self.law == "stations":
+        if not LAWS[self.law].from_coefficients:
             return (math.nan,) * 4
         k1u, k2u, k1p, k2p = self.k1u, self.k2u, self.k1p, self.k2p
         if self.coefficients == "fitted":
@@ -215,33 +318,11 @@ class Contact(Strict):
 
     def springs(self, of: Material) -> Stations:
         """Contact stations of the law (model, section 5), at the nominal Young's modulus of the material."""
-        if self.law == "stations":
-            assert self.stations is not None
-            own = sorted(self.stations, key=lambda station: -station.s_over_z)
-            return Stations(
-                self.z * np.array([station.s_over_z for station in own]),
-                np.array([station.k1 for station in own]),
-                np.array([station.k2 for station in own]),
-                np.array([station.weight for station in own]),
-            )
-        k1u, k2u, k1p, k2p = self.stiffness(of)
-        if self.law == "sliced":
-            assert self.n_stations is not None
-            x, weight = np.polynomial.legendre.leggauss(self.n_stations)
-            weight = weight[::-1]
-            return Stations(0.5 * self.z * x[::-1], 0.5 * k1u * weight, 0.5 * k2u * weight, weight)
-        ends, one = 0.5 * self.z * np.array([1.0, -1.0]), np.ones(2)
-        if self.law == "uniform":
-            return Stations(ends, 0.5 * k1u * one, 0.5 * k2u * one, one)
-        if self.law == "point":
-            return Stations(ends, k1p * one, k2p * one, one)
-        middle = max(k1u - 2.0 * k1p, 0.0), max(k2u - 2.0 * k2p, 0.0)
-        return Stations(
-            np.array([ends[0], 0.0, ends[1]]),
-            np.array([k1p, middle[0], k1p]),
-            np.array([k2p, middle[1], k2p]),
-            np.array([1.0, 0.0, 1.0]),
-        )
+        return LAWS[self.law].stations(self, of)
+
+    def ends(self) -> Array:
+        """Distance of the pin's ends from P along its axis, m, the outer one first."""
+        return 0.5 * self.z * np.array([1.0, -1.0])
 
     def undamped_ends(self) -> list[int]:
         """Indices in ``stations`` of undamped stations that can touch alone, where the pin's whirl has no damping.

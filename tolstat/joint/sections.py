@@ -50,9 +50,10 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
 Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
 
 
-def require(value: object, info: ValidationInfo, selector: str, word: str, instead: str) -> None:
-    """Raise when a key is missing although the key `selector` of its section has the value `word`."""
-    if value is None and info.data.get(selector) == word:
+def require(value: object, info: ValidationInfo, selector: str, words: tuple[str, ...], instead: str) -> None:
+    """Raise when a key is missing although the key `selector` of its section has one of the values `words`."""
+    word = info.data.get(selector)
+    if value is None and word in words:
         remedy = f'add {info.field_name}, or write {selector} = "{instead}"'
         raise refuse(f'missing key, needed with {selector} = "{word}"', remedy)
 
@@ -162,5 +163,5 @@ class Bushing(Strict):
     @field_validator("cross", "fork")
     @classmethod
     def _given(cls, value: BeamAxes | None, info: ValidationInfo) -> BeamAxes | None:
-        require(value, info, "stiffness", "given", "beam")
+        require(value, info, "stiffness", ("given",), "beam")
         return value

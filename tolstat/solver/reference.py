@@ -12,7 +12,18 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import CONTACTS, RESULT, SIMULATED, Fidelity, Options, Start, Status, without_results
+from tolstat.common.loads import put_largest
+from tolstat.common.tables import (
+    RESULT,
+    SIMULATED,
+    SPAN,
+    Fidelity,
+    Options,
+    Start,
+    Status,
+    for_kernels,
+    without_results,
+)
 
 FloatArray = NDArray[np.float64]
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
@@ -28,24 +39,8 @@ MAX_STEPS = 50_000
 MAX_REVS = 6
 """Number of revolutions after which a joint whose largest loads still change is not periodic."""
 
-
-class Largest(NamedTuple):
-    """Largest loads along a solution.
-
-    Attributes
-    ----------
-    F, T : ndarray, shape (8,)
-        Moduli of the bushing loads cross 1-4, fork 1-4, N and N m.
-    contact : ndarray, shape (4, 3)
-        Contact forces of each pin, in the order of `tables.CONTACTS`, N.
-    psi : float
-        Modulus of Psi, eq. (13).
-    """
-
-    F: FloatArray
-    T: FloatArray
-    contact: FloatArray
-    psi: float
+Largest = FloatArray
+"""Largest values of all loads of a joint, (values,), SI, in the order of `tables.SPAN`."""
 
 
 class FirstOrder(NamedTuple):
@@ -99,6 +94,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         Its functions share work arrays, and so are not thread-safe.
     """
     from tolstat.kernel.integrators import first_order as kernel
+    from tolstat.kernel.mechanics.loads import N_LOADS
     from tolstat.kernel.mechanics.topology import N_DOF
     from tolstat.kernel.mechanics.work import WORK
     from tolstat.kernel.revolution.simulate import make_scratch, simulate_joint
@@ -109,7 +105,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     alone = make_scratch(options)
     work, state = alone.work, alone.state
     settled = np.zeros(1, RESULT)
-    simulate_joint(par, options, alone, settled.view(np.recarray)[0])
+    simulate_joint(par, options, alone, for_kernels(settled)[0])
     period = 2 * np.pi / abs(float(par.omega))
     t0, y0 = period * (float(settled["revolutions"][0]) % 1.0), np.concatenate([state.q0, state.v0])
     if from_start:
@@ -133,11 +129,10 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         return out
 
     def largest(times: FloatArray, states: FloatArray) -> Largest:
-        m = len(times)
-        loads, contact, psi = np.empty((m, 8, 6)), np.empty((m, 4, len(CONTACTS))), np.empty(m)
-        kernel.sample(times, np.ascontiguousarray(states), par, work, loads, contact, psi)
-        force, torque = (np.linalg.norm(loads[..., k : k + 3], axis=2).max(axis=0) for k in (0, 3))
-        return Largest(force, torque, contact.max(axis=0), float(np.abs(psi).max()))
+        values = np.empty((len(times), N_LOADS))
+        kernel.sample(times, np.ascontiguousarray(states), par, work, values)
+        found: Largest = values.max(axis=0)
+        return found
 
     scale = np.repeat([LENGTH, VELOCITY], N_DOF)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
@@ -223,7 +218,7 @@ def _periodic(
     before = None
     for last, steps in _revolutions(system, solver, max_steps, angles):
         out["revolutions"], out["steps"] = 1 + np.nan_to_num(out["revolutions"]), steps
-        out["F_max"], out["T_max"], out["contact_max"], out["psi_max"] = last
+        put_largest(last, out)
         if before is not None:
             out["closure"] = _change(before, last)
             if out["closure"][0] <= closure_tol:
@@ -233,8 +228,7 @@ def _periodic(
         before = last
     if np.isfinite(out["closure"][0]):
         return Status.NOT_SETTLED
-    for name in ("F_max", "T_max", "contact_max", "psi_max"):
-        out[name] = np.nan
+    put_largest(np.nan, out)
     return Status.NEWTON_FAILED
 
 
@@ -268,6 +262,6 @@ def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | 
 
 
 def _change(before: Largest, last: Largest) -> float:
-    """Largest change of any largest load, relative to the largest of its kind."""
-    pairs = ((before.F, last.F), (before.T, last.T))
+    """Largest change of any bushing's largest load, relative to the largest of its kind."""
+    pairs = [(before[SPAN[kind]], last[SPAN[kind]]) for kind in ("F", "T")]
     return max(float(np.abs(b - a).max() / max(b.max(), 1e-300)) for a, b in pairs)

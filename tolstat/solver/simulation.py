@@ -9,7 +9,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import CONTACTS, PARAM, RESULT, SIMULATED, Fidelity, HistorySpec, Method, Options, Simulation
+from tolstat.common.tables import (
+    CONTACTS,
+    KERNEL_RESULT,
+    PARAM,
+    RESULT,
+    SIMULATED,
+    SPAN,
+    Fidelity,
+    HistorySpec,
+    Method,
+    Options,
+    Simulation,
+    for_kernels,
+)
 from tolstat.solver import rainflow, refinement, stationary
 
 if TYPE_CHECKING:
@@ -177,11 +190,11 @@ def _alone(
     from tolstat.kernel.revolution.simulate import simulate_joint
 
     alone = scratch(options)
-    rows = params.view(np.recarray)
+    rows, out, own = params.view(np.recarray), for_kernels(results), for_kernels(blocks)
     for i in range(len(params)):
-        simulate_joint(rows[i], options, alone, results[i])
-        if len(blocks):
-            blocks[i] = alone.past.trail.revolution
+        simulate_joint(rows[i], options, alone, out[i])
+        if len(own):
+            own[i] = alone.past.trail.revolution
         if keep:
             yield i, alone.ring.samples
 
@@ -204,13 +217,13 @@ def _together(
         batch.par.n_stations = part["n_stations"][0]
         words = part.view(np.float64).reshape(len(part), -1)
         samples = make_samples(len(part) if keep else 0, options.steps_per_rev)
-        own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), RESULT).view(np.recarray)
-        out = np.zeros(len(part), RESULT).view(np.recarray)
+        own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
+        out = np.zeros(len(part), KERNEL_RESULT).view(np.recarray)
         rows = part.view(np.recarray)
         lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
-        results[here] = out
+        for_kernels(results)[here] = out
         if len(blocks):
-            blocks[here] = own
+            for_kernels(blocks)[here] = own
         yield from zip(here.tolist(), samples, strict=False)
 
 
@@ -225,7 +238,9 @@ def _groups(params: NDArray[np.void], max_size: int) -> Iterator[NDArray[np.intp
 def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:
     """Extract the histories that are kept from the samples of the recorded revolution."""
     if histories == "full":
-        return {name: samples[name] for name in specs}
+        held = {name: samples["value"][:, span] for name, span in SPAN.items()}
+        held |= {name: samples[name] for name in samples.dtype.names or ()}
+        return {name: held[name].reshape(spec.shape) for name, spec in specs.items()}
     loads = np.ascontiguousarray(samples["loads"])
     sample = rainflow.count(loads) if "cycles" in histories else {}
     if "harmonics" in histories:

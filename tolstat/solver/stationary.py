@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import LARGEST, VALID, Motion, Status
+from tolstat.common.loads import KINDS
+from tolstat.common.tables import VALID, Motion, Status
 
 DISCARDED_SHARE = 1 / 3
 """Share of the revolutions watched that is discarded at their beginning."""
@@ -67,12 +68,12 @@ def classify(results: Table, blocks: Table, duration: int) -> None:
         if len(watched) < MIN_REVOLUTIONS or not is_stationary(watched):
             continue
         results["status"][i] = Status.STATIONARY
-        for load in LARGEST:
-            own = results[f"{load}_max"]
-            median, lower, upper = largest(watched[f"{load}_max"].reshape(len(watched), -1), duration)
+        for kind in KINDS:
+            own = results[f"{kind}_max"]
+            median, lower, upper = largest(watched[f"{kind}_max"].reshape(len(watched), -1), duration)
             own[i] = median.reshape(own[i].shape)
             size = np.where(median > 0, median, 1.0)
-            results[f"{load}_lower"][i], results[f"{load}_upper"][i] = (lower / size).min(), (upper / size).max()
+            results[f"{kind}_lower"][i], results[f"{kind}_upper"][i] = (lower / size).min(), (upper / size).max()
 
 
 def fill_intervals(results: Table) -> None:
@@ -84,9 +85,9 @@ def fill_intervals(results: Table) -> None:
         Joints; ends of stationary ones that never repeat are left as they are.
     """
     never = (results["status"] == Status.STATIONARY) & (results["motion"] != Motion.SUBHARMONIC)
-    for load in LARGEST:
+    for kind in KINDS:
         for end in ("lower", "upper"):
-            own = results[f"{load}_{end}"]
+            own = results[f"{kind}_{end}"]
             own[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
 
 

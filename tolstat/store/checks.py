@@ -16,9 +16,9 @@ import numpy as np
 
 from tolstat.common import selected_results
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS
-from tolstat.common.tables import HistorySpec
+from tolstat.common.tables import SCHEMA_VERSION, HistorySpec
 from tolstat.store import integrity
-from tolstat.store.result_file import FILETYPE, SCHEMA_VERSION, check_column, descriptions, store_error, text
+from tolstat.store.result_file import FILETYPE, check_column, descriptions, store_error, text
 
 DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
 """Exceptions that reading a damaged file raises, in h5py or in code that relies on the file's attributes."""

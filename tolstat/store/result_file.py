@@ -21,7 +21,7 @@ from tolstat.common import draw_records, selected_results, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.files import atomic_write, check_disk_space
-from tolstat.common.tables import HistorySpec, Options
+from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Options
 from tolstat.store.integrity import errors_hash, seal
 from tolstat.store.provenance import git_commit, versions
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 FILETYPE = "tolstat campaign"
-SCHEMA_VERSION = 4
 MAX_FIXED_TEXT = 32_000
 """Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
 COLUMN_OVERHEAD = 800

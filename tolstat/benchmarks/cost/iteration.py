@@ -19,7 +19,7 @@ from tolstat.benchmarks.cost.flops import Snapshot, count_apart
 from tolstat.benchmarks.cost.rates import Sample, alone
 from tolstat.benchmarks.cost.split import Once, Split, split
 from tolstat.benchmarks.timing import Times, in_turn
-from tolstat.common.tables import RESULT, Options
+from tolstat.common.tables import KERNEL_RESULT, Options
 from tolstat.solver import simulation
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
     params, options = these
     scratch = simulation.scratch(options)
     state = scratch.state
-    out = np.zeros(1, RESULT).view(np.recarray)
+    out = np.zeros(1, KERNEL_RESULT).view(np.recarray)
     for i in range(min(n, len(params))):
         simulate_joint(params.view(np.recarray)[i], options, scratch, out[0])
         h = 2 * np.pi / (abs(float(params["omega"][i])) * options.steps_per_rev)
@@ -103,8 +103,8 @@ def _tally(these: Sample) -> NDArray[np.int64]:
     batch, tally = simulation.lanes(options), np.zeros(3, np.int64)
     batch.par.n_stations = params["n_stations"][0]
     words = params.view(np.float64).reshape(len(params), -1)
-    out = np.zeros(len(params), RESULT).view(np.recarray)
-    samples, blocks = make_samples(0, options.steps_per_rev), np.zeros((0, 0), RESULT).view(np.recarray)
+    out = np.zeros(len(params), KERNEL_RESULT).view(np.recarray)
+    samples, blocks = make_samples(0, options.steps_per_rev), np.zeros((0, 0), KERNEL_RESULT).view(np.recarray)
     rows = params.view(np.recarray)
     lockstep(rows, words, options, PATIENCE, simulation.scratch(options), batch, samples, blocks, out, tally)
     return tally

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tolstat.benchmarks.joints import Params, parameters
 from tolstat.benchmarks.timing import in_turn
-from tolstat.common.tables import RESULT, Fidelity, Method, Options, Status
+from tolstat.common.tables import RESULT, Fidelity, Method, Options, Status, for_kernels
 from tolstat.solver import simulation
 
 if TYPE_CHECKING:
@@ -91,11 +91,11 @@ def alone(params: Params, options: Options) -> NDArray[np.void]:
     """Simulate joints one after the other, without lanes; results, (n,) RESULT."""
     from tolstat.kernel.revolution.simulate import simulate_joint
 
-    results = np.zeros(len(params), RESULT).view(np.recarray)
-    rows = params.view(np.recarray)
+    results = np.zeros(len(params), RESULT)
+    rows, out = params.view(np.recarray), for_kernels(results)
     scratch = simulation.scratch(options)
     for i in range(len(params)):
-        simulate_joint(rows[i], options, scratch, results[i])
+        simulate_joint(rows[i], options, scratch, out[i])
     return results
 
 

@@ -1,8 +1,8 @@
 """The joint as a first-order system, y = (q, q'), for third-party integrators: rate, Jacobian, loads."""
 
 from tolstat.kernel.mechanics.dynamics import acceleration, forces
-from tolstat.kernel.mechanics.motion import speed_ratio
-from tolstat.kernel.mechanics.topology import N_DOF, PSI
+from tolstat.kernel.mechanics.loads import all_loads
+from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.simd.jit import njit
 
@@ -58,8 +58,8 @@ def jacobian_of_row(t, y, params, options, works, column, out):
 
 
 @njit
-def sample(times, states, par, work, loads, contact, psi):
-    """Evaluate the loads along a solution.
+def sample(times, states, par, work, value):
+    """Evaluate all loads along a solution.
 
     Parameters
     ----------
@@ -67,14 +67,9 @@ def sample(times, states, par, work, loads, contact, psi):
         The solution, s; m and rad, per s.
     par, work : records of PARAM and WORK
         The joint; scratch.
-    loads, contact, psi : ndarray, shapes (m, 8, 6), (m, 4, 3) and (m,)
-        Written: N, N m; N; Psi of eq. (13).
+    value : ndarray, shape (m, N_LOADS)
+        Written: as by `loads.all_loads`, SI.
     """
     for k in range(times.size):
         forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
-        for bushing in range(8):
-            copy(work.load[bushing], loads[k, bushing])
-        for pin in range(4):
-            copy(work.contact[pin], contact[k, pin])
-        tau = (work.shaft[0] + states[k, N_DOF + PSI]) / par.omega
-        psi[k] = (tau - speed_ratio(par.omega * times[k], par.alpha)) / tau
+        all_loads(0, par, work, states[k, N_DOF:], value[k])

@@ -12,7 +12,7 @@ lanes : tuple
 control, motion : records of CONTROL and MOTION
     Those of the batch, read joint by joint.
 samples, notes, fine, past, out
-    Those of the lane's joint, as in `settle.Ring` and `resolve.Past`, and its row of RESULT.
+    Those of the lane's joint, as in `settle.Ring` and `resolve.Past`, and its row of KERNEL_RESULT.
 """
 
 from tolstat.common.tables import MAX_ITERATIONS

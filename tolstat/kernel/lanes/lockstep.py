@@ -143,7 +143,7 @@ def next_closeup_step(lane, k, par, options, alone, batch, samples, out):
     lane, k : int
         Number of the lane; first step to consider, the one to sample `k`.
     par, out
-        The lane's joint and its row of RESULT.
+        The lane's joint and its row of KERNEL_RESULT.
     options, alone, batch
         As in `lockstep`.
     samples : ndarray of SAMPLE, shape (steps_per_rev,)
@@ -233,10 +233,10 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
         Memory of the lanes; nothing is carried over from one call to the next.
     samples : ndarray of SAMPLE, shape (n, steps_per_rev) or (0, steps_per_rev)
         Written unless empty: the last revolution of every joint.
-    blocks : ndarray of RESULT, shape (n, revolutions) or (0, revolutions)
+    blocks : ndarray of KERNEL_RESULT, shape (n, revolutions) or (0, revolutions)
         Written unless empty: statistics of the last revolutions of every joint with error-controlled steps; revolution
         r (from 0) at r modulo their number.
-    results : ndarray of RESULT, shape (n,)
+    results : ndarray of KERNEL_RESULT, shape (n,)
         Written.
     tally : ndarray of int, shape (3,)
         Counters, increased: rounds; lanes with a joint, summed over rounds; rounds with new tangents.

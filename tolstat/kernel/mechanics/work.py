@@ -7,7 +7,7 @@ took five times as long.)
 
 import numpy as np
 
-from tolstat.common.tables import MAX_STATIONS
+from tolstat.common.parameters import MAX_STATIONS
 from tolstat.kernel.mechanics.topology import N_BODIES, N_DOF, N_LUMPS
 
 # columns of work.station

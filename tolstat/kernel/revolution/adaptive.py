@@ -51,7 +51,7 @@ def build_resolve(newton, begin):
             Whether errors are checked and loads recorded; False for the neighbouring motion of `resolve`.
         fine : ndarray of SAMPLE, shape (3,)
             Scratch: the last parts.
-        extremes : record of RESULT
+        extremes : record of KERNEL_RESULT
             Written: largest and smallest loads of the cell.
         """
         whole = 1 << options.max_halvings

@@ -8,9 +8,9 @@ among the largest and smallest loads; the recorded samples stay as they are.
 
 import math
 
-from tolstat.common.tables import CONTACTS
 from tolstat.kernel.integrators.integrate import UNLIMITED
 from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD
+from tolstat.kernel.mechanics.loads import FORCES, INTERPOLATED, N_COURSES, N_LOADS, TORQUES
 from tolstat.kernel.revolution.settle import peak, record
 from tolstat.kernel.simd.jit import njit, njit_inner
 
@@ -34,19 +34,17 @@ def switches(s, samples):
 
 @njit
 def on_a_peak(s, samples, out):
-    """Whether any load has a kink between samples `s - 1` and `s` and is near its largest value there."""
+    """Whether any bushing load has a kink between samples `s - 1` and `s` and is near its largest value there."""
     n = samples.size
-    for kind in (0, 1):
-        largest = out.F_max if kind == 0 else out.T_max
+    for first in (FORCES, TORQUES):
         size = 0.0
-        for b in range(8):
-            size = max(size, largest[b])
-        for b in range(8):
-            m0, m1 = samples[s - 2].modulus[b, kind], samples[s - 1].modulus[b, kind]
-            m2, m3 = samples[s].modulus[b, kind], samples[(s + 1) % n].modulus[b, kind]
-            m4 = samples[(s + 2) % n].modulus[b, kind]
+        for i in range(first, first + 8):
+            size = max(size, out.largest[i])
+        for i in range(first, first + 8):
+            m0, m1 = samples[s - 2].value[i], samples[s - 1].value[i]
+            m2, m3, m4 = samples[s].value[i], samples[(s + 1) % n].value[i], samples[(s + 2) % n].value[i]
             kink = max(abs(m3 - m0 - 3 * (m2 - m1)), abs(m4 - m1 - 3 * (m3 - m2)))
-            if max(m1, m2, m3) > largest[b] - NEAR * size and kink > KINK * size:
+            if max(m1, m2, m3) > out.largest[i] - NEAR * size and kink > KINK * size:
                 return True
     return False
 
@@ -69,22 +67,14 @@ def height(before, here, ahead):
 def count_in(j, fine, out):
     """Update the extremes in `out` with sample `j` of the finer integration and the peak at sample `j - 1`, if any."""
     here, before, first = fine[j % 3], fine[(j - 1) % 3], fine[(j - 2) % 3]
-    for b in range(8):
-        for kind in (0, 1):
-            load = here.modulus[b, kind]
-            if j > 1:
-                load = max(load, height(first.modulus[b, kind], before.modulus[b, kind], load))
-            if kind == 0:
-                out.F_max[b], out.F_range[b] = extend(load, out.F_max[b], out.F_range[b])
-            else:
-                out.T_max[b], out.T_range[b] = extend(load, out.T_max[b], out.T_range[b])
-    for pin in range(4):
-        for i in range(len(CONTACTS)):
-            load = here.contact[pin, i]
-            if j > 1:
-                load = max(load, height(first.contact[pin, i], before.contact[pin, i], load))
-            out.contact_max[pin, i] = max(out.contact_max[pin, i], load)
-    out.psi_max = max(out.psi_max, abs(here.psi))
+    for i in range(N_LOADS):
+        load = here.value[i]
+        if j > 1 and INTERPOLATED[i]:
+            load = max(load, height(first.value[i], before.value[i], load))
+        if i < N_COURSES:
+            out.largest[i], out.reach[i] = extend(load, out.largest[i], out.reach[i])
+        else:
+            out.largest[i] = max(out.largest[i], load)
 
 
 def build_closeup(advance, acceleration):
@@ -103,7 +93,7 @@ def build_closeup(advance, acceleration):
         Restores recorded sample `s` as the last accepted point; `h` is the step of the output grid, s.
     look_closer : jitted function (par, options, work, state, samples, fine, out) -> None
         Integrates the steps around switches on peaks of the recorded revolution again, each in
-        ``options.peak_substeps`` parts, and extends the extremes in `out`, a row of RESULT. The work is added to
+        ``options.peak_substeps`` parts, and extends the extremes in `out`, a row of KERNEL_RESULT. The work is added to
         ``state.counters``.
     """
 

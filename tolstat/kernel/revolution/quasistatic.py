@@ -11,6 +11,7 @@ where pseudo-transient continuation leads from there.
 import math
 
 from tolstat.kernel.integrators.state import AHEAD, HALVINGS, STEPS
+from tolstat.kernel.mechanics.loads import FORCES, SPEED_ERROR, TORQUES
 from tolstat.kernel.mechanics.motion import speed_ratio
 from tolstat.kernel.mechanics.topology import PSI
 from tolstat.kernel.mechanics.vector import larger
@@ -81,7 +82,7 @@ def end_closure(samples):
         largest = 0.0
         for s in range(samples.size):
             for b in range(8):
-                largest = max(largest, samples[s].modulus[b, kind])
+                largest = max(largest, samples[s].value[(FORCES, TORQUES)[kind] + b])
         change = samples[0].change[kind]
         worst = larger(worst, change / largest if largest > 0 else change)
     return worst
@@ -89,9 +90,10 @@ def end_closure(samples):
 
 @njit
 def speed_ratios(par, samples):
-    """Write ``tau`` and ``psi``, eq. (13), of the samples; ``tau`` holds the output shaft's angular deviation before.
+    """Write ``tau`` and its error |Psi|, eq. (13), of the samples.
 
-    The derivative of the deviation with respect to the input angle is taken by periodic central differences.
+    Before, ``tau`` holds the output shaft's angular deviation. Its derivative with respect to the input angle is taken
+    by periodic central differences.
     """
     n = samples.size
     by_sample = n / (4 * math.pi) if par.omega > 0 else -n / (4 * math.pi)
@@ -101,7 +103,7 @@ def speed_ratios(par, samples):
         slope = (ahead - before) * by_sample
         before = here
         samples[s].tau = speed_ratio(2 * math.pi * s / n, par.alpha) + slope
-        samples[s].psi = slope / samples[s].tau
+        samples[s].value[SPEED_ERROR] = abs(slope / samples[s].tau)
 
 
 def build_quasistatic(hold, relax, record):

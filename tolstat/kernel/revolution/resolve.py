@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import CONTACTS, RESULT, Fidelity, Method, Motion, Options, Status
+from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Motion, Options, Status
 from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
 from tolstat.kernel.integrators.state import STAGED_STEP, TOLERANCE
+from tolstat.kernel.mechanics.loads import FORCES, N_COURSES, N_LOADS, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
 from tolstat.kernel.mechanics.vector import copy
@@ -71,7 +72,7 @@ TURNS = np.dtype(
         ("period", "i8"),  # period found with the tolerance before, revolutions; 0: none
         ("beside", "i8"),  # 1 while the neighbouring motion is integrated
         ("growth", "f8"),  # sum of the logarithms of its growth
-        ("before", "f8", (8, 2)),  # largest |F|, |T| with the tolerance before
+        ("before", "f8", N_COURSES),  # largest bushing loads with the tolerance before
         ("other", "f8", (3, N_DOF)),  # q, v, a of the neighbour; of the joint while `beside` is 1
     ]
 )
@@ -82,7 +83,7 @@ class Past(NamedTuple):
 
     trail: Trail
     turns: np.record  # TURNS
-    extremes: np.recarray  # (2,) RESULT: largest and smallest loads of the current cell and revolution
+    extremes: np.recarray  # (2,) KERNEL_RESULT: largest and smallest loads of the current cell and revolution
     begun: np.ndarray  # (3, N_DOF) q, v, a at the start of the current cell
     mesh: np.recarray  # (cells,) CELL
 
@@ -105,7 +106,8 @@ class Pasts(NamedTuple):
 def make_pasts(joints: int, options: Options) -> Pasts:
     """Allocate for several joints."""
     trails = make_trails(joints, options.steps_per_rev, revolutions_kept(options))
-    turns, extremes = np.zeros(joints, TURNS).view(np.recarray), np.zeros((joints, 2), RESULT).view(np.recarray)
+    turns = np.zeros(joints, TURNS).view(np.recarray)
+    extremes = np.zeros((joints, 2), KERNEL_RESULT).view(np.recarray)
     cells = options.steps_per_rev * cells_of(options.steps_per_rev)
     mesh = np.zeros((joints, cells), CELL).view(np.recarray)
     return Pasts(*trails, turns, extremes, np.zeros((joints, 3, N_DOF)), mesh)
@@ -152,31 +154,21 @@ def begin_turns(par, options, memory, weight, past):
 @njit
 def clear_extremes(extremes):
     """Reset largest and smallest loads."""
-    extremes.psi_max = 0.0
-    for b in range(8):
-        extremes.F_max[b] = extremes.T_max[b] = 0.0
-        extremes.F_range[b] = extremes.T_range[b] = -np.inf
-    for pin in range(4):
-        for i in range(len(CONTACTS)):
-            extremes.contact_max[pin, i] = 0.0
+    for i in range(N_LOADS):
+        extremes.largest[i] = 0.0
+    for i in range(N_COURSES):
+        extremes.reach[i] = -np.inf
 
 
 @njit
 def merge_extremes(one, out):
     """Include the extremes `one` in those of `out`."""
-    for b in range(8):
-        low = one.F_max[b] - one.F_range[b], one.T_max[b] - one.T_range[b]
-        for kind in (0, 1):
-            if kind == 0:
-                top, reach = extend(one.F_max[b], out.F_max[b], out.F_range[b])
-                out.F_max[b], out.F_range[b] = top, max(reach, top - low[0])
-            else:
-                top, reach = extend(one.T_max[b], out.T_max[b], out.T_range[b])
-                out.T_max[b], out.T_range[b] = top, max(reach, top - low[1])
-    for pin in range(4):
-        for i in range(len(CONTACTS)):
-            out.contact_max[pin, i] = max(out.contact_max[pin, i], one.contact_max[pin, i])
-    out.psi_max = max(out.psi_max, one.psi_max)
+    for i in range(N_COURSES):
+        low = one.largest[i] - one.reach[i]
+        top, reach = extend(one.largest[i], out.largest[i], out.reach[i])
+        out.largest[i], out.reach[i] = top, max(reach, top - low)
+    for i in range(N_COURSES, N_LOADS):
+        out.largest[i] = max(out.largest[i], one.largest[i])
 
 
 @njit
@@ -192,20 +184,18 @@ def keep_revolution(samples, extremes, trail, r):
     clear_extremes(extremes)
     stride = -(-samples.size // trail.modulus.shape[1])
     for s in range(0, samples.size, stride):
-        for b in range(8):
-            copy(samples[s].modulus[b], trail.modulus[r % trail.revolution.size, s // stride, b])
+        copy(samples[s].value[:N_COURSES], trail.modulus[r % trail.revolution.size, s // stride])
     return own
 
 
 @njit
 def largest_change(before, out):
-    """Largest change of any largest load against `before`, (8, 2), relative to the largest of the kind."""
+    """Largest change of any largest bushing load against `before`, relative to the largest of the kind."""
     worst = 0.0
-    for kind in (0, 1):
+    for first in (FORCES, TORQUES):
         change = size = 0.0
-        for b in range(8):
-            load = out.F_max[b] if kind == 0 else out.T_max[b]
-            change, size = max(change, abs(load - before[b, kind])), max(size, load)
+        for i in range(first, first + 8):
+            change, size = max(change, abs(out.largest[i] - before[i])), max(size, out.largest[i])
         worst = max(worst, change / size if size > 0 else 0.0)
     return worst
 
@@ -229,8 +219,7 @@ def tighten(period, options, memory, mesh, turns, out):
     """Tighten the tolerance; keep `period` and the largest loads in `out` for comparison."""
     memory[TOLERANCE] /= TIGHTER
     refine_mesh(mesh)
-    for b in range(8):
-        turns.before[b, 0], turns.before[b, 1] = out.F_max[b], out.T_max[b]
+    copy(out.largest[:N_COURSES], turns.before)
     turns.tightened += 1
     turns.since, turns.period = turns.revolution, period
     turns.limit = max(turns.limit, turns.revolution + SETTLING)
@@ -349,7 +338,7 @@ def after_revolution(point, memory, weight, iterations, par, options, samples, p
         The revolution just made.
     past : Past
         Data of the joint; updated.
-    out : record of RESULT
+    out : record of KERNEL_RESULT
         Updated; complete when the joint has ended.
 
     Returns
@@ -373,7 +362,7 @@ def after_revolution(point, memory, weight, iterations, par, options, samples, p
     turns.revolution += 1
     own = keep_revolution(samples, past.extremes[1], trail, last)
     out.revolutions = turns.revolution
-    force, torque = own.F_max.max(), own.T_max.max()
+    force, torque = own.largest[FORCES : FORCES + 8].max(), own.largest[TORQUES : TORQUES + 8].max()
     if not (force < 1e300 and torque < 1e300):
         return NOT_FINITE, False
     force, torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)

@@ -5,9 +5,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import CONTACTS
+from tolstat.kernel.mechanics.loads import (
+    FORCES,
+    INTERPOLATED,
+    N_COURSES,
+    N_LOADS,
+    TORQUES,
+    modulus,
+    other_loads,
+    output_speed,
+)
 from tolstat.kernel.mechanics.scale import stiffness
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PSI
+from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.revolution.trail import make_notes
@@ -18,11 +27,9 @@ from tolstat.kernel.simd.lane import pick
 SAMPLE = np.dtype(
     [
         ("loads", "f8", (8, 6)),  # N, N m
-        ("contact", "f8", (4, len(CONTACTS))),  # N
-        ("modulus", "f8", (8, 2)),  # |F|, |T|
+        ("value", "f8", (N_LOADS,)),  # of every load, kind after kind
         ("change", "f8", (2,)),  # largest change of |F| and |T| against the revolution before
         ("tau", "f8"),
-        ("psi", "f8"),  # Psi, eq. (13)
         ("mode", "u1", (4,)),
         ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
         ("q", "f8", (N_DOF,)),  # m, rad
@@ -73,7 +80,7 @@ def pressed(pin, lane, par, work):
 
 @njit
 def record(k, lane, in_full, par, work, v, samples):
-    """Record the loads of a grid point, and their change since the revolution before.
+    """Record the loads of a grid point, and the change of the bushing loads since the revolution before.
 
     Parameters
     ----------
@@ -94,31 +101,23 @@ def record(k, lane, in_full, par, work, v, samples):
     """
     sample = samples[k % samples.size]
     fetch(samples[(k + 2) % samples.size])
-    of_force = of_torque = 0.0
-    for b in range(8):
-        for kind in (0, 1):
-            square = 0.0
-            for i in range(3):
-                load = pick(work.load[b, 3 * kind + i], lane)
-                square += load * load
-                if in_full:
-                    sample.loads[b, 3 * kind + i] = load
-            modulus = math.sqrt(square)
-            change = abs(modulus - sample.modulus[b, kind])  # NaN in the first revolution
-            of_force = larger(of_force, change) if kind == 0 else of_force
-            of_torque = larger(of_torque, change) if kind == 1 else of_torque
-            sample.modulus[b, kind] = modulus
-    sample.change[0], sample.change[1] = of_force, of_torque
+    for kind in (0, 1):
+        change = 0.0
+        for b in range(8):
+            i, load = (FORCES, TORQUES)[kind] + b, modulus(3 * kind, b, lane, work)
+            change = larger(change, abs(load - sample.value[i]))  # NaN in the first revolution
+            sample.value[i] = load
+        sample.change[kind] = change
     if not in_full:
         return
+    other_loads(lane, par, work, v, sample.value)
+    for b in range(8):
+        for i in range(6):
+            sample.loads[b, i] = pick(work.load[b, i], lane)
     for pin in range(4):
-        for i in range(len(CONTACTS)):
-            sample.contact[pin, i] = pick(work.contact[pin, i], lane)
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin] = pressed(pin, lane, par, work)
-    omega, rate = pick(par.omega, lane), pick(v[PSI], lane)
-    sample.tau = (pick(work.shaft[0], lane) + rate) / omega
-    sample.psi = rate / (omega * sample.tau)  # eq. (13)
+    sample.tau, _ = output_speed(lane, par, work, v)
 
 
 @njit
@@ -161,7 +160,7 @@ def closure_error(samples):
         for s in range(samples.size):
             change = larger(change, samples[s].change[kind])
             for b in range(8):
-                largest = max(largest, samples[s].modulus[b, kind])
+                largest = max(largest, samples[s].value[(FORCES, TORQUES)[kind] + b])
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
     return worst
@@ -202,7 +201,7 @@ def step_error(par, samples, out):
     """
     force = torque = 0.0
     for b in range(8):
-        force, torque = max(force, out.F_max[b]), max(torque, out.T_max[b])
+        force, torque = max(force, out.largest[FORCES + b]), max(torque, out.largest[TORQUES + b])
     total = 0.0
     for s in range(samples.size):
         q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q
@@ -221,27 +220,24 @@ def step_error(par, samples, out):
 
 @njit
 def summarise(samples, out):
-    """Write the statistics of the recorded revolution to a row of RESULT."""
+    """Write the statistics of the recorded revolution to a row of KERNEL_RESULT."""
     n = samples.size
-    for b in range(8):
-        for kind in (0, 1):
-            top, low = extremes(samples.modulus[:, b, kind])
-            low = max(low, 0.0)
+    for i in range(N_LOADS):
+        if i < N_COURSES:
+            top, low = extremes(samples.value[:, i])
             total = 0.0
             for s in range(n):
-                total += samples[s].modulus[b, kind]
-            if kind == 0:
-                out.F_max[b], out.F_mean[b], out.F_range[b] = top, total / n, top - low
-            else:
-                out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / n, top - low
-    out.psi_max = 0.0
+                total += samples[s].value[i]
+            out.largest[i], out.average[i], out.reach[i] = top, total / n, top - max(low, 0.0)
+        elif INTERPOLATED[i]:
+            out.largest[i], _ = extremes(samples.value[:, i])
+        else:
+            out.largest[i] = 0.0
+            for s in range(n):
+                out.largest[i] = max(out.largest[i], samples[s].value[i])
     for pin in range(4):
-        for i in range(len(CONTACTS)):
-            out.contact_max[pin, i], _ = extremes(samples.contact[:, pin, i])
         for mode in range(4):
             count = 0
             for s in range(n):
                 count += samples[s].mode[pin] == mode
             out.mode_share[pin, mode] = count / n
-    for s in range(n):
-        out.psi_max = max(out.psi_max, abs(samples[s].psi))

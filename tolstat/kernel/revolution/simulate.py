@@ -5,13 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import CONTACTS, MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
+from tolstat.common.tables import MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
 from tolstat.kernel.integrators import integrate
 from tolstat.kernel.integrators.mesh import parts_of
 from tolstat.kernel.integrators.state import AHEAD, FACTORISATIONS, HALVINGS, ITERATIONS, STEPS, make_state_record
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.guess import rigid_guess
 from tolstat.kernel.mechanics.ideal_loads import ideal_loads
+from tolstat.kernel.mechanics.loads import N_COURSES, N_LOADS
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import make_work
@@ -85,18 +86,17 @@ def inside_model(par):
 
 @njit
 def clear_results(out):
-    """Reset a row of RESULT: NaN in what may not be computed, zero in the counters."""
+    """Reset a row of KERNEL_RESULT: NaN in what may not be computed, zero in the counters."""
     nan = np.nan
     out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
     out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
-    out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = out.psi_max = nan
+    out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = nan
     out.step_error = out.refinement_change = nan
-    for b in range(8):
-        out.F_max[b] = out.F_mean[b] = out.F_range[b] = nan
-        out.T_max[b] = out.T_mean[b] = out.T_range[b] = nan
+    for i in range(N_LOADS):
+        out.largest[i] = nan
+    for i in range(N_COURSES):
+        out.average[i] = out.reach[i] = nan
     for pin in range(4):
-        for k in range(len(CONTACTS)):
-            out.contact_max[pin, k] = nan
         for k in range(4):
             out.mode_share[pin, k] = nan
 
@@ -110,7 +110,7 @@ def clear(par, state, samples, notes):
     state.a0[:] = 0.0
     reset(state)
     for s in range(samples.size):
-        samples[s].modulus[:] = np.nan
+        samples[s].value[:N_COURSES] = np.nan
     notes.count = 0
 
 
@@ -191,7 +191,7 @@ def check_settled(k, iterations, options, samples, notes, out):
         Numerical settings.
     samples, notes
         As in `settle.Ring`; the closure error is noted.
-    out : record of RESULT
+    out : record of KERNEL_RESULT
         ``closure`` and ``revolutions`` are written.
     """
     n = options.steps_per_rev
@@ -225,11 +225,11 @@ def run_dynamic(par, options, work, state, ring, out):
 
 @njit
 def is_finite(out):
-    """Whether the load statistics of a joint are finite."""
-    for b in range(8):
-        if not (out.F_max[b] < 1e300 and out.T_max[b] < 1e300 and out.F_mean[b] + out.T_mean[b] < 1e300):
-            return False
-    return True
+    """Whether the statistics of the bushing loads of a joint are finite."""
+    good = True
+    for i in range(N_COURSES):
+        good = good and out.largest[i] < 1e300 and out.average[i] < 1e300
+    return good
 
 
 @njit
@@ -282,7 +282,7 @@ def simulate_joint(par, options, alone, out):
         Numerical settings.
     alone : Scratch
         Work arrays; nothing is carried over from one joint to the next. The ring holds the last revolution.
-    out : record of RESULT
+    out : record of KERNEL_RESULT
         Written: status, and NaN in what was not computed.
     """
     work, state, ring, past = alone

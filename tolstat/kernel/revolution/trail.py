@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import CONTACTS, RESULT
-from tolstat.kernel.mechanics.vector import copy, larger
+from tolstat.common.tables import KERNEL_RESULT
+from tolstat.kernel.mechanics.loads import FORCES, N_COURSES, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit
 
 MOST_ANGLES = 360
@@ -26,16 +27,16 @@ NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
 class Trail(NamedTuple):
     """Work arrays; revolution r lies at index r modulo the number kept."""
 
-    modulus: np.ndarray  # (kept, angles, 8, 2) |F|, |T|
-    revolution: np.ndarray  # (kept,) record of RESULT: statistics of each revolution
+    modulus: np.ndarray  # (kept, angles, N_COURSES) moduli of the bushing loads
+    revolution: np.ndarray  # (kept,) record of KERNEL_RESULT: statistics of each revolution
     notes: np.record  # NOTES
 
 
 def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
     """Allocate the arrays of several trails, for `kept` revolutions."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
-    modulus = np.full((joints, kept, angles, 8, 2), np.nan)
-    return modulus, np.zeros((joints, kept), RESULT).view(np.recarray), make_notes(joints)
+    modulus = np.full((joints, kept, angles, N_COURSES), np.nan)
+    return modulus, np.zeros((joints, kept), KERNEL_RESULT).view(np.recarray), make_notes(joints)
 
 
 def make_notes(joints: int) -> np.recarray:
@@ -88,12 +89,12 @@ def lag_closure(last, lag, trail):
     kept, angles = trail.modulus.shape[0], trail.modulus.shape[1]
     now, before = trail.modulus[last % kept], trail.modulus[(last - lag) % kept]
     worst = 0.0
-    for kind in (0, 1):
+    for first in (FORCES, TORQUES):
         change = largest = 0.0
         for s in range(angles):
-            for b in range(8):
-                change = larger(change, abs(now[s, b, kind] - before[s, b, kind]))
-                largest = max(largest, now[s, b, kind])
+            for i in range(first, first + 8):
+                change = larger(change, abs(now[s, i] - before[s, i]))
+                largest = max(largest, now[s, i])
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
     return worst
@@ -101,32 +102,20 @@ def lag_closure(last, lag, trail):
 
 @njit
 def combine(last, count, trail, out):
-    """Write the statistics over the `count` revolutions up to `last` (from 0) to `out`, a row of RESULT."""
+    """Write the statistics over the `count` revolutions up to `last` (from 0) to `out`, a row of KERNEL_RESULT."""
     kept = trail.revolution.size
-    first = trail.revolution[last % kept]
-    for b in range(8):
-        for kind in (0, 1):
-            top, low, total = 0.0, np.inf, 0.0
-            for r in range(last - count + 1, last + 1):
-                one = trail.revolution[r % kept]
-                if kind == 0:
-                    most, mean, reach = one.F_max[b], one.F_mean[b], one.F_range[b]
-                else:
-                    most, mean, reach = one.T_max[b], one.T_mean[b], one.T_range[b]
-                top, low, total = max(top, most), min(low, most - reach), total + mean
-            if kind == 0:
-                out.F_max[b], out.F_mean[b], out.F_range[b] = top, total / count, top - low
-            else:
-                out.T_max[b], out.T_mean[b], out.T_range[b] = top, total / count, top - low
-    out.psi_max = first.psi_max
-    for pin in range(4):
-        copy(first.contact_max[pin], out.contact_max[pin])
+    for i in range(N_LOADS):
+        top, low, total = trail.revolution[last % kept].largest[i], np.inf, 0.0
+        for r in range(last - count + 1, last + 1):
+            one = trail.revolution[r % kept]
+            top = max(top, one.largest[i])
+            if i < N_COURSES:
+                low, total = min(low, one.largest[i] - one.reach[i]), total + one.average[i]
+        out.largest[i] = top
+        if i < N_COURSES:
+            out.average[i], out.reach[i] = total / count, top - low
     out.mode_share[:] = 0.0
     for r in range(last - count + 1, last + 1):
-        one = trail.revolution[r % kept]
-        out.psi_max = max(out.psi_max, one.psi_max)
         for pin in range(4):
-            for i in range(len(CONTACTS)):
-                out.contact_max[pin, i] = max(out.contact_max[pin, i], one.contact_max[pin, i])
             for mode in range(4):
-                out.mode_share[pin, mode] += one.mode_share[pin, mode] / count
+                out.mode_share[pin, mode] += trail.revolution[r % kept].mode_share[pin, mode] / count

@@ -24,6 +24,8 @@ except ImportError:  # Numba's internals differ: compile each function separatel
     from numba.core.registry import CPUDispatcher as Kernel
 
 KERNEL = Path(__file__).parent.parent
+TABLES = ("fields.py", "parameters.py", "tables.py")
+"""Files of ``common/`` that the layout of the tables follows from."""
 OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
 """No ``fastmath``: it removes the checks for NaN. No ``parallel``: the work is divided among processes."""
 
@@ -31,7 +33,7 @@ OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastm
 def source_hash() -> str:
     """Hash of everything that compiled kernels depend on: the kernel's sources and the tables' layout."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in [*sorted(KERNEL.rglob("*.py")), KERNEL.parent / "common" / "tables.py"]:
+    for path in [*sorted(KERNEL.rglob("*.py")), *(KERNEL.parent / "common" / name for name in TABLES)]:
         digest.update(path.relative_to(KERNEL.parent).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

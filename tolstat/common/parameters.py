@@ -1,0 +1,47 @@
+"""Parameters of one joint for the kernel, which the table PARAM holds."""
+
+from __future__ import annotations
+
+from tolstat.common.fields import Field
+
+MAX_STATIONS = 16
+"""Maximum number of contact stations of a pin."""
+
+PARAM_FIELDS = (
+    Field("alpha", "rad", "misalignment"),
+    Field("omega", "rad/s", "angular velocity of the input shaft"),
+    Field("torque", "N*m", "resisting torque T_r"),
+    Field("Js", "kg*m^2", "inertia of the output shaft"),
+    Field("R", "m", "distance of the pins' and arms' reference points from O"),
+    Field("r_b", "m", "distance of the cross bushings' markers from O"),
+    Field("l_f", "m", "distance of the fork bushings' markers from the hole centre along z"),
+    Field("hub_mass", "kg", "mass of the hub"),
+    Field("hub_inertia", "kg*m^2", "inertia of the hub about x, y, z of C", shape=(3,)),
+    Field("pin_mass", "kg", "mass of a pin"),
+    Field("pin_inertia", "kg*m^2", "inertia of a pin about e, t, z", shape=(3,)),
+    Field("arm_mass", "kg", "mass of an arm"),
+    Field("arm_inertia", "kg*m^2", "inertia of an arm about e, t, z", shape=(3,)),
+    Field("k_cross", "N/m, N*m/rad", "cross bushing stiffness: force e, t, z, torque e, t, z", shape=(6,)),
+    Field("c_cross", "N*s/m, N*m*s/rad", "cross bushing damping, same order", shape=(6,)),
+    Field("k_fork", "N/m, N*m/rad", "fork bushing stiffness, same order", shape=(6,)),
+    Field("c_fork", "N*s/m, N*m*s/rad", "fork bushing damping, same order", shape=(6,)),
+    Field("c_d", "N*s/m", "normal contact damping"),
+    Field("c_t", "N*s/m", "tangential contact damping (lubricant film)"),
+    Field("delta_d", "m", "penetration over which contact damping rises"),
+    Field("n_stations", "1", "contact stations per pin", "i8"),
+    Field("station_s", "m", "signed distance of each station from P along the pin, falling", shape=(MAX_STATIONS,)),
+    Field("station_k1", "N/m^2", "quadratic coefficient of each station's force", shape=(MAX_STATIONS,)),
+    Field("station_k2", "N/m", "linear coefficient of each station's force", shape=(MAX_STATIONS,)),
+    Field("station_weight", "1", "weight of each station's damping and film", shape=(MAX_STATIONS,)),
+    Field("clearance", "m", "radial clearance c of each pin", shape=(4,)),
+    Field("pin_point", "m", "P less the pin's reference point, in axes of C", shape=(4, 3)),
+    Field("pin_axis", "1", "direction of the pin axis, in axes of C", shape=(4, 3)),
+    Field(
+        "hole_point",
+        "m",
+        "hole centre less the arm's reference point, in axes of the arm's frame",
+        shape=(4, 3),
+    ),
+    Field("hole_axis", "1", "direction of the hole axis, in axes of the arm's frame", shape=(4, 3)),
+)
+"""Parameters of one joint for the kernel. Pin fields are indexed by pin, hole fields by arm (hole k: arm k)."""

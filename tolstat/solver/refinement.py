@@ -25,8 +25,8 @@ steps do not resolve decays. With fewer steps a revolution than the second numbe
 of the step, as the error of smooth motion does."""
 SWINGING_PSI, SWINGING_STEP_ERROR = 1.5e-3, 1e-3
 """|Psi| above which the output shaft swings about the ideal motion, and the mean error above which such a joint is
-refined: errors of a swinging motion decay slowly, and BDF2 damps it. Both numbers come from 2759 joints that were solved both
-ways, at 10, 30 and 100 N m and of the fuzz tests: of those not refined the worst is 0.8 % off."""
+refined: errors of a swinging motion decay slowly, and BDF2 damps it. Both numbers come from 2759 joints that were
+solved both ways, at 10, 30 and 100 N m and of the fuzz tests: of those not refined the worst is 0.8 % off."""
 MAX_CHANGE = 0.05
 """Change of the largest loads by the last tolerance above which a joint is not resolved. TR-BDF2 leaves a third of it
 as error, or less."""

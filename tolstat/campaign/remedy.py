@@ -17,9 +17,7 @@ WITHOUT_RESULTS = {
     Status.TIMEOUT: 'simulate it again with more time: tolstat run STUDY --retry timeout --joint-timeout "1 h"',
     Status.CRASHED: "simulate it again: tolstat run STUDY --retry crashed; if it crashes again, report the error",
     Status.INVALID_INPUT: "a parameter is not finite: check the tolerances in the study",
-    Status.OUTSIDE_MODEL: (
-        "negative clearance, |alpha| >= 90 deg, no speed or no stiffness: change the joint or its tolerances"
-    ),
+    Status.OUTSIDE_MODEL: "negative clearance, |alpha| >= 90 deg, no speed or no stiffness: change joint or tolerances",
 }
 """Remedies that do not depend on the results of the joint."""
 

@@ -46,8 +46,8 @@ LIMITS = (
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("share", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
-    Column("with failed, unsettled", _outer, shown=_has_unresolved),
-    Column("and numerical error", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=_has_error),
+    Column("with unresolved joints", _outer, shown=_has_unresolved),
+    Column("total interval", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=_has_error),
 )
 """Columns of the table `query.limits`. Joints above are counted among the valid ones, as the share is; the last two
 columns count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""

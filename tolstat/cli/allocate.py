@@ -25,7 +25,7 @@ def allocate(
         typer.Option(
             "--costs",
             metavar="TABLE",
-            help="Cost of each tolerance, TOML or CSV (see docs/statistics.md); default: cost inversely proportional "
+            help="Cost of each tolerance, TOML or CSV (see docs/questions/allocate.md); default: cost inversely proportional "
             "to the tolerance.",
         ),
     ] = None,

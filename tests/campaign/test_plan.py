@@ -19,8 +19,9 @@ from tolstat.analysis import exceedance, quantile
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import Status
-from tolstat.store import ResultStore, view
+from tolstat.store import ResultStore
 
 RULE = "P(cross1.F > 0.5 N) width < 0.4"
 """Nearly one in five of the fake joints is unresolved, and counts at both ends of the interval."""
@@ -203,7 +204,7 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
     with ResultStore.open(tmp_path / "a.h5") as store:
         results = store.results()[1:]
     for limit in made.limits:
-        found = exceedance.at(view.load(results, limit.load)[0], results["status"], limit.level)
+        found = exceedance.at(LOADS[limit.load].of(results), results["status"], limit.level)
         assert found.upper - found.lower <= limit.width + 1e-12
     large = plan.plan(dataclasses.replace(small, sampling=small.sampling.model_copy(update={"n": 10**6})), pilot=2)
     assert large.rows == 10**6 + 1

@@ -220,7 +220,7 @@ def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:
     with ResultStore.open(tmp_path / "subset.h5") as store:
         view = store.view()
         assert [joint.row for joint in worst_joints(view, "cross1.F", 1).joints] == [np.argmax(results["F_max"][:, 0])]
-        with pytest.raises(StoreError, match="no sample"):
+        with pytest.raises(StoreError, match="no random sample"):
             view.load("cross1.F")
 
 

@@ -105,6 +105,11 @@ class Study:
         return Sampling(n=self.samples, seed=self.seed)
 
     @property
+    def first_sample(self) -> int:
+        """Row of the first random joint."""
+        return self.sampling.first_sample
+
+    @property
     def rows(self) -> int:
         """Number of rows of every table."""
         return self.n

@@ -25,8 +25,8 @@ def allocate(
         typer.Option(
             "--costs",
             metavar="TABLE",
-            help="Cost of each tolerance, TOML or CSV (see docs/questions/allocate.md); default: cost inversely proportional "
-            "to the tolerance.",
+            help="Cost of each tolerance, TOML or CSV (see docs/questions/allocate.md); default: cost inversely "
+            "proportional to the tolerance.",
         ),
     ] = None,
     keep: Annotated[

@@ -97,7 +97,6 @@ class Study:
     variants: tuple[()] = ()
     case_names: tuple[()] = ()
     joint: Dump = field(default_factory=lambda: Dump(material=Dump(E="2.1e11 Pa")))
-    first_sample: int = 1
 
     @property
     def sampling(self) -> Sampling:

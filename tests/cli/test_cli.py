@@ -68,7 +68,6 @@ def test_every_command_has_help_with_every_option_explained(command):
     assert done.exit_code == 0
     text, options = done.stdout.split("Options:")
     lines = [line for line in options.splitlines() if line.startswith("  --")]
-    assert lines
     for line in lines:
         assert re.search(r"--[\w-]+( \S+)?( / --[\w-]+)?\s{2,}\S", line + "  ." * line.endswith("report")), line
     assert text.startswith(f"Usage: tolstat {command} [OPTIONS]")

@@ -74,13 +74,20 @@ class Reading(HTMLParser):
         assert self.open.pop() == tag
 
 
+def among(sections, wanted):
+    """Whether the sections wanted are there, in this order; questions may add others."""
+    return [section for section in sections if section in wanted] == wanted
+
+
 def test_page_is_well_formed_and_loads_nothing(html):
     read = Reading(html)
     assert len(set(read.names)) == len(read.names)
     assert all(link.startswith(("#", "data:")) for link in read.links)
     assert {link[1:] for link in read.links if link.startswith("#")} <= set(read.names)
     assert not re.search(r"@import|url\((?!#)|fetch\(|XMLHttp", html)
-    assert read.sections == ["verdict", "exceedance", "capability", "causes", "worst", "modes", "failed", "provenance"]
+    assert among(
+        read.sections, ["verdict", "exceedance", "capability", "causes", "worst", "modes", "failed", "provenance"]
+    )
 
 
 def test_every_picture_has_a_title_and_a_description(html):
@@ -276,7 +283,9 @@ def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
     path = synthetic.store(tmp_path, text, failed=3)
     page.write(path, tmp_path / "page.html", accepted=0.05, replay=0)
     html = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert Reading(html).sections == ["verdict", "exceedance", "worst", "modes", "failed", "provenance"]
+    sections = Reading(html).sections
+    assert among(sections, ["verdict", "exceedance", "worst", "modes", "failed", "provenance"])
+    assert not {"capability", "causes"} & set(sections)
     with ResultStore.open(path) as store:
         weights, results = store.origin()["weight"][1:], store.results()[1:]
     valid = results["status"] == Status.OK

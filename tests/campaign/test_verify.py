@@ -16,7 +16,7 @@ from tolstat.analysis import accuracy
 from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.tables import LOAD_KINDS, Method, Options, Start, Status
+from tolstat.common.tables import LOAD_KINDS, Method, Options, Simulation, Start, Status
 from tolstat.questions.accuracy import query as tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.exceedance import query as exceedance
@@ -182,6 +182,20 @@ def test_a_run_can_do_without(tmp_path):
     campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages(), check=False)
     with ResultStore.open(tmp_path / "a.h5") as store:
         assert verification.read(store) is None
+
+
+def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path):
+    (tmp_path / "plan.toml").write_text(synthetic.STUDY, encoding="utf-8")
+    plan, rows, results = study.load(tmp_path / "plan.toml"), range(20, 30), synthetic.results(61)[20:30]
+    with ResultStore.create(tmp_path / "b.h5", plan, sampling.draw(plan, rows), rows=rows) as store:
+        store.write(np.arange(10), Simulation(results, None))
+        solve = lambda slots, *_, **__: Simulation(results[slots], None)  # noqa: E731
+        checked = verify.check_campaign(store, lambda slots: slots, ("newton",), 3, 7, solve)
+        verification.write(store, checked)
+    with ResultStore.open(tmp_path / "b.h5") as store:
+        found = verification.read(store)
+    assert set(found.rows.tolist()) <= set(rows)
+    np.testing.assert_array_equal(found.base, results[found.rows - 20])
 
 
 def off_by(path, factor, rows=(5, 9)):

@@ -204,15 +204,15 @@ def check_campaign(
     settled = np.flatnonzero(store.status() == Status.OK)
     if joints is not None and len(settled) > 1:
         settled = settled[settled >= store.first_sample]  # the nominal joint is not in the statistics either
-    rows = choose(settled, joints, seed)
-    if not rows.size:
+    slots = choose(settled, joints, seed)
+    if not slots.size:
         return None
-    options = [recorded.options_of(store, row) for row in rows.tolist()]
-    checks = run_checks(parameters(rows), options, names, simulate, workers, progress)
+    options = [recorded.options_of(store, slot) for slot in slots.tolist()]
+    checks = run_checks(parameters(slots), options, names, simulate, workers, progress)
     for check in checks.values():
         selected_results.blank_others(check.results, store.columns)
-    base = np.concatenate([store.results(slice(row, row + 1)) for row in rows.tolist()])
-    return Verification(seed, rows, base, checks)
+    base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in slots.tolist()])
+    return Verification(seed, store.row(slots), base, checks)
 
 
 def check_few(store: ResultStore, parameters: Callable[..., NDArray[np.void]], simulate: Simulate) -> None:

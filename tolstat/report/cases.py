@@ -82,9 +82,10 @@ def reference(store: ResultStore) -> dict[str, object]:
         return {}
     true = found.checks[accuracy.REFERENCE].results
     error, change, state = np.full((store.n, 2), np.nan), np.full(store.n, np.nan), np.full(store.n, "", object)
-    error[found.rows] = accuracy.by_kind(accuracy.differences(found.base, true))[:, :2]
-    change[found.rows] = true["closure"]
-    state[found.rows] = [Status(int(code)).label for code in true["status"]]
+    slots = store.slot(found.rows)
+    error[slots] = accuracy.by_kind(accuracy.differences(found.base, true))[:, :2]
+    change[slots] = true["closure"]
+    state[slots] = [Status(int(code)).label for code in true["status"]]
     return {"reference": state, "reference_change": change, "error_F": error[:, 0], "error_T": error[:, 1]}
 
 

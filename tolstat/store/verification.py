@@ -46,7 +46,7 @@ class Verification(NamedTuple):
     seed : int
         Seed of the random choice of the joints.
     rows : ndarray, shape (m,)
-        File slots of the joints, ascending; of a study that was not run, rows of the campaign.
+        Rows of the joints in the campaign, ascending.
     base : ndarray of RESULT, shape (m,)
         Their results in the campaign.
     checks : dict of str to Check
@@ -74,7 +74,7 @@ def read(store: Reader) -> Verification | None:
             c.of(table)[:] = group[name][c.name][:]
         attrs = group[name].attrs
         checks[name] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
-    base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in rows.tolist()])
+    base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in store.slot(rows).tolist()])
     return Verification(int(group.attrs["seed"]), rows, base, checks)
 
 

@@ -63,7 +63,7 @@ def test_only_the_fields_asked_for_are_held(path):
         whole, part = view.read(store), view.read(store, LOAD_FIELDS, ["pin1.offset_t"])
     assert whole.results.dtype == RESULT
     assert whole.errors.dtype == ERROR
-    assert part.results.itemsize < 0.4 * RESULT.itemsize
+    assert part.results.dtype.names == LOAD_FIELDS
     assert part.errors.dtype.names == ("pin1.offset_t",)
     for field in LOAD_FIELDS:
         np.testing.assert_array_equal(part.results[field], whole.results[field])

@@ -75,6 +75,7 @@ def force_and_torque(base, other):
     return accuracy.by_kind(accuracy.differences(base, other))[:, :2]
 
 
+@pytest.mark.slow
 def test_estimate_is_of_the_size_of_the_error(coarse):
     """What the solver's own checks give is within a factor of two of the distance to the reference, in each joint.
 
@@ -89,6 +90,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
     assert (ratio[~crossing] < 2).all()
 
 
+@pytest.mark.slow
 def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
     params = joint.perturb(plan.joint, sampling.draw(plan)[coarse.rows[-1:]])
     here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results

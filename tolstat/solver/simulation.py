@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import CONTACTS, PARAM, RESULT, SIMULATED, Fidelity, HistorySpec, Method, Options, Simulation
+from tolstat.common.tables import (
+    CONTACTS,
+    PARAM,
+    RESULT,
+    SIMULATED,
+    Fidelity,
+    HistorySpec,
+    Method,
+    Options,
+    Simulation,
+    Status,
+)
+from tolstat.joint import ideal
 from tolstat.solver import rainflow, refinement, stationary
 
 if TYPE_CHECKING:
@@ -20,6 +32,10 @@ Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
 MOST_KEPT = 12_000
 """Maximum number of samples in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
+
+NEARLY_REVERSING = 0.8
+"""Torque that reverses the load (`ideal.reversal_torque`), relative to a joint's own, above which explicit steps cost
+less than error-controlled ones."""
 
 NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
 """Stands for the statistics of single revolutions where none are asked for."""
@@ -153,7 +169,7 @@ def simulate_rows(
         found = np.zeros(len(rows), RESULT).view(np.recarray)
         revolutions = settings.max_revs if follows_error(settings) else 0
         blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
-        run = _together if in_lanes(settings) else _alone
+        run = _resolved if follows_error(settings) else _together if in_lanes(settings) else _alone
         for i, samples in run(params[rows], settings, bool(specs), found, blocks):
             if found[i].status in SIMULATED:
                 for name, values in _sample(samples, histories, specs).items():
@@ -192,8 +208,13 @@ def _together(
     keep: bool,
     results: NDArray[np.void],
     blocks: NDArray[np.void] = NO_BLOCKS,
+    steps: NDArray[np.int64] | None = None,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints in lock-step by number of contact stations; yield index and samples of each if `keep`."""
+    """Simulate joints in lanes by number of contact stations; yield index and samples of each if `keep`.
+
+    `steps`: number of explicit steps of the first revolution, (n,); without it joints are simulated in lock-step.
+    """
+    from tolstat.kernel.lanes.explicit import explicit
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
@@ -207,11 +228,59 @@ def _together(
         own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), RESULT).view(np.recarray)
         out = np.zeros(len(part), RESULT).view(np.recarray)
         rows = part.view(np.recarray)
-        lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+        if steps is None:
+            lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+        else:
+            explicit(rows, words, steps[here], options, scratch(options), batch, samples, own, out)
         results[here] = out
         if len(blocks):
             blocks[here] = own
         yield from zip(here.tolist(), samples, strict=False)
+
+
+def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int64]:
+    """Least stable number of explicit steps a revolution of joints that are resolved with them, (n,); 0 for others.
+
+    These are joints whose torque reverses, or nearly does, unless a revolution takes too many stable steps: where
+    contacts hit, error-controlled steps are hardly longer, and each costs five times as much.
+    """
+    from tolstat.kernel.lanes.explicit import count_steps
+    from tolstat.kernel.revolution.explicit import MOST_STEPS
+
+    steps = np.zeros(len(params), np.int64)
+    hitting = np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
+    if len(hitting) and in_lanes(options):
+        own = np.zeros(len(hitting), np.int64)
+        count_steps(params[hitting].view(np.recarray), options, scratch(options).work, own)
+        steps[hitting] = np.where(own <= MOST_STEPS, own, 0)
+    return steps
+
+
+def _resolved(
+    params: NDArray[np.void],
+    options: Options,
+    keep: bool,
+    results: NDArray[np.void],
+    blocks: NDArray[np.void],
+) -> Iterator[tuple[int, NDArray[np.void]]]:
+    """Simulate joints with explicit steps where these suit, else with error-controlled steps; yield as `_together`.
+
+    Joints that turn out too stiff for explicit steps are simulated with error-controlled ones.
+    """
+    others = _together if in_lanes(options) else _alone
+    steps = explicit_steps(params, options)
+    for chosen in (True, False):
+        rows = np.flatnonzero((steps > 0) == chosen)
+        if not len(rows):
+            continue
+        here, out = params[rows], np.zeros(len(rows), RESULT).view(np.recarray)
+        own = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray)
+        run = _together(here, options, keep, out, own, steps[rows]) if chosen else others(here, options, keep, out, own)
+        for i, samples in run:
+            results[rows[i]] = out[i]
+            yield int(rows[i]), samples
+        results[rows], blocks[rows] = out, own
+        steps[rows[out["status"] == Status.NEWTON_FAILED]] = 0
 
 
 def _groups(params: NDArray[np.void], most: int) -> Iterator[NDArray[np.intp]]:
@@ -239,8 +308,11 @@ def is_compiled(options: Options | None = None) -> bool:
 
     from tolstat.kernel.simd.jit import CACHE_DIRECTORY
 
-    name = "lockstep.lockstep" if in_lanes(options or Options()) else "simulate.simulate_joint"
-    return any(Path(CACHE_DIRECTORY).rglob(f"{name}*.nbc"))
+    options = options or Options()
+    names = ["lockstep.lockstep" if in_lanes(options) else "simulate.simulate_joint"]
+    if refinement.may_refine(options):
+        names += ["explicit.explicit", "explicit.count_steps"]
+    return all(any(Path(CACHE_DIRECTORY).rglob(f"{name}*.nbc")) for name in names)
 
 
 def warm_up(options: Options | None = None) -> None:
@@ -249,4 +321,11 @@ def warm_up(options: Options | None = None) -> None:
     params = np.zeros(1, PARAM)
     params["clearance"] = -1.0
     simulate_rows(params, options)
+    if refinement.may_refine(options):
+        settings, joint = refinement.settings(options), params.copy()
+        joint["torque"], joint["omega"], joint["alpha"], joint["Js"] = 0.0, 1.0, 0.1, 1.0  # its torque reverses
+        steps = np.maximum(explicit_steps(joint, settings), settings.steps_per_rev)
+        found = np.zeros(1, RESULT).view(np.recarray)
+        for _ in _together(params, settings, False, found, found[:, None], steps):
+            pass
     rainflow.count(np.zeros((2, 8, 6)))

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.tables import CONTACTS, RESULT, Fidelity, Method, Motion, Options, Status
-from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
-from tolstat.kernel.integrators.state import STAGED_STEP, TOLERANCE
+from tolstat.kernel.integrators.mesh import CELL, cells_of
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
 from tolstat.kernel.mechanics.vector import copy
@@ -30,8 +29,6 @@ OK, NOT_SETTLED, NOT_PERIODIC = int(Status.OK), int(Status.NOT_SETTLED), int(Sta
 TR_BDF2, DYNAMIC = int(Method.TR_BDF2), int(Fidelity.DYNAMIC)
 NEWTON_FAILED, NOT_FINITE = int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
 
-TIGHTER = 8
-"""Factor from one tolerance to the next tighter one: it halves the steps."""
 NEARLY, PATIENT = 1.5e-2, 10
 """Closure error at which the tolerance is tightened, if need be, and number of revolutions after which the first one is
 tightened anyway: a joint need not settle with every tolerance."""
@@ -70,6 +67,11 @@ TURNS = np.dtype(
         ("tightened", "i8"),  # number of times that the tolerance was tightened
         ("period", "i8"),  # period found with the tolerance before, revolutions; 0: none
         ("beside", "i8"),  # 1 while the neighbouring motion is integrated
+        ("force", "f8"),  # largest |F| of the last revolution, N; before the first one, an estimate
+        ("torque", "f8"),  # largest |T|, N m
+        ("steps", "i8"),  # of the first revolution, with explicit steps
+        ("doubled", "i8"),  # number of times that they were doubled because they were unstable
+        ("bearable", "f8"),  # contact force of an end station up to which the steps in use are stable, N
         ("growth", "f8"),  # sum of the logarithms of its growth
         ("before", "f8", (8, 2)),  # largest |F|, |T| with the tolerance before
         ("other", "f8", (3, N_DOF)),  # q, v, a of the neighbour; of the joint while `beside` is 1
@@ -136,15 +138,13 @@ def closure_target(options, turns):
 
 
 @njit
-def begin_turns(par, options, memory, weight, past):
-    """Initialise `past`, and `memory` and `weight` of State, for a joint at its start."""
+def begin_turns(par, options, past):
+    """Initialise `past` for a joint at its start."""
     turns = past.turns
     turns.revolution = turns.since = turns.tightened = turns.period = turns.beside = 0
     turns.limit, turns.growth = options.max_revs, 0.0
-    memory[TOLERANCE] = options.rtol
-    force = typical_force(par)
-    set_scale(force, force * par.R, closure_target(options, turns), options, par, memory, weight)
-    forget_mesh(past.mesh)
+    turns.force = typical_force(par)
+    turns.torque = turns.force * par.R
     past.trail.notes.count = 0
     clear_extremes(past.extremes[1])
 
@@ -225,10 +225,8 @@ def find_period(last, closure, tolerance, turns, trail):
 
 
 @njit
-def tighten(period, options, memory, mesh, turns, out):
-    """Tighten the tolerance; keep `period` and the largest loads in `out` for comparison."""
-    memory[TOLERANCE] /= TIGHTER
-    refine_mesh(mesh)
+def tighten(period, turns, out):
+    """Ask for half the steps; keep `period` and the largest loads in `out` for comparison."""
     for b in range(8):
         turns.before[b, 0], turns.before[b, 1] = out.F_max[b], out.T_max[b]
     turns.tightened += 1
@@ -237,7 +235,7 @@ def tighten(period, options, memory, mesh, turns, out):
 
 
 @njit
-def repeats(last, options, memory, mesh, trail, turns, out):
+def repeats(last, options, trail, turns, out):
     """Whether a joint repeats and its largest loads are resolved or no tolerance is left; may tighten the tolerance."""
     period = find_period(last, out.closure, max(NEARLY, options.settle_tol), turns, trail)
     tired = turns.tightened == 0 and last + 1 >= PATIENT
@@ -246,7 +244,7 @@ def repeats(last, options, memory, mesh, trail, turns, out):
     combine(last, max(1, period), trail, out)
     change = largest_change(turns.before, out) if turns.tightened > 0 else np.nan
     if turns.tightened < options.max_refinements and not change <= RESOLVED:
-        tighten(period, options, memory, mesh, turns, out)
+        tighten(period, turns, out)
         return False
     period = find_period(last, out.closure, max(ENOUGH * change, options.settle_tol), turns, trail)
     if period == 0:
@@ -332,15 +330,13 @@ def neighbour_done(q, v, a, par, options, turns):
 
 
 @njit
-def after_revolution(point, memory, weight, iterations, par, options, samples, past, out):
+def after_revolution(point, iterations, par, options, samples, past, out):
     """Decide how a joint continues after a revolution.
 
     Parameters
     ----------
     point : tuple of ndarray, shape (55,)
         q, v, a of the joint; exchanged for those of the neighbour, and back.
-    memory, weight : ndarray
-        Of State; the tolerance and the scales of errors and residuals are set.
     iterations : int
         Newton iterations so far.
     par, options
@@ -361,7 +357,6 @@ def after_revolution(point, memory, weight, iterations, par, options, samples, p
     """
     q, v, a = point
     trail, turns = past.trail, past.turns
-    memory[STAGED_STEP] = 0.0  # the stage may belong to the other motion
     if turns.beside == 1:
         neighbour_done(q, v, a, par, options, turns)
         if turns.revolution == turns.limit:
@@ -376,15 +371,14 @@ def after_revolution(point, memory, weight, iterations, par, options, samples, p
     force, torque = own.F_max.max(), own.T_max.max()
     if not (force < 1e300 and torque < 1e300):
         return NOT_FINITE, False
-    force, torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
+    turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
         out.closure = closure_error(samples)
         note_closure(turns.revolution, out.closure, trail.notes)
-        if repeats(last, options, memory, past.mesh, trail, turns, out):
+        if repeats(last, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_PERIODIC), False
     elif turns.period == 1 and turns.tightened < options.max_refinements and largest_change(turns.before, own) > FAR:
-        tighten(1, options, memory, past.mesh, turns, own)
-    set_scale(force, torque, closure_target(options, turns), options, par, memory, weight)
+        tighten(1, turns, own)
     if turns.limit > BESIDE and turns.revolution >= turns.limit - BESIDE:
         if turns.revolution == turns.limit - BESIDE:
             set_beside(q, v, a, par.R, turns)

@@ -61,9 +61,9 @@ def _of_failure(row: np.void, options: Mapping[str, Any]) -> str:
 def _of_steps(row: np.void, options: Mapping[str, Any]) -> str:
     change = float(row["refinement_change"])
     if not math.isfinite(change):
-        return "fails with error-controlled steps: try solver.max_halvings = 20"
+        return "fails with finer steps: try solver.max_halvings = 20"
     more = int(options["max_refinements"]) + 1
-    return f"largest loads change by {change:.1%} with the last tolerance: try solver.max_refinements = {more}"
+    return f"largest loads change by {change:.1%} with the last halving of steps: try solver.max_refinements = {more}"
 
 
 def _of_slow(row: np.void, options: Mapping[str, Any]) -> str:

@@ -6,13 +6,13 @@ a revolution `resolve` decides how it continues, and a lane whose joint has ende
 
 import math
 
+from tolstat.common.tables import STEPS_PER_ITERATION
 from tolstat.kernel.integrators.stability import fewest_steps
 from tolstat.kernel.integrators.state import FACTORISATIONS, ITERATIONS
 from tolstat.kernel.lanes.batch import empty, get_counters, put_joint, samples_of
 from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.explicit import (
-    STEPS_PER_ITERATION,
     begin_explicit,
     begin_revolution,
     is_stable,

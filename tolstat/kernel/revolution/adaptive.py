@@ -43,9 +43,9 @@ def begin_mesh(par, options, memory, weight, past):
 
 
 @njit
-def adapt_mesh(tightened, par, options, memory, weight, past):
-    """Prepare the next revolution; `tightened`: number of times that steps had been halved before this one."""
-    if past.turns.tightened > tightened:
+def adapt_mesh(halved, par, options, memory, weight, past):
+    """Prepare the next revolution; `halved`: number of times that steps had been halved before this one."""
+    if past.turns.halved > halved:
         memory[TOLERANCE] /= TIGHTER
         refine_mesh(past.mesh)
     memory[STAGED_STEP] = 0.0  # the stage may belong to the other motion
@@ -157,9 +157,9 @@ def build_resolve(newton, begin):
                 predict_increment(k, state.q0, state.v0, state.ahead, ring.samples)
             if c % past.mesh.size == 0:
                 point, spent = (state.q0, state.v0, state.a0), state.counters[ITERATIONS]
-                tightened = past.turns.tightened
+                halved = past.turns.halved
                 status, goes_on = after_revolution(point, spent, par, options, ring.samples, past, out)
-                adapt_mesh(tightened, par, options, state.memory, state.weight, past)
+                adapt_mesh(halved, par, options, state.memory, state.weight, past)
                 if past.turns.beside == 1:
                     c -= past.mesh.size
         return status

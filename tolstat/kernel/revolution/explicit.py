@@ -19,14 +19,12 @@ from tolstat.kernel.simd.lane import any_of
 MOST_STEPS = 40_000
 """Number of steps of a revolution above which a joint is given up as too stiff, before its steps are halved to estimate
 their error."""
-STEPS_PER_ITERATION = 5
-"""Number of explicit steps that take the time of a Newton iteration."""
 
 
 @njit
 def steps_of(turns):
     """Number of steps of a revolution in use."""
-    return turns.steps << (turns.tightened + turns.doubled)
+    return turns.steps << (turns.halved + turns.doubled)
 
 
 @njit

@@ -24,7 +24,7 @@ PEAKS = np.dtype(
 )
 """Of one joint; a batch has them in lanes."""
 NEAR = 0.9
-"""Share of the largest value so far above which a maximum between steps can be larger."""
+"""Share of the largest value so far up to which no peak between steps is looked for."""
 
 
 @njit
@@ -57,10 +57,10 @@ def follow(work, v, peaks):
 
 @njit
 def forget(mask, peaks):
-    """Reset in the lanes of the mask."""
+    """Reset in the lanes of the mask; NaN stands for steps before the first one, so that it is no peak."""
     for i in range(16 + N_CONTACTS):
         peaks.top[i] = retain(mask, 0.0, peaks.top[i])
-        peaks.one[i], peaks.two[i] = retain(mask, 0.0, peaks.one[i]), retain(mask, 0.0, peaks.two[i])
+        peaks.one[i], peaks.two[i] = retain(mask, np.nan, peaks.one[i]), retain(mask, np.nan, peaks.two[i])
         if i < 16:
             peaks.low[i] = retain(mask, np.inf, peaks.low[i])
     peaks.psi = retain(mask, 0.0, peaks.psi)

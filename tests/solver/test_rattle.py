@@ -110,7 +110,7 @@ def test_with_explicit_steps_a_joint_has_the_same_bits_beside_any_others() -> No
         assert_same(blocks[i, :made], own[0, :made])
 
 
-def test_unstable_steps_are_found_out_and_doubled() -> None:
+def test_unstable_steps_are_found_out_and_shortened() -> None:
     params = joints(30, 1500, 100, [2, 5])
     steps = simulation.explicit_steps(params, EXPLICIT)
     right, _ = with_explicit_steps(params, steps)

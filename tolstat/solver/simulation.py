@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Callable, Iterator
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -36,6 +36,9 @@ MOST_KEPT = 12_000
 NEARLY_REVERSING = 0.8
 """Torque that reverses the load (`ideal.reversal_torque`), relative to a joint's own, above which explicit steps cost
 less than error-controlled ones."""
+
+UNIFORM_REVS = 4
+"""Revolutions with uniform steps of a joint that explicit steps suit: what uniform steps resolve settles sooner."""
 
 NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
 """Stands for the statistics of single revolutions where none are asked for."""
@@ -169,14 +172,23 @@ def simulate_rows(
         found = np.zeros(len(rows), RESULT).view(np.recarray)
         revolutions = settings.max_revs if follows_error(settings) else 0
         blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
-        run = _resolved if follows_error(settings) else _together if in_lanes(settings) else _alone
+        run: Callable[..., Iterator[tuple[int, NDArray[np.void]]]] = _together if in_lanes(settings) else _alone
+        if follows_error(settings):
+            run = partial(_resolved, steps[rows])
         for i, samples in run(params[rows], settings, bool(specs), found, blocks):
             if found[i].status in SIMULATED:
                 for name, values in _sample(samples, histories, specs).items():
                     kept[name][rows[i]] = values
         return found.view(np.ndarray), blocks.view(np.ndarray)
 
-    results, _ = simulate(np.arange(len(params)), options)
+    steps = explicit_steps(params, options)
+    results = np.zeros(len(params), RESULT)
+    hitting = np.flatnonzero(steps)
+    if len(hitting):
+        results[hitting], _ = simulate(hitting, options._replace(max_revs=min(options.max_revs, UNIFORM_REVS)))
+    others = np.flatnonzero((steps == 0) | (results["status"] == Status.NEWTON_FAILED))
+    if len(others):
+        results[others], _ = simulate(others, options)
     refinement.refine(results, options, simulate)
     stationary.fill_intervals(results)
     return Simulation(results, kept)
@@ -239,44 +251,47 @@ def _together(
 
 
 def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int64]:
-    """Least stable number of explicit steps a revolution of joints that are resolved with them, (n,); 0 for others.
+    """Least stable number of explicit steps a revolution of joints that are refined with them, (n,); 0 for others.
 
     These are joints whose torque reverses, or nearly does, unless a revolution takes too many stable steps: where
     contacts hit, error-controlled steps are hardly longer, and each costs five times as much.
     """
+    steps = np.zeros(len(params), np.int64)
+    hitting = np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
+    if not len(hitting) or not refinement.may_refine(options) or not in_lanes(refinement.settings(options)):
+        return steps
     from tolstat.kernel.lanes.explicit import count_steps
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
-    steps = np.zeros(len(params), np.int64)
-    hitting = np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
-    if len(hitting) and in_lanes(options):
-        own = np.zeros(len(hitting), np.int64)
-        count_steps(params[hitting].view(np.recarray), options, scratch(options).work, own)
-        steps[hitting] = np.where(own <= MOST_STEPS, own, 0)
+    own = np.zeros(len(hitting), np.int64)
+    count_steps(params[hitting].view(np.recarray), options, scratch(options).work, own)
+    steps[hitting] = np.where(own <= MOST_STEPS, own, 0)
     return steps
 
 
 def _resolved(
+    steps: NDArray[np.int64],
     params: NDArray[np.void],
     options: Options,
     keep: bool,
     results: NDArray[np.void],
     blocks: NDArray[np.void],
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints with explicit steps where these suit, else with error-controlled steps; yield as `_together`.
+    """Simulate joints with explicit steps where `steps`, (n,), is not zero, else with error-controlled steps.
 
-    Joints that turn out too stiff for explicit steps are simulated with error-controlled ones.
+    Joints that turn out too stiff for explicit steps get error-controlled ones. Other arguments are as of `_together`.
     """
-    others = _together if in_lanes(options) else _alone
-    steps = explicit_steps(params, options)
-    for chosen in (True, False):
-        rows = np.flatnonzero((steps > 0) == chosen)
+    steps = steps.copy()
+    for explicit in (True, False):
+        rows = np.flatnonzero((steps > 0) == explicit)
         if not len(rows):
             continue
-        here, out = params[rows], np.zeros(len(rows), RESULT).view(np.recarray)
+        out = np.zeros(len(rows), RESULT).view(np.recarray)
         own = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray)
-        run = _together(here, options, keep, out, own, steps[rows]) if chosen else others(here, options, keep, out, own)
-        for i, samples in run:
+        run: Callable[..., Iterator[tuple[int, NDArray[np.void]]]] = _together if in_lanes(options) else _alone
+        if explicit:
+            run = partial(_together, steps=steps[rows])
+        for i, samples in run(params[rows], options, keep, out, own):
             results[rows[i]] = out[i]
             yield int(rows[i]), samples
         results[rows], blocks[rows] = out, own
@@ -322,10 +337,8 @@ def warm_up(options: Options | None = None) -> None:
     params["clearance"] = -1.0
     simulate_rows(params, options)
     if refinement.may_refine(options):
-        settings, joint = refinement.settings(options), params.copy()
-        joint["torque"], joint["omega"], joint["alpha"], joint["Js"] = 0.0, 1.0, 0.1, 1.0  # its torque reverses
-        steps = np.maximum(explicit_steps(joint, settings), settings.steps_per_rev)
-        found = np.zeros(1, RESULT).view(np.recarray)
-        for _ in _together(params, settings, False, found, found[:, None], steps):
-            pass
+        params["omega"], params["alpha"], params["Js"] = 1.0, 0.1, 1.0  # its torque reverses
+        explicit_steps(params, options)
+        found, one = np.zeros(1, RESULT).view(np.recarray), np.full(1, options.steps_per_rev)
+        list(_together(params, refinement.settings(options), False, found, found[:, None], one))
     rainflow.count(np.zeros((2, 8, 6)))

@@ -133,9 +133,12 @@ def depth_at(force, par):
 
 
 @njit
-def fewest_steps(par, options, work):
-    """Least number of stable steps of a revolution, a multiple of ``options.steps_per_rev``; `work` is scratch."""
-    period, depth = 2 * math.pi / abs(par.omega), depth_at(IMPACT * typical_force(par), par)
+def steps_for(force, par, options, work):
+    """Least number of steps a revolution that is stable while no end station presses with more than `force` (N).
+
+    It is a multiple of ``options.steps_per_rev``, or `TOO_MANY`; `work` is scratch.
+    """
+    period, depth = 2 * math.pi / abs(par.omega), depth_at(force, par)
     h = period / options.steps_per_rev
     for _ in range(6):
         h *= (STABLE / eigenvalue(h, depth, par, work)) ** FALL
@@ -148,6 +151,12 @@ def fewest_steps(par, options, work):
             return steps
         steps += options.steps_per_rev
     return TOO_MANY
+
+
+@njit
+def fewest_steps(par, options, work):
+    """Number of steps of the first revolution, as of `steps_for`."""
+    return steps_for(IMPACT * typical_force(par), par, options, work)
 
 
 @njit

@@ -107,10 +107,11 @@ def arrive(lane, par, lanes, options, alone, batch, samples, past, out):
     k = int(control.count[lane]) // (steps // n)
     control.until[lane] = steps // n
     if turns.beside == 0:
-        if not is_stable(largest_at_an_end(lane, lanes[2]), point[0], turns):
+        force = largest_at_an_end(lane, lanes[2])
+        if not is_stable(force, point[0], turns):
             control.steps[lane] += control.count[lane]
             control.halvings[lane] += 1
-            if not repeat_finer(point, par, work, past):
+            if not repeat_finer(force, point, par, options, work, past):
                 out.failed_step = k
                 return NEWTON_FAILED, False
             start_revolution(lane, par, options, batch)

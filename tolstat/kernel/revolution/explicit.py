@@ -1,13 +1,13 @@
 """One joint with explicit steps (`verlet`): equal steps over each revolution; `resolve` decides after it.
 
 The first number of steps is the least that is stable while no end station presses harder than expected (`stability`).
-A revolution in which one does is repeated with twice as many steps. In place of a tighter tolerance, too, the number of
-steps is doubled.
+A revolution in which one does is repeated with as many steps as that force needs. In place of a tighter tolerance the
+steps are halved.
 """
 
 import math
 
-from tolstat.kernel.integrators.stability import largest_force
+from tolstat.kernel.integrators.stability import largest_force, steps_for
 from tolstat.kernel.integrators.verlet import correct, predict
 from tolstat.kernel.mechanics.dynamics import acceleration
 from tolstat.kernel.mechanics.topology import N_DOF
@@ -16,6 +16,8 @@ from tolstat.kernel.revolution.resolve import SETTLING, begin_turns
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import any_of
 
+AMPLE = 2.0
+"""Contact force that a revolution is repeated for, in units of the one that it was not stable for."""
 MOST_STEPS = 40_000
 """Number of steps of a revolution above which a joint is given up as too stiff, before its steps are halved to estimate
 their error."""
@@ -24,7 +26,7 @@ their error."""
 @njit
 def steps_of(turns):
     """Number of steps of a revolution in use."""
-    return turns.steps << (turns.halved + turns.doubled)
+    return turns.steps << turns.halved
 
 
 @njit
@@ -37,7 +39,7 @@ def step_length(par, turns):
 def begin_explicit(steps, par, options, work, past):
     """Initialise `past` for a joint at its start, with that number of steps a revolution; `work` is scratch."""
     begin_turns(par, options, past)
-    past.turns.steps, past.turns.doubled = steps, 0
+    past.turns.steps = steps
     past.turns.bearable = largest_force(steps, par, work)
 
 
@@ -61,12 +63,17 @@ def is_stable(force, q, turns):
 
 
 @njit
-def repeat_finer(point, par, work, past):
-    """Return to the start of the revolution with twice as many steps; return False if these are too many."""
-    turns = past.turns
-    if turns.steps << turns.doubled > MOST_STEPS // 2:
+def repeat_finer(force, point, par, options, work, past):
+    """Return to the start of the revolution with more steps, at most twice as many; return False if there are too many.
+
+    `force`: largest contact force of an end station that was met, N; where it is a consequence of instability, twice
+    as many steps will do.
+    """
+    turns, n = past.turns, options.steps_per_rev
+    wanted = min(steps_for(AMPLE * force, par, options, work), 2 * steps_of(turns))
+    turns.steps = max(turns.steps, n * ((wanted >> turns.halved) // n)) + n
+    if turns.steps > MOST_STEPS:
         return False
-    turns.doubled += 1
     turns.since = turns.revolution
     turns.limit = max(turns.limit, turns.revolution + SETTLING)
     turns.bearable = largest_force(steps_of(turns), par, work)

@@ -69,8 +69,7 @@ TURNS = np.dtype(
         ("beside", "i8"),  # 1 while the neighbouring motion is integrated
         ("force", "f8"),  # largest |F| of the last revolution, N; before the first one, an estimate
         ("torque", "f8"),  # largest |T|, N m
-        ("steps", "i8"),  # of the first revolution, with explicit steps
-        ("doubled", "i8"),  # number of times that they were doubled because they were unstable
+        ("steps", "i8"),  # explicit steps of a revolution before they were halved
         ("bearable", "f8"),  # contact force of an end station up to which the steps in use are stable, N
         ("growth", "f8"),  # sum of the logarithms of its growth
         ("before", "f8", (8, 2)),  # largest |F|, |T| with the steps before

@@ -85,6 +85,53 @@ def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order() -> None:
     assert_same(backwards[::-1], together)
 
 
+EXPLICIT = FOLLOWING._replace(max_refinements=1, max_revs=10)
+
+
+def with_explicit_steps(params: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Results of joints that start with these numbers of steps a revolution, and statistics of their revolutions."""
+    results = np.zeros(len(params), RESULT).view(np.recarray)
+    blocks = np.zeros((len(params), EXPLICIT.max_revs), RESULT).view(np.recarray)
+    list(simulation._together(params, EXPLICIT, False, results, blocks, steps))
+    return results.view(np.ndarray), blocks.view(np.ndarray)
+
+
+def test_with_explicit_steps_a_joint_has_the_same_bits_beside_any_others() -> None:
+    params = np.concatenate([joints(15, 3000, 100, [0, 7, 10]), joints(30, 1500, 100, [10, 13, 5])])
+    steps = simulation.explicit_steps(params, EXPLICIT)
+    assert (steps > 0).all()
+    together, blocks = with_explicit_steps(params, steps)
+    backwards, _ = with_explicit_steps(params[::-1].copy(), steps[::-1].copy())
+    assert_same(backwards[::-1], together)
+    for i in (0, 4):
+        alone, own = with_explicit_steps(params[i : i + 1], steps[i : i + 1])
+        assert_same(alone, together[i : i + 1])
+        made = int(together["revolutions"][i])
+        assert_same(blocks[i, :made], own[0, :made])
+
+
+def test_unstable_steps_are_found_out_and_shortened() -> None:
+    params = joints(30, 1500, 100, [2, 5])
+    steps = simulation.explicit_steps(params, EXPLICIT)
+    right, _ = with_explicit_steps(params, steps)
+    for share in (0.4, 0.7):  # two thirds of the bound is past the limit
+        few = EXPLICIT.steps_per_rev * (share * steps // EXPLICIT.steps_per_rev).astype(np.int64)
+        found, _ = with_explicit_steps(params, few)
+        assert (found["halvings"] > 0).all()
+        assert (found["status"] == right["status"]).all()
+        np.testing.assert_allclose(found["F_max"].max(axis=1), right["F_max"].max(axis=1), rtol=0.03)
+
+
+def test_which_joints_get_explicit_steps() -> None:
+    rattling, calm = joints(30, 1500, 100, [0]), joints(15, 500, 100, [0])
+    slow, stiff = joints(15, 20, 0, [0]), joints(30, 1500, 100, [0])
+    for name in ("k_cross", "k_fork", "station_k1", "station_k2"):
+        stiff[name] *= 1000
+    found = simulation.explicit_steps(np.concatenate([rattling, calm, slow, stiff]), EXPLICIT)
+    assert found[0] > 0
+    assert (found[1:] == 0).all()
+
+
 def cell(level: int, worst: float = 0.0, pinned: int = 0) -> np.recarray:
     made = np.zeros(1, CELL).view(np.recarray)
     made.level, made.worst, made.pinned = level, worst, pinned

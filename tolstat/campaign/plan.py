@@ -18,6 +18,7 @@ from tolstat.common.loads import LOADS
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation
 from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, origin_blocks
+from tolstat.solver import refinement
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store.histories import attach_scales, create_dataset
 from tolstat.store.recorded import perturbed, settings, variants
@@ -32,8 +33,8 @@ PILOT = 128
 SHARES = (0.5, 0.1, 0.01)
 """Exceedances for which the width of the interval is predicted."""
 QUANTILES = (0.95, 0.99, 0.999)
-ORDINARY = 600.0
-"""Newton iterations of a joint that does not rattle, from `studies/iso2768_f.toml` with the default settings."""
+ORDINARY = 680.0
+"""Work of a joint that does not rattle, from `studies/iso2768_f.toml` with the default settings, Newton iterations."""
 CONFIDENCE = 0.95
 
 
@@ -72,8 +73,8 @@ class Reversals:
     torque : float
         Smallest torque at which none of them would reverse, N m; None if none does.
     cost : float
-        Mean Newton iterations of such a joint relative to those of the pilot's other joints, or to `ORDINARY` if there
-        are no others; None if none reverses.
+        Mean work of such a joint (`refinement.work`) relative to that of the pilot's other joints, or to `ORDINARY` if
+        there are no others; None if none reverses.
     """
 
     joints: int
@@ -185,9 +186,9 @@ def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals
     here = np.abs(params["torque"]) < torque
     if not here.any():
         return Reversals(0, None, None)
-    iterations = results["newton_iterations"]
-    others = float(iterations[~here].mean()) if not here.all() else ORDINARY
-    return Reversals(int(here.sum()), float(torque[here].max()), float(iterations[here].mean()) / max(others, 1.0))
+    work = refinement.work(results)
+    others = float(work[~here].mean()) if not here.all() else ORDINARY
+    return Reversals(int(here.sum()), float(torque[here].max()), float(work[here].mean()) / max(others, 1.0))
 
 
 def _errors(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:

@@ -84,9 +84,9 @@ def _of_newton_failure(row: np.void, options: Mapping[str, Any]) -> str:
 def _of_unresolved(row: np.void, options: Mapping[str, Any]) -> str:
     change = float(row["refinement_change"])
     if not math.isfinite(change):
-        return "error-controlled steps failed: try solver.max_halvings = 20"
+        return "finer steps failed: try solver.max_halvings = 20"
     more = int(options["max_refinements"]) + 1
-    return f"the last tighter tolerance changes largest loads by {change:.1%}: try solver.max_refinements = {more}"
+    return f"the last halving of the steps changes largest loads by {change:.1%}: try solver.max_refinements = {more}"
 
 
 def _of_slow(row: np.void, options: Mapping[str, Any]) -> str:

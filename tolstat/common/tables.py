@@ -31,6 +31,8 @@ CHANNELS = {
 CONTACTS = ("outer", "inner", "resultant")
 """Contact forces of a pin: normal force of its outermost and of its innermost station, and the resultant of all."""
 OUTER, INNER, RESULTANT = range(3)
+STEPS_PER_ITERATION = 5
+"""Number of explicit steps that take the time of a Newton iteration."""
 MAX_ITERATIONS = 40
 """Upper bound on a joint's Newton iterations per step of the longest run allowed, so that no joint blocks a campaign.
 Joints that never settle take some 8 to 10."""
@@ -279,7 +281,11 @@ RESULT_FIELDS = (
     Field(
         "step_error", "1", "mean estimated error of the uniform steps, as a load relative to the largest of its kind"
     ),
-    Field("refinement_change", "1", "largest change of a largest load by the last tolerance, relative to its kind's"),
+    Field(
+        "refinement_change",
+        "1",
+        "largest change of a largest load by the last halving of steps, relative to its kind's",
+    ),
     Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),
     Field("newton_iterations", "1", "Newton iterations", "i4"),
     Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),

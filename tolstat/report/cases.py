@@ -13,6 +13,7 @@ from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.campaign.remedy import remedy
 from tolstat.common import selected_results
 from tolstat.common.tables import BUSHINGS, Motion, Status
+from tolstat.solver import refinement
 from tolstat.store import verification
 from tolstat.study.design import IDEAL
 
@@ -33,11 +34,12 @@ def table(store: ResultStore) -> pd.DataFrame:
     -------
     DataFrame
         One row per joint: ``variant``, the ``values`` that define it, ``note``, ``alpha [deg]``, ``case``, ``status``,
-        ``motion``, ``revolutions``, ``cost`` (Newton iterations relative to the first joint), ``remedy``; force and
+        ``motion``, ``revolutions``, ``cost`` (`refinement.work` relative to the first joint), ``remedy``; force and
         torque of each bushing, SI, and their Gamma, eq. (14), per cent; loads that the study does not keep are left
         out. If the file holds a comparison with the reference (``tolstat verify``), also the columns of `reference`.
     """
     design, results, alpha = store.design(), store.results(), store.errors()["operation.alpha"]
+    work = refinement.work(results)
     variants = [store.variants[i] for i in design["variant"]]
     columns: dict[str, object] = {
         "variant": [variant.family for variant in variants],
@@ -48,7 +50,7 @@ def table(store: ResultStore) -> pd.DataFrame:
         "status": [Status(int(code)).label for code in results["status"]],
         "motion": [_motion(row) for row in results],
         "revolutions": results["revolutions"],
-        "cost": results["newton_iterations"] / max(1, int(results["newton_iterations"][0])),
+        "cost": work / max(1.0, float(work[0])),
         "remedy": [remedy(row, store.options | _own(v, "solver")) for row, v in zip(results, variants, strict=True)],
     }
     gamma = relative_errors(results, design["group"])

@@ -1,7 +1,8 @@
-"""Second simulation, with error-controlled steps, of joints that the uniform steps do not resolve.
+"""Second simulation, with finer steps, of joints that the uniform steps do not resolve.
 
-These are joints that have not settled, and those whose estimated step error is too large. A joint whose largest loads
-still change with the last tolerance is reported as not resolved.
+These are joints that have not settled, and those whose estimated step error is too large. Joints whose torque reverses
+get explicit steps, all others error-controlled ones (`simulation.explicit_steps`). A joint whose largest loads still
+change by the last halving of the steps is reported as not resolved.
 """
 
 from __future__ import annotations
@@ -11,12 +12,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import SIMULATED, UNSETTLED, VALID, Fidelity, Method, Options, Status
+from tolstat.common.tables import SIMULATED, STEPS_PER_ITERATION, UNSETTLED, VALID, Fidelity, Method, Options, Status
 from tolstat.solver import stationary
 
 TOLERANCE = 0.04
 """First tolerance of the error of a part of a step, as a load relative to the joint's largest
-(`kernel.integrators.mesh`); each tighter one is an eighth (`kernel.revolution.resolve.TIGHTER`)."""
+(`kernel.integrators.mesh`); each tighter one is an eighth (`kernel.revolution.adaptive.TIGHTER`). Explicit steps are
+halved instead."""
 MIN_MAX_REVS = 48
 """Revolutions after which a joint that has not repeated is given up, unless `max_revs` is larger."""
 STEP_ERROR, AT_STEPS = 0.07, 180
@@ -28,8 +30,8 @@ SWINGING_PSI, SWINGING_STEP_ERROR = 1.5e-3, 1e-3
 refined: errors of a swinging motion decay slowly, and BDF2 damps it. Both numbers come from 2759 joints that were
 solved both ways, at 10, 30 and 100 N m and of the fuzz tests: of those not refined the worst is 0.8 % off."""
 MAX_CHANGE = 0.05
-"""Change of the largest loads by the last tolerance above which a joint is not resolved. TR-BDF2 leaves a third of it
-as error, or less."""
+"""Change of the largest loads by the last halving of the steps above which a joint is not resolved. A method of order 2
+leaves a third of it as error, or less."""
 MAX_INTERVAL_WIDTH = 0.03
 """Width of a stationary joint's interval, relative to its largest load, up to which results of the uniform steps may
 stand."""
@@ -39,20 +41,36 @@ COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")
 Simulate = Callable[[NDArray[np.intp], Options], tuple[NDArray[np.void], NDArray[np.void]]]
 
 
+def work(results: NDArray[np.void]) -> NDArray[np.float64]:
+    """Work of simulating joints, (n,), in units of a Newton iteration; an explicit step is a fifth of one."""
+    return np.asarray(results["newton_iterations"] + results["steps"] / STEPS_PER_ITERATION)
+
+
+def may_refine(options: Options) -> bool:
+    """Whether joints can be refined with these settings."""
+    return options.fidelity == Fidelity.DYNAMIC and options.max_refinements > 0
+
+
+def settings(options: Options) -> Options:
+    """Settings of the second simulation of joints that are first simulated with `options`."""
+    revs = max(options.max_revs, MIN_MAX_REVS)
+    return options._replace(method=int(Method.TR_BDF2), rtol=TOLERANCE, max_revs=revs)
+
+
 def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> None:
-    """Repeat joints that need it with error-controlled steps, until their largest loads change no more.
+    """Repeat joints that need it with finer steps, until their largest loads change no more.
 
     Parameters
     ----------
     results : ndarray of RESULT, shape (n,)
         Joints as simulated with `options`; refined ones are overwritten.
     options : Options
-        Numerical settings, with at most ``max_refinements`` tighter tolerances.
+        Numerical settings; steps are halved at most ``max_refinements`` times.
     simulate : callable
         Indices (m,) of joints, Options -> their results, (m,) table RESULT, and the statistics of the revolutions of
         each, (m, revolutions), see `kernel.lanes.lockstep`.
     """
-    if options.fidelity != Fidelity.DYNAMIC or not options.max_refinements:
+    if not may_refine(options):
         return
     coarse = max(1.0, AT_STEPS / options.steps_per_rev) ** 3
     allowed = np.where(results["psi_max"] > SWINGING_PSI, SWINGING_STEP_ERROR, STEP_ERROR) * coarse
@@ -60,8 +78,7 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     rows = np.flatnonzero(unsure | np.isin(results["status"], UNSETTLED))
     if not rows.size:
         return
-    method, revs = int(Method.TR_BDF2), max(options.max_revs, MIN_MAX_REVS)
-    found, blocks = simulate(rows, options._replace(method=method, rtol=TOLERANCE, max_revs=revs))
+    found, blocks = simulate(rows, settings(options))
     stationary.classify(found, blocks, options.duration)
     known = np.isin(found["status"], SIMULATED)
     for name in COUNTS:

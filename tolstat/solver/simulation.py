@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Callable, Iterator
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -21,8 +21,10 @@ from tolstat.common.tables import (
     Method,
     Options,
     Simulation,
+    Status,
     for_kernels,
 )
+from tolstat.joint import ideal
 from tolstat.solver import rainflow, refinement, stationary
 
 if TYPE_CHECKING:
@@ -33,6 +35,13 @@ Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
 MAX_KEPT_SAMPLES = 12_000
 """Maximum number of samples in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
+
+NEARLY_REVERSING = 0.8
+"""Torque that reverses the load (`ideal.reversal_torque`), relative to a joint's own, above which explicit steps cost
+less than error-controlled ones."""
+
+UNIFORM_REVS = 4
+"""Revolutions with uniform steps of a joint that explicit steps suit: what uniform steps resolve settles sooner."""
 
 NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
 """Empty statistics of single revolutions, if they are not needed."""
@@ -166,14 +175,23 @@ def simulate_rows(
         found = np.zeros(len(rows), RESULT).view(np.recarray)
         revolutions = settings.max_revs if follows_error(settings) else 0
         blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
-        run = _together if in_lanes(settings) else _alone
+        run: Callable[..., Iterator[tuple[int, NDArray[np.void]]]] = _together if in_lanes(settings) else _alone
+        if follows_error(settings):
+            run = partial(_resolved, steps[rows])
         for i, samples in run(params[rows], settings, bool(specs), found, blocks):
             if found[i].status in SIMULATED:
                 for name, values in _sample(samples, histories, specs).items():
                     kept[name][rows[i]] = values
         return found.view(np.ndarray), blocks.view(np.ndarray)
 
-    results, _ = simulate(np.arange(len(params)), options)
+    steps = explicit_steps(params, options)
+    results = np.zeros(len(params), RESULT)
+    hitting = np.flatnonzero(steps)
+    if len(hitting):
+        results[hitting], _ = simulate(hitting, options._replace(max_revs=min(options.max_revs, UNIFORM_REVS)))
+    others = np.flatnonzero((steps == 0) | (results["status"] == Status.NEWTON_FAILED))
+    if len(others):
+        results[others], _ = simulate(others, options)
     refinement.refine(results, options, simulate)
     stationary.fill_intervals(results)
     return Simulation(results, kept)
@@ -205,8 +223,13 @@ def _together(
     keep: bool,
     results: NDArray[np.void],
     blocks: NDArray[np.void] = NO_BLOCKS,
+    steps: NDArray[np.int64] | None = None,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints in lock-step by number of contact stations; yield index and samples of each if `keep`."""
+    """Simulate joints in lanes by number of contact stations; yield index and samples of each if `keep`.
+
+    `steps`: number of explicit steps of the first revolution, (n,); without it joints are simulated in lock-step.
+    """
+    from tolstat.kernel.lanes.explicit import explicit
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
@@ -220,11 +243,62 @@ def _together(
         own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
         out = np.zeros(len(part), KERNEL_RESULT).view(np.recarray)
         rows = part.view(np.recarray)
-        lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+        if steps is None:
+            lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+        else:
+            explicit(rows, words, steps[here], options, scratch(options), batch, samples, own, out)
         for_kernels(results)[here] = out
         if len(blocks):
             for_kernels(blocks)[here] = own
         yield from zip(here.tolist(), samples, strict=False)
+
+
+def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int64]:
+    """Least stable number of explicit steps a revolution of joints that are refined with them, (n,); 0 for others.
+
+    These are joints whose torque reverses, or nearly does, unless a revolution takes too many stable steps: where
+    contacts hit, error-controlled steps are hardly longer, and each costs five times as much.
+    """
+    steps = np.zeros(len(params), np.int64)
+    hitting = np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
+    if not len(hitting) or not refinement.may_refine(options) or not in_lanes(refinement.settings(options)):
+        return steps
+    from tolstat.kernel.lanes.explicit import count_steps
+    from tolstat.kernel.revolution.explicit import MOST_STEPS
+
+    own = np.zeros(len(hitting), np.int64)
+    count_steps(params[hitting].view(np.recarray), options, scratch(options).work, own)
+    steps[hitting] = np.where(own <= MOST_STEPS, own, 0)
+    return steps
+
+
+def _resolved(
+    steps: NDArray[np.int64],
+    params: NDArray[np.void],
+    options: Options,
+    keep: bool,
+    results: NDArray[np.void],
+    blocks: NDArray[np.void],
+) -> Iterator[tuple[int, NDArray[np.void]]]:
+    """Simulate joints with explicit steps where `steps`, (n,), is not zero, else with error-controlled steps.
+
+    Joints that turn out too stiff for explicit steps get error-controlled ones. Other arguments are as of `_together`.
+    """
+    steps = steps.copy()
+    for explicit in (True, False):
+        rows = np.flatnonzero((steps > 0) == explicit)
+        if not len(rows):
+            continue
+        out = np.zeros(len(rows), RESULT).view(np.recarray)
+        own = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray)
+        run: Callable[..., Iterator[tuple[int, NDArray[np.void]]]] = _together if in_lanes(options) else _alone
+        if explicit:
+            run = partial(_together, steps=steps[rows])
+        for i, samples in run(params[rows], options, keep, out, own):
+            results[rows[i]] = out[i]
+            yield int(rows[i]), samples
+        results[rows], blocks[rows] = out, own
+        steps[rows[out["status"] == Status.NEWTON_FAILED]] = 0
 
 
 def _groups(params: NDArray[np.void], max_size: int) -> Iterator[NDArray[np.intp]]:
@@ -254,8 +328,11 @@ def is_compiled(options: Options | None = None) -> bool:
 
     from tolstat.kernel.simd.jit import CACHE_DIRECTORY
 
-    name = "lockstep.lockstep" if in_lanes(options or Options()) else "simulate.simulate_joint"
-    return any(Path(CACHE_DIRECTORY).rglob(f"{name}*.nbc"))
+    options = options or Options()
+    names = ["lockstep.lockstep" if in_lanes(options) else "simulate.simulate_joint"]
+    if refinement.may_refine(options):
+        names += ["explicit.explicit", "explicit.count_steps"]
+    return all(any(Path(CACHE_DIRECTORY).rglob(f"{name}*.nbc")) for name in names)
 
 
 def warm_up(options: Options | None = None) -> None:
@@ -264,4 +341,9 @@ def warm_up(options: Options | None = None) -> None:
     params = np.zeros(1, PARAM)
     params["clearance"] = -1.0
     simulate_rows(params, options)
+    if refinement.may_refine(options):
+        params["omega"], params["alpha"], params["Js"] = 1.0, 0.1, 1.0  # its torque reverses
+        explicit_steps(params, options)
+        found, one = np.zeros(1, RESULT).view(np.recarray), np.full(1, options.steps_per_rev)
+        list(_together(params, refinement.settings(options), False, found, found[:, None], one))
     rainflow.count(np.zeros((2, 8, 6)))

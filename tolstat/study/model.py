@@ -39,8 +39,8 @@ class Solver(Strict):
         Number of parts of a step where a contact switches on a load's peak, see `kernel.revolution.closeup`; with 1
         these steps are not repeated.
     max_refinements : int
-        Maximum number of times that a joint's error tolerance for adaptive steps is tightened, see `refinement`; 0
-        leaves all joints at `steps_per_rev`.
+        Maximum number of times that the steps of a refined joint are halved to estimate their error, see `refinement`;
+        0 leaves all joints at `steps_per_rev`.
     duration : int
         Revolutions for which the largest loads of a joint that never repeats are estimated, see `stationary`.
     """

@@ -127,22 +127,22 @@ def parts_of(mesh):
 
 
 @njit
-def set_scale(largest_force, largest_torque, closure, options, par, memory, weight):
+def set_scale(closure, turns, options, par, memory, weight):
     """Set the loads that errors are relative to, and the weights of residuals for a given closure error.
 
     Parameters
     ----------
-    largest_force, largest_torque : float
-        Largest loads of the joint, N and N m.
     closure : float
         Closure error that is to be detected.
+    turns : record
+        Holds the largest loads of the joint, ``force`` (N) and ``torque`` (N m).
     options, par
         Settings and record of PARAM.
     memory, weight : ndarray
         As in State, with the tolerance in `memory`; written.
     """
-    memory[FORCE], memory[TORQUE] = largest_force, largest_torque
+    memory[FORCE], memory[TORQUE] = turns.force, turns.torque
     share = min(NEWTON_SHARE * memory[TOLERANCE], SETTLE_SHARE * closure)
-    small = max(options.newton_tol * typical_force(par), share * largest_force)
+    small = max(options.newton_tol * typical_force(par), share * turns.force)
     set_weight(small / options.newton_tol, par, weight)
     memory[LAST_ITERATION_BELOW] = LAST_ITERATION_FACTOR * options.newton_tol

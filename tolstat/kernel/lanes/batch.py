@@ -22,6 +22,7 @@ from tolstat.kernel.integrators.state import (
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import WORK
+from tolstat.kernel.revolution.peaks import PEAKS
 from tolstat.kernel.revolution.resolve import Pasts, make_pasts
 from tolstat.kernel.revolution.settle import make_samples
 from tolstat.kernel.revolution.trail import make_notes
@@ -46,6 +47,7 @@ CONTROL = np.dtype(
         (name, "f8")
         for name in ("phase", "live", "fresh", "passed", "origin", "grid", "pseudo", "stage", "error", "worst")
     ]
+    + [(name, "f8") for name in ("count", "until")]
     + [(name, "f8") for name in ("steps", "iterations", "halvings", "factorisations")]
     + [(name, "i8", WIDTH) for name in ("joint", "k", "level", "done", "tries", "left", "part", "looked", "began")]
 )
@@ -59,6 +61,7 @@ CONTROL = np.dtype(
 - ``origin``, ``grid``: start and length of the step of the output grid, cell, or part of a closer look, s
 - ``pseudo``: step of pseudo-time, s; ``tries``: number of such steps
 - ``stage``: of a part of a cell, 0 or 1; ``error``: of that part; ``worst``: of the cell's worst part
+- ``count``, ``until``: explicit steps of the revolution that are done; steps up to the next point of the output grid
 - ``steps``, ``iterations``, ``halvings``, ``factorisations``: counters as of State
 - ``joint``: index of the joint; ``k``: grid point, cell or angle that is being solved
 - ``level``: halvings of the sub-step or part; at an angle, attempts that failed; in pseudo-time, as `course.FROM_GUESS`
@@ -77,6 +80,7 @@ class Batch(NamedTuple):
     kept: np.record  # factorised tangents in use; each lane replaces only its own
     motion: np.record
     control: np.record
+    peaks: np.record
     samples: np.recarray  # (WIDTH, steps_per_rev) SAMPLE
     fine: np.recarray  # (WIDTH, 3) SAMPLE, as in `settle.Ring`
     notes: np.recarray  # (WIDTH,) NOTES
@@ -100,15 +104,21 @@ PLACE = _places()
 def make_batch(options: Options) -> Batch:
     """Allocate."""
     pars = aligned_zeros(1, lane_dtype(PARAM)).view(np.recarray)
-    work, kept, motion, control = (
-        aligned_zeros(1, lane_dtype(dtype)).view(np.recarray)[0] for dtype in (WORK, WORK, MOTION, CONTROL)
+    work, kept, motion, control, peaks = (
+        aligned_zeros(1, lane_dtype(dtype)).view(np.recarray)[0] for dtype in (WORK, WORK, MOTION, CONTROL, PEAKS)
     )
     motion.weight[:] = 1.0
     words = pars.view(np.float64).view(np.ndarray)
     samples = make_samples(WIDTH, options.steps_per_rev)
     fine = make_samples(WIDTH, 3)
     notes, pasts = make_notes(WIDTH), make_pasts(WIDTH, options)
-    return Batch(pars[0], words, work, kept, motion, control, samples, fine, notes, pasts)
+    return Batch(pars[0], words, work, kept, motion, control, peaks, samples, fine, notes, pasts)
+
+
+@njit
+def samples_of(lane, batch, samples):
+    """Samples of the lane's joint: its row of `samples` if the caller keeps them, else those of the batch."""
+    return samples[batch.control.joint[lane]] if len(samples) > 0 else batch.samples[lane]
 
 
 @njit

@@ -22,12 +22,12 @@ from tolstat.kernel.integrators.state import AHEAD, H_OLD, STAGED_STEP
 from tolstat.kernel.integrators.trbdf2 import GAMMA
 from tolstat.kernel.lanes.batch import ANGLE, CHECK, HOLD, PART, RELAX, STEP, start_newton
 from tolstat.kernel.mechanics.topology import N_DOF, PSI
+from tolstat.kernel.revolution.adaptive import adapt_mesh, begin_mesh
 from tolstat.kernel.revolution.closeup import count_in
 from tolstat.kernel.revolution.equilibrium import CV_STATIC, FIRST, GROWTH, LARGEST, MAX_STEPS, SHRINK, SMALLEST
 from tolstat.kernel.revolution.quasistatic import angle_time, end_closure
 from tolstat.kernel.revolution.resolve import (
     after_revolution,
-    begin_turns,
     clear_extremes,
     follows_error,
     merge_extremes,
@@ -245,7 +245,7 @@ def fall_back(lane, par, options, control, motion):
 @njit
 def start_cells(lane, par, options, control, motion, past):
     """Start error-controlled steps in a lane."""
-    begin_turns(par, options, motion.memory[:, lane], motion.weight[:, lane], past)
+    begin_mesh(par, options, motion.memory[:, lane], motion.weight[:, lane], past)
     control.grid[lane] = grid_step(par, options) / cells_of(options.steps_per_rev)
     start_cell(lane, 1, options, control, motion, past)
 
@@ -342,8 +342,9 @@ def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
             predict_increment(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
     if c % past.mesh.size == 0:
         point = motion.q0[:, lane], motion.v0[:, lane], motion.a0[:, lane]
-        memory, weight, spent = motion.memory[:, lane], motion.weight[:, lane], int(control.iterations[lane])
-        status, goes_on = after_revolution(point, memory, weight, spent, par, options, samples, past, out)
+        spent, halved = int(control.iterations[lane]), turns.halved
+        status, goes_on = after_revolution(point, spent, par, options, samples, past, out)
+        adapt_mesh(halved, par, options, motion.memory[:, lane], motion.weight[:, lane], past)
         if turns.beside == 1:
             c -= past.mesh.size
     if goes_on:

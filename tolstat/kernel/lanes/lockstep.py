@@ -8,7 +8,7 @@ the queue. A joint in which a step or angle has finally failed is simulated agai
 of the result.
 """
 
-from tolstat.kernel.integrators.mesh import cells_of, load_error
+from tolstat.kernel.integrators.mesh import cells_of, load_error, parts_of
 from tolstat.kernel.lanes.batch import (
     ANGLE,
     HOLD,
@@ -20,6 +20,7 @@ from tolstat.kernel.lanes.batch import (
     put_joint,
     put_points,
     put_start,
+    samples_of,
     start_newton,
 )
 from tolstat.kernel.lanes.course import (
@@ -75,12 +76,6 @@ that wait stand still."""
 
 
 @njit
-def samples_of(lane, batch, samples):
-    """Samples of the lane's joint: its row of `samples` if the caller keeps them, else those of the batch."""
-    return samples[batch.control.joint[lane]] if len(samples) > 0 else batch.samples[lane]
-
-
-@njit
 def finish_joint(lane, status, rows, options, alone, batch, samples, results):
     """Continue a lane whose joint has ended, or whose step of a closer look has: next closer look, or results.
 
@@ -109,7 +104,7 @@ def finish_joint(lane, status, rows, options, alone, batch, samples, results):
         if closer and next_closeup_step(lane, k, par, options, alone, batch, own, out):
             return
         get_counters(lane, batch, state.counters)
-        write_counters(status, options, state.counters, batch.pasts.mesh[lane], out)
+        write_counters(status, options.steps_per_rev, state.counters, out)
     else:
         simulate_joint(par, options, alone, out)
         for s in range(own.size):
@@ -127,7 +122,7 @@ def finish_adaptive_joint(lane, status, options, alone, batch, blocks, results):
     cells = cells_of(options.steps_per_rev)
     get_counters(lane, batch, counters)
     failed = (batch.control.k[lane] + cells - 1) // cells if status == NEWTON_FAILED else -1
-    finish(status, failed, options, counters, batch.pasts.mesh[lane], results[joint])
+    finish(status, failed, parts_of(batch.pasts.mesh[lane]), options, counters, results[joint])
     for r in range(blocks.shape[1]):
         if joint < len(blocks):
             blocks[joint, r] = batch.pasts.revolution[lane, r]

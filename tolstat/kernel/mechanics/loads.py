@@ -55,3 +55,19 @@ def all_loads(lane, par, work, v, value):
     for b in range(8):
         value[FORCES + b], value[TORQUES + b] = modulus(0, b, lane, work), modulus(3, b, lane, work)
     other_loads(lane, par, work, v, value)
+
+
+@njit
+def loads_to_follow(work, v, value):
+    """Write squares of the bushings' moduli and all other loads to `value`, (N_LOADS,), in all lanes at once.
+
+    `v`: velocities that ``work`` was evaluated at, (55,).
+    """
+    for b in range(8):
+        for kind in range(2):
+            x, y, z = work.load[b, 3 * kind], work.load[b, 3 * kind + 1], work.load[b, 3 * kind + 2]
+            value[(FORCES, TORQUES)[kind] + b] = x * x + y * y + z * z
+    for pin in range(4):
+        for i in range(len(CONTACTS)):
+            value[CONTACT_FORCES + len(CONTACTS) * pin + i] = work.contact[pin, i]
+    value[SPEED_ERROR] = abs(v[PSI] / (work.shaft[0] + v[PSI]))

@@ -1,8 +1,16 @@
 """Simulation of one joint with error-controlled steps (`mesh`); `resolve` decides after each revolution."""
 
 from tolstat.kernel.integrators import integrate
-from tolstat.kernel.integrators.mesh import cells_of, load_error, next_level, note_cell
-from tolstat.kernel.integrators.state import CV_FACTORISED, HALVINGS, ITERATIONS, STAGED_STEP
+from tolstat.kernel.integrators.mesh import (
+    cells_of,
+    forget_mesh,
+    load_error,
+    next_level,
+    note_cell,
+    refine_mesh,
+    set_scale,
+)
+from tolstat.kernel.integrators.state import CV_FACTORISED, HALVINGS, ITERATIONS, STAGED_STEP, TOLERANCE
 from tolstat.kernel.revolution.closeup import count_in
 from tolstat.kernel.revolution.resolve import (
     NEWTON_FAILED,
@@ -10,14 +18,38 @@ from tolstat.kernel.revolution.resolve import (
     after_revolution,
     begin_turns,
     clear_extremes,
+    closure_target,
     merge_extremes,
 )
 from tolstat.kernel.revolution.settle import grid_step, predict_increment, record
-from tolstat.kernel.simd.jit import njit_inner
+from tolstat.kernel.simd.jit import njit, njit_inner
 
 predict, accept, stages = integrate.predict, integrate.accept, integrate.stages
 REFUSED = 1e300
 """Error of a cell in which Newton's iteration failed."""
+
+
+TIGHTER = 8
+"""Factor from one tolerance to the next tighter one: it halves the steps."""
+
+
+@njit
+def begin_mesh(par, options, memory, weight, past):
+    """Initialise `past`, and `memory` and `weight` of State, for a joint at its start."""
+    begin_turns(par, options, past)
+    forget_mesh(past.mesh)
+    memory[TOLERANCE] = options.rtol
+    set_scale(closure_target(options, past.turns), past.turns, options, par, memory, weight)
+
+
+@njit
+def adapt_mesh(halved, par, options, memory, weight, past):
+    """Prepare the next revolution; `halved`: number of times that steps had been halved before this one."""
+    if past.turns.halved > halved:
+        memory[TOLERANCE] /= TIGHTER
+        refine_mesh(past.mesh)
+    memory[STAGED_STEP] = 0.0  # the stage may belong to the other motion
+    set_scale(closure_target(options, past.turns), past.turns, options, par, memory, weight)
 
 
 def build_resolve(newton, begin):
@@ -108,7 +140,7 @@ def build_resolve(newton, begin):
     @njit_inner
     def resolve(par, options, work, state, ring, past, out):
         begin(par, options, work, state)
-        begin_turns(par, options, state.memory, state.weight, past)
+        begin_mesh(par, options, state.memory, state.weight, past)
         cells = cells_of(options.steps_per_rev)
         length = grid_step(par, options) / cells
         c = 0
@@ -125,8 +157,9 @@ def build_resolve(newton, begin):
                 predict_increment(k, state.q0, state.v0, state.ahead, ring.samples)
             if c % past.mesh.size == 0:
                 point, spent = (state.q0, state.v0, state.a0), state.counters[ITERATIONS]
-                memory, weight = state.memory, state.weight
-                status, goes_on = after_revolution(point, memory, weight, spent, par, options, ring.samples, past, out)
+                halved = past.turns.halved
+                status, goes_on = after_revolution(point, spent, par, options, ring.samples, past, out)
+                adapt_mesh(halved, par, options, state.memory, state.weight, past)
                 if past.turns.beside == 1:
                     c -= past.mesh.size
         return status

@@ -1,11 +1,11 @@
-"""Decisions after each revolution of a joint with error-controlled steps (`mesh`).
+"""Decisions after each revolution of a joint with error-controlled steps (`mesh`) or explicit ones (`explicit`).
 
-Once the motion repeats, after one or several revolutions, the joint continues with a tighter tolerance until it repeats
+Once the motion repeats, after one or several revolutions, the joint continues with steps half as long until it repeats
 again: from the change of the largest loads their error is estimated. A joint that does not repeat is integrated up to a
-limit. Over its last revolutions a neighbouring motion, started at a small distance, is integrated on the same mesh and
-scaled back to that distance after each revolution: the mean logarithm of the growth is the largest Lyapunov exponent
-(Benettin et al. 1980). The input angle is prescribed, so that no exponent is trivially zero: a negative one belongs to
-a motion that repeats, zero to a quasi-periodic and a positive one to a chaotic motion.
+limit. Over its last revolutions a neighbouring motion, started at a small distance, is integrated with the same steps
+and scaled back to that distance after each revolution: the mean logarithm of the growth is the largest Lyapunov
+exponent (Benettin et al. 1980). The input angle is prescribed, so that no exponent is trivially zero: a negative one
+belongs to a motion that repeats, zero to a quasi-periodic and a positive one to a chaotic motion.
 """
 
 import math
@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Motion, Options, Status
-from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
-from tolstat.kernel.integrators.state import STAGED_STEP, TOLERANCE
+from tolstat.kernel.integrators.mesh import CELL, cells_of
 from tolstat.kernel.mechanics.loads import FORCES, N_COURSES, N_LOADS, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
@@ -31,21 +30,19 @@ OK, NOT_SETTLED, NOT_PERIODIC = int(Status.OK), int(Status.NOT_SETTLED), int(Sta
 TR_BDF2, DYNAMIC = int(Method.TR_BDF2), int(Fidelity.DYNAMIC)
 NEWTON_FAILED, NOT_FINITE = int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
 
-TIGHTER = 8
-"""Factor from one tolerance to the next tighter one: it halves the steps."""
 NEARLY, PATIENT = 1.5e-2, 10
-"""Closure error at which the tolerance is tightened, if need be, and number of revolutions after which the first one is
-tightened anyway: a joint need not settle with every tolerance."""
+"""Closure error at which the steps are halved, if need be, and number of revolutions after which the first ones are
+halved anyway: a joint need not settle with all steps."""
 ENOUGH = 0.1
 """Closure error at which a joint has settled in any case, in units of the last change of its largest loads: a third of
 their error."""
 RESOLVED = 2e-2
-"""Change of the largest loads by a tighter tolerance, relative to the largest of their kind, up to which no further one
-follows. A method of order 2 leaves a third of it as error."""
+"""Change of the largest loads by halving the steps, relative to the largest of their kind, up to which these are not
+halved again. A method of order 2 leaves a third of it as error."""
 FAR = 2 * RESOLVED
-"""Change in the first revolution with a tighter tolerance above which the next one follows at once."""
+"""Change in the first revolution with steps half as long above which they are halved again at once."""
 SETTLING = 16
-"""Minimum number of revolutions with a tighter tolerance before a joint is given up."""
+"""Minimum number of revolutions with steps half as long before a joint is given up."""
 LONGEST_PERIOD = 8
 """Longest period that is recognised, revolutions."""
 MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.1, 10.0, 4.0
@@ -66,13 +63,17 @@ MOST_ITERATIONS = 3_000_000
 TURNS = np.dtype(
     [
         ("revolution", "i8"),  # revolutions completed
-        ("since", "i8"),  # revolutions completed before the tolerance in use
+        ("since", "i8"),  # revolutions completed before the steps in use
         ("limit", "i8"),  # revolutions after which the joint is given up
-        ("tightened", "i8"),  # number of times that the tolerance was tightened
-        ("period", "i8"),  # period found with the tolerance before, revolutions; 0: none
+        ("halved", "i8"),  # number of times that the steps were halved to estimate their error
+        ("period", "i8"),  # period found with the steps before, revolutions; 0: none
         ("beside", "i8"),  # 1 while the neighbouring motion is integrated
+        ("force", "f8"),  # largest |F| of the last revolution, N; before the first one, an estimate
+        ("torque", "f8"),  # largest |T|, N m
+        ("steps", "i8"),  # explicit steps of a revolution before they were halved
+        ("bearable", "f8"),  # contact force of an end station up to which the steps in use are stable, N
         ("growth", "f8"),  # sum of the logarithms of its growth
-        ("before", "f8", N_COURSES),  # largest bushing loads with the tolerance before
+        ("before", "f8", N_COURSES),  # largest bushing loads with the steps before
         ("other", "f8", (3, N_DOF)),  # q, v, a of the neighbour; of the joint while `beside` is 1
     ]
 )
@@ -133,20 +134,18 @@ def follows_error(options):
 
 @njit
 def closure_target(options, turns):
-    """Closure error at which a joint is finished with the tolerance in use: it ends or the tolerance is tightened."""
-    return options.settle_tol if turns.tightened > 0 else max(NEARLY, options.settle_tol)
+    """Closure error at which a joint is finished with the steps in use: it ends or they are halved."""
+    return options.settle_tol if turns.halved > 0 else max(NEARLY, options.settle_tol)
 
 
 @njit
-def begin_turns(par, options, memory, weight, past):
-    """Initialise `past`, and `memory` and `weight` of State, for a joint at its start."""
+def begin_turns(par, options, past):
+    """Initialise `past` for a joint at its start."""
     turns = past.turns
-    turns.revolution = turns.since = turns.tightened = turns.period = turns.beside = 0
+    turns.revolution = turns.since = turns.halved = turns.period = turns.beside = 0
     turns.limit, turns.growth = options.max_revs, 0.0
-    memory[TOLERANCE] = options.rtol
-    force = typical_force(par)
-    set_scale(force, force * par.R, closure_target(options, turns), options, par, memory, weight)
-    forget_mesh(past.mesh)
+    turns.force = typical_force(par)
+    turns.torque = turns.force * par.R
     past.trail.notes.count = 0
     clear_extremes(past.extremes[1])
 
@@ -215,27 +214,25 @@ def find_period(last, closure, tolerance, turns, trail):
 
 
 @njit
-def tighten(period, options, memory, mesh, turns, out):
-    """Tighten the tolerance; keep `period` and the largest loads in `out` for comparison."""
-    memory[TOLERANCE] /= TIGHTER
-    refine_mesh(mesh)
+def halve_steps(period, turns, out):
+    """Halve the steps from the next revolution on; keep `period` and the largest loads in `out` for comparison."""
     copy(out.largest[:N_COURSES], turns.before)
-    turns.tightened += 1
+    turns.halved += 1
     turns.since, turns.period = turns.revolution, period
     turns.limit = max(turns.limit, turns.revolution + SETTLING)
 
 
 @njit
-def repeats(last, options, memory, mesh, trail, turns, out):
-    """Whether a joint repeats and its largest loads are resolved or no tolerance is left; may tighten the tolerance."""
+def repeats(last, options, trail, turns, out):
+    """Whether a joint repeats and its largest loads are resolved or no halving is left; may halve the steps."""
     period = find_period(last, out.closure, max(NEARLY, options.settle_tol), turns, trail)
-    tired = turns.tightened == 0 and last + 1 >= PATIENT
+    tired = turns.halved == 0 and last + 1 >= PATIENT
     if period == 0 and not tired:
         return False
     combine(last, max(1, period), trail, out)
-    change = largest_change(turns.before, out) if turns.tightened > 0 else np.nan
-    if turns.tightened < options.max_refinements and not change <= RESOLVED:
-        tighten(period, options, memory, mesh, turns, out)
+    change = largest_change(turns.before, out) if turns.halved > 0 else np.nan
+    if turns.halved < options.max_refinements and not change <= RESOLVED:
+        halve_steps(period, turns, out)
         return False
     period = find_period(last, out.closure, max(ENOUGH * change, options.settle_tol), turns, trail)
     if period == 0:
@@ -321,17 +318,15 @@ def neighbour_done(q, v, a, par, options, turns):
 
 
 @njit
-def after_revolution(point, memory, weight, iterations, par, options, samples, past, out):
+def after_revolution(point, iterations, par, options, samples, past, out):
     """Decide how a joint continues after a revolution.
 
     Parameters
     ----------
     point : tuple of ndarray, shape (55,)
         q, v, a of the joint; exchanged for those of the neighbour, and back.
-    memory, weight : ndarray
-        Of State; the tolerance and the scales of errors and residuals are set.
     iterations : int
-        Newton iterations so far.
+        Newton iterations so far, or explicit steps in units of one.
     par, options
         Joint and settings.
     samples : ndarray of SAMPLE
@@ -350,7 +345,6 @@ def after_revolution(point, memory, weight, iterations, par, options, samples, p
     """
     q, v, a = point
     trail, turns = past.trail, past.turns
-    memory[STAGED_STEP] = 0.0  # the stage may belong to the other motion
     if turns.beside == 1:
         neighbour_done(q, v, a, par, options, turns)
         if turns.revolution == turns.limit:
@@ -365,15 +359,14 @@ def after_revolution(point, memory, weight, iterations, par, options, samples, p
     force, torque = own.largest[FORCES : FORCES + 8].max(), own.largest[TORQUES : TORQUES + 8].max()
     if not (force < 1e300 and torque < 1e300):
         return NOT_FINITE, False
-    force, torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
+    turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
         out.closure = closure_error(samples)
         note_closure(turns.revolution, out.closure, trail.notes)
-        if repeats(last, options, memory, past.mesh, trail, turns, out):
+        if repeats(last, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_PERIODIC), False
-    elif turns.period == 1 and turns.tightened < options.max_refinements and largest_change(turns.before, own) > FAR:
-        tighten(1, options, memory, past.mesh, turns, own)
-    set_scale(force, torque, closure_target(options, turns), options, par, memory, weight)
+    elif turns.period == 1 and turns.halved < options.max_refinements and largest_change(turns.before, own) > FAR:
+        halve_steps(1, turns, own)
     if turns.limit > BESIDE and turns.revolution >= turns.limit - BESIDE:
         if turns.revolution == turns.limit - BESIDE:
             set_beside(q, v, a, par.R, turns)

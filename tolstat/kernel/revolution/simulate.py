@@ -233,27 +233,28 @@ def is_finite(out):
 
 
 @njit
-def write_counters(status, options, counters, mesh, out):
+def write_counters(status, steps_per_rev, counters, out):
     """Write status, step numbers and counters of a joint that has ended."""
     out.status = status
     out.settled = status == OK
-    out.steps_per_rev = parts_of(mesh) if follows_error(options) else options.steps_per_rev
+    out.steps_per_rev = steps_per_rev
     out.steps, out.newton_iterations = counters[STEPS], counters[ITERATIONS]
     out.halvings, out.factorisations = counters[HALVINGS], counters[FACTORISATIONS]
 
 
 @njit
-def finish(status, failed, options, counters, mesh, out):
+def finish(status, failed, steps_per_rev, options, counters, out):
     """Write how a joint ended; one without results is reset, with its failed step and angle.
 
-    `failed` is the step of the output grid at which the joint failed, -1 if at none.
+    `failed` is the step of the output grid at which the joint failed, -1 if at none; `steps_per_rev` counts those of
+    the last revolution.
     """
     if status not in (OK, NOT_SETTLED, NOT_PERIODIC):
         clear_results(out)
         if failed > 0:
             out.failed_step = failed
             out.failed_theta = 2 * math.pi * ((failed - 1) % options.steps_per_rev) / options.steps_per_rev
-    write_counters(status, options, counters, mesh, out)
+    write_counters(status, steps_per_rev, counters, out)
 
 
 @njit
@@ -299,7 +300,8 @@ def simulate_joint(par, options, alone, out):
         write_diagnostics(status, par, options, ring.notes, ring.samples, out)
         if status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1:
             look_closer(par, options, work, state, ring.samples, ring.fine, out)
-    finish(status, failed, options, state.counters, past.mesh, out)
+    taken = parts_of(past.mesh) if controlled else options.steps_per_rev
+    finish(status, failed, taken, options, state.counters, out)
 
 
 class Scratch(NamedTuple):

@@ -1,0 +1,130 @@
+"""Explicit steps: order, stability limit and its bound, loads that are followed at every step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tolstat.common.tables import Options
+from tolstat.kernel.integrators.stability import depth_at, eigenvalue, fewest_steps, largest_force
+from tolstat.kernel.integrators.state import make_state_record
+from tolstat.kernel.integrators.verlet import correct, predict
+from tolstat.kernel.mechanics.topology import (
+    ARM,
+    ARM_OF_PIN,
+    BUSHING_BASE,
+    BUSHING_LUMP,
+    FRAME,
+    FRAME_I,
+    HUB,
+    N_DOF,
+    N_LUMPS,
+    OUTPUT_SHAFT,
+    PIN,
+    PSI,
+    TRIAD,
+)
+from tolstat.kernel.mechanics.work import make_work
+from tolstat.kernel.revolution.peaks import PEAKS, follow_value, forget
+
+
+def oscillator(steps: int, stiffness: float, damping: float, end: float = 1.0) -> float:
+    """Displacement at `end` of an oscillator of mass 1 that starts from 1, at rest."""
+    state, h = make_state_record(N_DOF), end / steps
+    state.q[:], state.v[:], state.a[:] = 1.0, 0.0, -stiffness
+    for _ in range(steps):
+        predict(h, state)
+        state.a[:] = -stiffness * state.q - damping * state.v
+        correct(h, state)
+    return float(state.q[0])
+
+
+def test_order_is_two() -> None:
+    stiffness, damping = 50.0, 3.0
+    omega = np.sqrt(stiffness - damping**2 / 4)
+    true = np.exp(-damping / 2) * (np.cos(omega) + damping / (2 * omega) * np.sin(omega))
+    errors = [abs(oscillator(n, stiffness, damping) - true) for n in (40, 80, 160, 320, 640, 1280)]
+    assert np.abs(np.log2(np.divide(errors[:-1], errors[1:])) - 2).max() < 0.2
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.99])
+def test_steps_are_stable_up_to_the_limit(share: float) -> None:
+    """h^2/4 k + h c just below and just above 1, of which `share` is damping."""
+    for limit, bounded in ((0.97, True), (1.03, False)):
+        stiffness, damping = 4 * (1 - share) * limit, share * limit
+        assert (abs(oscillator(2000, stiffness, damping, 2000.0)) < 10) == bounded
+
+
+def dense(h: float, depth: float, par: np.record) -> np.ndarray:
+    """M^-1/2 (h^2/4 K + h C) M^-1/2, (55, 55), spring by spring."""
+    found, mass = np.zeros((N_DOF, N_DOF)), np.zeros(N_DOF)
+
+    def add(one: int, other: int, on_one: np.ndarray, on_other: np.ndarray, k: float, c: float) -> None:
+        row = np.zeros(N_DOF)
+        row[6 * one : 6 * one + 6] = on_one
+        if other < N_LUMPS:
+            row[6 * other : 6 * other + 6] -= on_other
+        elif other == OUTPUT_SHAFT:
+            row[PSI] = -on_other[5]
+        found[:] += (h * h / 4 * k + h * c) * np.outer(row, row)
+
+    for lump, base in zip(BUSHING_LUMP, BUSHING_BASE, strict=True):
+        e, z = TRIAD[lump][0], np.array([0, 0, -par.l_f if FRAME[lump] == FRAME_I else par.l_f])
+        k, c = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
+        on_lump, on_base = ((par.r_b - par.R) * e, par.r_b * e) if base == HUB else (z, par.R * e + z)
+        for i, axis in enumerate(TRIAD[lump]):
+            forces = np.r_[axis, np.cross(on_lump, axis)], np.r_[axis, np.cross(on_base, axis)]
+            torques = np.r_[0 * axis, axis], np.r_[0 * axis, axis]
+            add(lump, base, *forces, k[i], c[i])
+            add(lump, base, *torques, k[3 + i], c[3 + i])
+    for pin in range(4):
+        for j in range(par.n_stations):
+            slope, c = 2 * par.station_k1[j] * depth + par.station_k2[j], par.c_d * par.station_weight[j]
+            for axis in TRIAD[PIN + pin][1:]:
+                along = np.r_[axis, np.cross(par.station_s[j] * TRIAD[PIN + pin][0], axis)]
+                add(PIN + pin, ARM + ARM_OF_PIN[pin], along, along, slope, c)
+    for body in range(N_LUMPS):
+        name = "hub" if body == HUB else "pin" if body < ARM else "arm"
+        mass[6 * body : 6 * body + 3] = par[f"{name}_mass"]
+        mass[6 * body + 3 : 6 * body + 6] = np.abs(TRIAD[body].T @ par[f"{name}_inertia"])
+    mass[PSI] = par.Js
+    return found / np.sqrt(np.outer(mass, mass))
+
+
+def test_the_largest_eigenvalue_is_that_of_the_matrices(params, random_errors) -> None:
+    par = params(**random_errors(4))[0]
+    work = make_work()
+    for h in (2e-6, 5e-6, 1e-4):
+        for depth in (0.0, 2e-5, 2e-4):
+            true = np.linalg.eigvalsh(dense(h, depth, par))[-1]
+            assert 0.98 * true < eigenvalue(h, depth, par, work) <= true * (1 + 1e-12)
+
+
+def test_steps_are_stable_and_not_many_more_than_needed(params, random_errors) -> None:
+    par = params(**random_errors(4))[0]
+    work, options = make_work(), Options()
+    steps = fewest_steps(par, options, work)
+    assert steps % options.steps_per_rev == 0
+    period, force = 2 * np.pi / par.omega, largest_force(steps, par, work)
+    depth = depth_at(force, par)
+    assert (par.station_k1[0] * depth + par.station_k2[0]) * depth == pytest.approx(force, rel=1e-12)
+    assert np.linalg.eigvalsh(dense(period / steps, depth, par))[-1] < 1
+    assert np.linalg.eigvalsh(dense(period / (0.9 * steps), depth, par))[-1] > 0.95
+    assert largest_force(2 * steps, par, work) > force
+
+
+def test_peaks_between_steps_are_met() -> None:
+    peaks = np.zeros(1, PEAKS).view(np.recarray)[0]
+    forget(True, peaks)
+    curve = 3 + np.sin(0.3 * np.arange(25) + 0.2)
+    for value in curve:
+        peaks.now[2] = value
+        follow_value(2, peaks)
+    assert curve.max() < 4 - 1e-3
+    assert peaks.top[2] == pytest.approx(4, abs=2e-4)
+    assert (peaks.one[2], peaks.two[2]) == (curve[-1], curve[-2])
+    forget(True, peaks)
+    for value in (5.0, 4.0, 3.0):
+        peaks.now[2] = value
+        follow_value(2, peaks)
+    assert peaks.top[2] == 5.0

@@ -1,0 +1,170 @@
+"""Longest step for which `verlet` is stable, from the parameters of a joint.
+
+The joint is linearised in the ideal pose with the stations of all pins closed, at one depth and in both directions
+across the pin: more than can press at a time. The largest eigenvalue of M^-1 (h^2/4 K + h C), which must be below 1 for
+`verlet`, is found by power iteration.
+"""
+
+import math
+
+from tolstat.kernel.mechanics.bushing import accumulate, markers
+from tolstat.kernel.mechanics.dynamics import mass_of
+from tolstat.kernel.mechanics.scale import typical_force
+from tolstat.kernel.mechanics.topology import (
+    ARM,
+    ARM_OF_PIN,
+    BUSHING_BASE,
+    BUSHING_LUMP,
+    HUB,
+    INPUT_SHAFT,
+    N_BODIES,
+    N_LUMPS,
+    OUTPUT_SHAFT,
+    PIN,
+    TRIAD,
+)
+from tolstat.kernel.mechanics.triad import from_triad, to_triad
+from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub
+from tolstat.kernel.simd.jit import njit
+
+STABLE = 0.98
+"""Largest eigenvalue up to which a step counts as stable: the power iteration approaches it from below."""
+ITERATIONS = 60
+IMPACT = 15.0
+"""Contact force of an end station, in units of the joint's typical force, that the first steps are stable for."""
+FALL = 0.7
+"""Exponent of the step's correction: the eigenvalue grows with a power of the step between 1 and 2."""
+TRIES = 20
+"""Maximum number of times that a step is added to each of the output grid's."""
+DEEPER, DEEPEST = 1.2, 100
+"""Factor from one depth to the next one that is tried, and maximum number of depths."""
+TOO_MANY = 2**31 - 1
+"""Number of steps that stands for no stable step found."""
+
+
+@njit
+def press_on(h, stiffness, damping):
+    """Share of a spring and its damper in h^2/4 K + h C."""
+    return h * (0.25 * h * stiffness + damping)
+
+
+@njit
+def connect(one, other, on_one, on_other, along, about, work):
+    """Add the forces between points `on_one` and `on_other` of two bodies that move by ``work.vel`` and ``work.spin``.
+
+    `along`, `about`: factors of displacement and rotation along e, t, z of body `one`; ``work.force`` is added to.
+    """
+    here = add(row(work.vel, one), cross(row(work.spin, one), on_one))
+    there = add(row(work.vel, other), cross(row(work.spin, other), on_other))
+    d, phi = to_triad(one, sub(here, there)), to_triad(one, sub(row(work.spin, one), row(work.spin, other)))
+    f = from_triad(one, (along[0] * d[0], along[1] * d[1], along[2] * d[2]))
+    torque = from_triad(one, (about[0] * phi[0], about[1] * phi[1], about[2] * phi[2]))
+    accumulate(work.force, one, f, add(cross(on_one, f), torque))
+    accumulate(work.force, other, scale(-1.0, f), scale(-1.0, add(cross(on_other, f), torque)))
+
+
+@njit
+def multiply(h, depth, par, work):
+    """Multiply the motion ``work.vel``, ``work.spin`` by h^2/4 K + h C; the product is written to ``work.force``."""
+    for body in range(N_BODIES):
+        for k in range(6):
+            work.force[body, k] = 0.0
+    for i in range(8):
+        lump, base = BUSHING_LUMP[i], BUSHING_BASE[i]
+        on_lump, on_base = markers(i, par)
+        k, c = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
+        along = press_on(h, k[0], c[0]), press_on(h, k[1], c[1]), press_on(h, k[2], c[2])
+        about = press_on(h, k[3], c[3]), press_on(h, k[4], c[4]), press_on(h, k[5], c[5])
+        connect(lump, base, on_lump, on_base, along, about, work)
+    for pin in range(4):
+        body = PIN + pin
+        for j in range(par.n_stations):
+            slope = 2 * par.station_k1[j] * depth + par.station_k2[j]
+            across = press_on(h, slope, max(par.c_d, par.c_t) * par.station_weight[j])
+            at = scale(par.station_s[j], row(TRIAD[body], 0))
+            connect(body, ARM + ARM_OF_PIN[pin], at, at, (0.0, across, across), (0.0, 0.0, 0.0), work)
+
+
+@njit
+def eigenvalue(h, depth, par, work):
+    """Largest eigenvalue of M^-1 (h^2/4 K + h C) for steps `h` (s) and stations pressed to `depth` (m)."""
+    for body in range(N_BODIES):
+        for k in range(3):
+            work.vel[body, k] = work.spin[body, k] = 0.0
+    for body in range(N_LUMPS):
+        for k in range(3):  # any motion without a symmetry
+            work.vel[body, k] = 0.5 + (7 * k + 3 * body) % 5
+            work.spin[body, k] = (0.5 + (5 * k + 4 * body) % 7) / par.R
+    work.spin[OUTPUT_SHAFT, 2] = 1 / par.R
+    found = 0.0
+    for _ in range(ITERATIONS):
+        multiply(h, depth, par, work)
+        work_done = work.spin[OUTPUT_SHAFT, 2] * work.force[OUTPUT_SHAFT, 5]
+        energy = par.Js * work.spin[OUTPUT_SHAFT, 2] ** 2
+        work.spin[OUTPUT_SHAFT, 2] = work.force[OUTPUT_SHAFT, 5] / par.Js
+        for body in range(N_LUMPS):
+            mass, inertia = mass_of(body, par)
+            turning = to_triad(body, row(work.spin, body))
+            torque = to_triad(body, (work.force[body, 3], work.force[body, 4], work.force[body, 5]))
+            for k in range(3):
+                x, y = work.vel[body, k], work.force[body, k]
+                work_done += x * y + turning[k] * torque[k]
+                energy += mass * x * x + inertia[k] * turning[k] * turning[k]
+                work.vel[body, k] = y / mass
+            faster = (torque[0] / inertia[0], torque[1] / inertia[1], torque[2] / inertia[2])
+            faster = from_triad(body, faster)
+            for k in range(3):
+                work.spin[body, k] = faster[k]
+        found = work_done / energy
+        size = 1 / found
+        for body in range(N_BODIES):
+            for k in range(3):
+                work.vel[body, k], work.spin[body, k] = size * work.vel[body, k], size * work.spin[body, k]
+                if body == INPUT_SHAFT:
+                    work.spin[body, k] = 0.0
+    return found
+
+
+@njit
+def depth_at(force, par):
+    """Depth (m) to which a normal force (N) presses an end station, eq. (5)."""
+    k1, k2 = par.station_k1[0], par.station_k2[0]
+    return 2 * force / (k2 + math.sqrt(k2 * k2 + 4 * k1 * force))
+
+
+@njit
+def steps_for(force, par, options, work):
+    """Least number of steps a revolution that is stable while no end station presses with more than `force` (N).
+
+    It is a multiple of ``options.steps_per_rev``, or `TOO_MANY`; `work` is scratch.
+    """
+    period, depth = 2 * math.pi / abs(par.omega), depth_at(force, par)
+    h = period / options.steps_per_rev
+    for _ in range(6):
+        h *= (STABLE / eigenvalue(h, depth, par, work)) ** FALL
+    parts = period / h / options.steps_per_rev
+    if not parts * options.steps_per_rev < TOO_MANY / 2:
+        return TOO_MANY
+    steps = options.steps_per_rev * math.ceil(parts)
+    for _ in range(TRIES):
+        if eigenvalue(period / steps, depth, par, work) <= STABLE:
+            return steps
+        steps += options.steps_per_rev
+    return TOO_MANY
+
+
+@njit
+def fewest_steps(par, options, work):
+    """Number of steps of the first revolution, as of `steps_for`."""
+    return steps_for(IMPACT * typical_force(par), par, options, work)
+
+
+@njit
+def largest_force(steps, par, work):
+    """Contact force of an end station (N) up to which so many steps a revolution are stable; `work` is scratch."""
+    h, depth = 2 * math.pi / (abs(par.omega) * steps), depth_at(IMPACT * typical_force(par), par)
+    for _ in range(DEEPEST):
+        if not eigenvalue(h, DEEPER * depth, par, work) <= STABLE:
+            break
+        depth *= DEEPER
+    return (par.station_k1[0] * depth + par.station_k2[0]) * depth

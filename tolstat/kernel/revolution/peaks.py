@@ -1,0 +1,81 @@
+"""Largest and smallest loads of a revolution of explicit steps, followed at every step.
+
+They are the heights of parabolas through three steps, as in the closer look (`closeup`), but of squared moduli.
+"""
+
+import math
+
+import numpy as np
+
+from tolstat.common.tables import CONTACTS, INNER, OUTER
+from tolstat.kernel.mechanics.loads import CONTACT_FORCES, INTERPOLATED, N_COURSES, N_LOADS, loads_to_follow
+from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import any_of, pick, retain, where
+
+PEAKS = np.dtype(
+    [
+        ("now", "f8", N_LOADS),  # as `loads_to_follow` writes them: squares of the moduli of bushing loads, other loads
+        ("one", "f8", N_LOADS),  # of the last step
+        ("two", "f8", N_LOADS),  # of the step before
+        ("top", "f8", N_LOADS),  # largest so far
+        ("low", "f8", N_COURSES),  # smallest so far
+    ]
+)
+"""Of one joint; a batch has them in lanes."""
+NEAR = 0.9
+"""Share of the largest value so far up to which no peak between steps is looked for."""
+
+
+@njit
+def follow_value(i, peaks):
+    """Include load `i` and, where it is interpolated, its peak at the step before, if there is one."""
+    load, one, two, top = peaks.now[i], peaks.one[i], peaks.two[i], peaks.top[i]
+    if INTERPOLATED[i]:
+        at_peak = (one >= two) & (one >= load) & (one > NEAR * top)
+        if any_of(at_peak):
+            bend = 2 * one - two - load
+            bent = at_peak & (bend > 0)
+            height = one + (load - two) * (load - two) / (8 * where(bent, bend, 1.0))
+            top = max(top, where(bent, height, top))
+        peaks.one[i], peaks.two[i] = load, one
+    peaks.top[i] = max(top, load)
+    if i < N_COURSES:
+        peaks.low[i] = min(peaks.low[i], load)
+
+
+@njit
+def follow(work, v, peaks):
+    """Include the loads in ``work``; `v`: velocities that they were evaluated at, (55,)."""
+    loads_to_follow(work, v, peaks.now)
+    for i in range(N_LOADS):
+        follow_value(i, peaks)
+
+
+@njit
+def forget(mask, peaks):
+    """Reset in the lanes of the mask; NaN stands for steps before the first one, so that it is no peak."""
+    for i in range(N_LOADS):
+        peaks.top[i] = retain(mask, 0.0, peaks.top[i])
+        peaks.one[i], peaks.two[i] = retain(mask, np.nan, peaks.one[i]), retain(mask, np.nan, peaks.two[i])
+        if i < N_COURSES:
+            peaks.low[i] = retain(mask, np.inf, peaks.low[i])
+
+
+@njit
+def largest_at_an_end(lane, peaks):
+    """Largest contact force of any end station, N."""
+    largest = 0.0
+    for pin in range(4):
+        first = CONTACT_FORCES + len(CONTACTS) * pin
+        largest = max(largest, pick(peaks.top[first + OUTER], lane), pick(peaks.top[first + INNER], lane))
+    return largest
+
+
+@njit
+def write_peaks(lane, peaks, out):
+    """Write largest and smallest loads of a lane to `out`, a row of KERNEL_RESULT."""
+    for i in range(N_LOADS):
+        out.largest[i] = pick(peaks.top[i], lane)
+        if i < N_COURSES:
+            out.largest[i] = math.sqrt(out.largest[i])
+            out.reach[i] = out.largest[i] - math.sqrt(pick(peaks.low[i], lane))

@@ -184,4 +184,4 @@ def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):
         assert text in done.stderr
     done = CliRunner().invoke(cli.app, ["allocate", str(path), "--limit", "P(cross1.F > 700 N) < 0.1"])
     assert done.exit_code == 2
-    assert "share their errors" in done.stderr
+    assert "share errors with" in done.stderr

@@ -195,7 +195,7 @@ def long_reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.Temp
     return study, datasets(path)
 
 
-@pytest.mark.parametrize("moment", range(4))
+@pytest.mark.parametrize("moment", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3))])
 def test_kill_loses_at_most_the_blocks_in_work(tmp_path: Path, long_reference, moment: int) -> None:
     study, expected = long_reference
     path, workers, block = tmp_path / "a.h5", 1 + moment % 2, 2 + moment
@@ -347,6 +347,7 @@ histories = "KIND"
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["full", "harmonics", "harmonics+cycles"])
 def test_real_joints_give_the_same_bytes(tmp_path: Path, kind: str) -> None:
     (tmp_path / "real.toml").write_text(REAL_STUDY.replace("KIND", kind))

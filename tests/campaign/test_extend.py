@@ -67,7 +67,7 @@ def slices(study: Study, folder: Path, *edges: int) -> list[Path]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("method", ["random", "sobol"])
+@pytest.mark.parametrize("method", ["random", pytest.param("sobol", marks=pytest.mark.slow)])
 def test_an_extended_campaign_is_one_of_that_size(tmp_path: Path, make: Make, method: str, kind: str) -> None:
     whole = run(make(101, method, kind), tmp_path / "whole.h5")
     grown = run(make(40, method, kind), tmp_path / "grown.h5")

@@ -75,6 +75,7 @@ def force_and_torque(base, other):
     return accuracy.by_kind(accuracy.differences(base, other))[:, :2]
 
 
+@pytest.mark.slow
 def test_estimate_is_of_the_size_of_the_error(coarse):
     """What the solver's own checks give is within a factor of two of the distance to the reference, in each joint.
 
@@ -89,6 +90,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
     assert (ratio[~crossing] < 2).all()
 
 
+@pytest.mark.slow
 def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
     params = joint.perturb(plan.joint, sampling.draw(plan)[coarse.rows[-1:]])
     here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
@@ -150,7 +152,7 @@ def test_errors_are_relative_to_the_largest_of_the_kind():
     found = accuracy.differences(base, other)
     assert found[0, 2] == pytest.approx(-0.02, rel=0.03)
     assert np.count_nonzero(found[0]) == 1
-    assert accuracy.by_kind(found)[1] == pytest.approx([0, 0.2, 0, 0])
+    assert accuracy.by_kind(found)[1] == pytest.approx([0.2 if kind.name == "T" else 0 for kind in LOAD_KINDS])
     assert np.isnan(found[2]).all()
     assert accuracy.spread(accuracy.by_kind(found)[:, 1]) == pytest.approx((2, 0.1, 0.2, 0.2))
     assert accuracy.spread(found[2])[0] == 0

@@ -45,6 +45,9 @@ vary.cross.R = { from = "60 mm", to = "90 mm" }
 """
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def result(tmp_path_factory) -> Path:
     """File of the study with all of its cases but few of its variants."""

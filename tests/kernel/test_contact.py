@@ -110,6 +110,7 @@ def test_contacts_do_no_work_around_a_loop(params, random_errors, law):
     assert blend[1] > max(0.1, 0.5 * blend[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "row", "torque", "grows"),
     [("mode", 861, 100.0, False), ("mode", 39, 1000.0, False), ("uniform", 39, 1000.0, True)],

@@ -23,7 +23,7 @@ from tolstat.report import page, verdict
 from tolstat.store import ResultStore, revolutions
 from tolstat.store.reader import Reader
 from tolstat.store.recall import recall
-from tolstat.store.view import KEPT_ROWS
+from tolstat.store.view import MAX_LISTED
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
 TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
@@ -184,7 +184,7 @@ def test_joints_without_a_load_are_named_with_what_to_do_and_compared_with_the_o
     assert view.count(Status.NEWTON_FAILED) == 15
     assert view.count(Status.NOT_SETTLED) == 12
     found = joints.without_load(view)
-    assert len(found) == KEPT_ROWS
+    assert len(found) == MAX_LISTED
     assert {joint.row for joint in found} <= set(range(401 - 27, 401))
     assert all(joint.remedy for joint in found)
     table = joints.their_errors(view)

@@ -48,12 +48,12 @@ class Spread(NamedTuple):
 
 
 def loads(results: NDArray[np.void]) -> FloatArray:
-    """Collect the largest loads of joints, (m,) table RESULT, as (m, 21): SI, in the order of `OBSERVABLES`."""
+    """Collect the largest loads of joints, (m,) table RESULT, as (m, loads): SI, in the order of `OBSERVABLES`."""
     return np.concatenate([of_kind(results, kind) for kind in KINDS], axis=1)
 
 
 def sizes(results: NDArray[np.void]) -> FloatArray:
-    """Reference value of each observable in each joint: the largest load of its kind, (m, 21), SI."""
+    """Reference value of each observable in each joint: the largest load of its kind, (m, loads), SI."""
     return np.asarray(_largest(loads(results))[:, KIND_OF])
 
 
@@ -65,7 +65,7 @@ def size(results: NDArray[np.void], observable: str) -> FloatArray:
 
 
 def _largest(values: FloatArray) -> FloatArray:
-    """Largest value of each kind, (m, 21) -> (m, 4); NaN propagates unless an observable is NaN in all joints."""
+    """Largest value of each kind, (m, loads) -> (m, kinds); NaN propagates unless a load is NaN in all joints."""
     known = ~np.isnan(values).all(axis=0)
     largest = np.full((len(values), len(KINDS)), np.nan)
     for kind in range(len(KINDS)):
@@ -85,7 +85,7 @@ def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
 
     Returns
     -------
-    ndarray, shape (m, 21)
+    ndarray, shape (m, loads)
         `base` less `other`, in the order of `OBSERVABLES`; NaN where a joint is not settled in `base` or has no
         results in `other`.
     """
@@ -101,12 +101,12 @@ def estimate(changes: Mapping[str, FloatArray]) -> FloatArray:
 
     Parameters
     ----------
-    changes : mapping of str to ndarray, shape (m, 21)
+    changes : mapping of str to ndarray, shape (m, loads)
         `differences` from each check: ``half_step``, ``newton``, ``settling`` and, if made, ``method``, ``fidelity``.
 
     Returns
     -------
-    ndarray, shape (m, 21)
+    ndarray, shape (m, loads)
         Time discretisation error (the larger of the extrapolated change under half the step and the change under
         another method) plus the errors of Newton's tolerance, of the settling tolerance, and of a fidelity below
         dynamic; relative, not negative.
@@ -123,7 +123,7 @@ def numerical(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) ->
 
     Returns
     -------
-    ndarray, shape (m, 21)
+    ndarray, shape (m, loads)
         Relative, not negative; NaN where neither is available.
     """
     changes = {name: differences(base, results) for name, results in checks.items()}
@@ -142,7 +142,7 @@ def usual(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> dic
 
 
 def by_kind(errors: FloatArray) -> FloatArray:
-    """Largest error of each kind in each joint, (m, 21) -> (m, 4); NaN as in `_largest`."""
+    """Largest error of each kind in each joint, (m, loads) -> (m, kinds); NaN as in `_largest`."""
     return _largest(np.abs(errors))
 
 

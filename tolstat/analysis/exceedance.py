@@ -170,10 +170,9 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) ->
         raise ValueError("count must lie between 0 and n")
     tail = 0.5 * (1.0 - confidence)
     # The beta function of order 0 does not exist; those ends are 0 and 1 by definition.
-    inner = betaincinv(np.maximum(k, 1.0), m - np.maximum(k, 1.0) + 1.0, tail)
-    lower = np.where(k > 0, inner, 0.0)
-    inner = betaincinv(k + 1.0, np.maximum(m - k, 1.0), 1.0 - tail)
-    upper = np.where(k < m, inner, 1.0)
+    some, others = np.where(k > 0, k, 1.0), np.where(k < m, m - k, 1.0)
+    lower = np.where(k > 0, betaincinv(some, m - some + 1.0, tail), 0.0)
+    upper = np.where(k < m, betaincinv(k + 1.0, others, 1.0 - tail), 1.0)
     return lower, upper
 
 

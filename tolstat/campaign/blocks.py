@@ -28,7 +28,7 @@ busy, and at most 90 MB of histories."""
 MIN_BLOCKS_PER_WORKER = 4
 """Minimum number of blocks per worker by default, so that no worker is idle for long at the end."""
 MIN_BLOCK_S, MAX_BLOCK_S = 1.0, 8.0
-"""Smallest and largest target duration of a block, s: a kill loses the blocks in work."""
+"""Smallest and largest target duration of a block, s: a kill loses the blocks being simulated."""
 MAX_WRITE_SHARE, MAX_PARENT_SHARE = 0.05, 0.25
 """Largest share of a block's simulation time that writing it may take, and largest share of the parent's time spent on
 writing: beyond a quarter the workers begin to wait for the parent. Writing a block waits twice for the disk, 5 to 50 ms
@@ -56,8 +56,8 @@ class Stages(NamedTuple):
         Compiles what `simulate` needs. Called before workers start, because two processes that compile into one
         cache can crash; then called in each worker, to load the compiled code.
     origins : callable
-        Study, rows of the campaign (range) -> how they were drawn, consecutive tables, or None if the sampling
-        method has no such table (`draw_records.columns`).
+        Study, rows of the campaign (range) -> which proposal or level gave each joint, consecutive tables; None if the
+        sampling method has no such table (`draw_records.columns`).
     """
 
     draw: Callable[..., Iterable[NDArray[np.void]]]
@@ -77,7 +77,7 @@ class Execution:
     ----------
     kind : {"processes", "serial", "dask"}, optional
         Supervised worker processes, this process, or a cluster; without it processes if there are several workers
-        and blocks. In this process nothing protects the campaign from a joint that crashes or hangs.
+        and blocks. With "serial" a joint that crashes or hangs takes the campaign with it.
     workers : int, optional
         Number of processes; without it the number of cores.
     block : int, optional
@@ -98,13 +98,13 @@ class Execution:
 class Block(NamedTuple):
     """File slots that are simulated together, their parameters and their solver options."""
 
-    rows: NDArray[np.intp]
+    slots: NDArray[np.intp]
     params: NDArray[np.void]
     options: Options
 
     def split(self) -> list[Block]:
         """Split into blocks of one joint each."""
-        return [Block(self.rows[i : i + 1], self.params[i : i + 1], self.options) for i in range(len(self.rows))]
+        return [Block(self.slots[i : i + 1], self.params[i : i + 1], self.options) for i in range(len(self.slots))]
 
 
 class Timed(NamedTuple):
@@ -149,25 +149,25 @@ class Pace:
 
 
 class Finished(NamedTuple):
-    """File slots, their simulation, and the reason why they were given up, if they were; else empty."""
+    """File slots, their simulation, and why they were given up; empty if they were not."""
 
-    rows: NDArray[np.intp]
+    slots: NDArray[np.intp]
     simulation: Simulation
     trouble: str
 
 
-def pending(store: ResultStore, last: int) -> Iterator[NDArray[np.intp]]:
-    """Yield the pending file slots below `last`, in arrays as from `ResultStore.pending_blocks`."""
-    for rows in store.pending_blocks():
-        if rows[0] >= last:
+def pending(store: ResultStore, stop_slot: int) -> Iterator[NDArray[np.intp]]:
+    """Yield the pending file slots below `stop_slot`, in arrays as from `ResultStore.pending_blocks`."""
+    for slots in store.pending_blocks():
+        if slots[0] >= stop_slot:
             return
-        yield rows[rows < last]
+        yield slots[slots < stop_slot]
 
 
 def simulate_pending(
-    study: Study, store: ResultStore, last: int, stages: Stages, execution: Execution, stop: Callable[[], bool]
+    study: Study, store: ResultStore, stop_slot: int, stages: Stages, execution: Execution, stop: Callable[[], bool]
 ) -> Generator[Finished, None, None]:
-    """Simulate the joints in the pending file slots below `last`.
+    """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true.
 
     Close the generator (`contextlib.closing`) when leaving it early.
 
@@ -176,14 +176,14 @@ def simulate_pending(
     WorkerDied
         When worker processes die whichever block they work on.
     """
-    todo = sum(len(rows) for rows in pending(store, last))
+    todo = sum(len(slots) for slots in pending(store, stop_slot))
     workers = execution.workers or executors.available_workers()
     size = execution.block or default_block(todo, workers)
     if not todo:
         return
     kind = execution.kind or ("processes" if workers > 1 and todo > size else "serial")
     pace = Pace(todo, workers, execution.block)
-    blocks = _blocks(study, store, last, pace, stages.perturb)
+    blocks = _blocks(study, store, stop_slot, pace, stages.perturb)
     work: executors.Work[Block, Timed | Lost] = executors.Work(
         partial(_simulate, stages.simulate, study.output.histories, study.output.harmonics, store.history_specs),
         Block.split,
@@ -203,16 +203,17 @@ def simulate_pending(
         for block, result in results:
             if isinstance(result, Lost):
                 status = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
-                blank = without_simulation(len(block.rows), status, store.history_specs)
-                yield Finished(block.rows, blank, result.reason)
+                blank = without_simulation(len(block.slots), status, store.history_specs)
+                yield Finished(block.slots, blank, result.reason)
             else:
                 begin = time.perf_counter()
-                yield Finished(block.rows, result.simulation, "")
-                pace.note(len(block.rows), result.seconds, time.perf_counter() - begin)
+                # the caller writes the block to the file before it asks for the next one
+                yield Finished(block.slots, result.simulation, "")
+                pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
 
 
 def default_block(n_pending: int, workers: int) -> int:
-    """Return the number of joints in the first blocks: about a second of work, and several blocks per worker."""
+    """Return the number of joints in the first blocks: at most `MAX_FIRST_BLOCK`, and several blocks per worker."""
     return max(1, min(MAX_FIRST_BLOCK, n_pending // (MIN_BLOCKS_PER_WORKER * workers)))
 
 
@@ -222,23 +223,27 @@ def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec])
 
 
 def _blocks(
-    study: Study, store: ResultStore, last: int, pace: Pace, perturb: Callable[..., NDArray[np.void]]
+    study: Study, store: ResultStore, stop_slot: int, pace: Pace, perturb: Callable[..., NDArray[np.void]]
 ) -> Iterator[Block]:
-    own = [settings(solver, store.fidelity) for solver in study.solvers]
-    again = [Options(**retry["options"]) for retry in store.retries]
-    known = list(dict.fromkeys(own + again))
-    for chunk in pending(store, last):
-        held = slice(chunk[0], chunk[-1] + 1)
-        errors, attempt = store.errors(held), store.attempt(held)[chunk - chunk[0]]
-        numbers = variants(study, store.row(chunk))
-        options = [again[k - 1] if k else own[i] for i, k in zip(numbers.tolist(), attempt.tolist(), strict=True)]
-        which = np.array([known.index(one) for one in options])
-        for number in np.unique(which):
-            alike = chunk[which == number]
-            while alike.size:
-                rows, alike = np.split(alike, [pace.take(alike.size)])
-                params = perturbed(study, store.row(rows), errors[rows - chunk[0]], perturb)
-                yield Block(rows, params, known[number])
+    """Yield the pending file slots below `stop_slot` as blocks whose joints have the same solver options."""
+    variant_options = [settings(solver, store.fidelity) for solver in study.solvers]
+    retry_options = [Options(**retry["options"]) for retry in store.retries]
+    distinct = list(dict.fromkeys(variant_options + retry_options))
+    for slots in pending(store, stop_slot):
+        read = slice(slots[0], slots[-1] + 1)
+        errors, attempt = store.errors(read), store.attempt(read)[slots - slots[0]]
+        variant = variants(study, store.row(slots))
+        options = [
+            retry_options[k - 1] if k else variant_options[i]
+            for i, k in zip(variant.tolist(), attempt.tolist(), strict=True)
+        ]
+        option = np.array([distinct.index(own) for own in options])
+        for number in np.unique(option):
+            left = slots[option == number]
+            while left.size:
+                some, left = np.split(left, [pace.take(left.size)])
+                params = perturbed(study, store.row(some), errors[some - slots[0]], perturb)
+                yield Block(some, params, distinct[number])
 
 
 def _finite(params: NDArray[np.void]) -> NDArray[np.bool_]:

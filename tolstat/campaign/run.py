@@ -132,11 +132,11 @@ def run(
             finished = simulate_pending(study, store, last, stages, execution, stop)
             with stop.deferred(), closing(finished):
                 for done in finished:
-                    store.write(done.rows, done.simulation)
+                    store.write(done.slots, done.simulation)
                     counts = counts.after(done.simulation.results["status"])
                     if done.trouble:
                         status = Status(done.simulation.results["status"][0])
-                        tell(f"row {store.rows[done.rows[0]]}: {status.label}: {done.trouble}")
+                        tell(f"row {store.rows[done.slots[0]]}: {status.label}: {done.trouble}")
                     if progress:
                         progress(counts)
             if check:

@@ -39,7 +39,7 @@ def capability(
         if not view.limits or view.method in ("sweep", "cases"):
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
             raise StoreError(str(Fault(str(file), "has no limits, or its joints are no random sample", remedy)))
-        view.check_sample(weighted=False)
+        view.check_sample(allow_weights=False)
         table = query.limits(view)
         try:
             rare = query.returns(view, list(view.limits), one_in) if one_in else None

@@ -284,6 +284,7 @@ RESULT_FIELDS = (
     Field("newton_iterations", "1", "Newton iterations", "i4"),
     Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),
     Field("factorisations", "1", "times that the tangent was factorised", "i4"),
+    # the order of the columns enters the checksums of rows
     *(field for kind in LOAD_KINDS if kind.places for field in kind.statistics().values()),
     Field(
         "mode_share",

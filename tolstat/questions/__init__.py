@@ -1,13 +1,14 @@
-"""Registry of the questions that a result file answers: a folder each, whose query takes a `store.view.View`.
+"""Registry of the questions: a folder each, whose query takes a `store.view.View`, or a study that it simulates.
 
-Commands, public names, sections of the page and keys of the JSON summary come from here, in this order. What it names
-is imported when it is first used. A folder has `query.py` (computes), `rendering.py` (text, tables, figures) and, where
+Commands, public names, sections of the page and the JSON summary come from here, in this order; `report`, `verify` and
+`status` print more than one question and are commands of their own. Modules are imported on first use.
+
+A folder has `query.py` (computes), `rendering.py` (text, tables, figures) and, where
 the page shows the question, `section.py` with ``sections(view, asked)``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -40,36 +41,36 @@ class Question(NamedTuple):
         Files of the package `cli` that ask it, each with a function of the same name.
     public : tuple of str
         ``module.function`` in the folder that `tolstat` offers under the function's name.
-    section : bool
+    has_section : bool
         Whether the page shows it: ``section.sections(view, asked)``.
-    summary : bool
+    has_summary : bool
         Whether the JSON of all statistics has it: ``query.summary(view, confidence)``.
     """
 
     name: str
     commands: tuple[str, ...] = ()
     public: tuple[str, ...] = ()
-    section: bool = False
-    summary: bool = False
+    has_section: bool = False
+    has_summary: bool = False
 
 
 QUESTIONS = (
-    Question("exceedance", section=True, summary=True),
-    Question("capability", ("capability",), section=True, summary=True),
+    Question("exceedance", has_section=True, has_summary=True),
+    Question("capability", ("capability",), has_section=True, has_summary=True),
     Question(
         "causes",
         ("worst", "causes"),
         ("query.causes_of", "angles.against_angle", "tail.worst_joints"),
-        section=True,
+        has_section=True,
     ),
     Question(
         "fatigue",
         ("fatigue",),
         ("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"),
-        section=True,
+        has_section=True,
     ),
-    Question("accuracy", section=True, summary=True),
-    Question("joints", section=True),
+    Question("accuracy", has_section=True, has_summary=True),
+    Question("joints", has_section=True),
     Question("time_above", ("time_above",), ("query.time_above",)),
     Question("reweight", ("reweight",), ("query.reweighted",)),
     Question("allocate", ("allocate",), ("query.allocated",)),
@@ -81,29 +82,27 @@ QUESTIONS = (
 COMMANDS = tuple(command for question in QUESTIONS for command in question.commands)
 """Files of the package `cli`."""
 PUBLIC = {
-    place.rpartition(".")[2]: f"tolstat.questions.{question.name}.{place.rpartition('.')[0]}"
+    function: f"tolstat.questions.{question.name}.{module}"
     for question in QUESTIONS
-    for place in question.public
+    for module, _, function in (name.partition(".") for name in question.public)
 }
 """Public names, and the modules that they come from."""
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
     """Sections of the page, in the order of `QUESTIONS`; questions that the file cannot answer have none."""
-    parts = (made(view, asked) for made in _found("section", "sections"))
-    return [section for part in parts for section in part]
+    modules = (_module(question, "section") for question in QUESTIONS if question.has_section)
+    return [section for module in modules for section in module.sections(view, asked)]
 
 
 def summary(view: View, confidence: float) -> dict[str, Any]:
     """JSON values of all questions that have a summary, by key."""
     found: dict[str, Any] = {}
-    for made in _found("summary", "summary", "query"):
-        found |= made(view, confidence)
+    for question in QUESTIONS:
+        if question.has_summary:
+            found |= _module(question, "query").summary(view, confidence)
     return found
 
 
-def _found(having: str, function: str, module: str = "") -> Iterator[Callable[..., Any]]:
-    for question in QUESTIONS:
-        if getattr(question, having):
-            home = import_module(f"tolstat.questions.{question.name}.{module or having}")
-            yield getattr(home, function)
+def _module(question: Question, name: str) -> Any:
+    return import_module(f"tolstat.questions.{question.name}.{name}")

@@ -39,12 +39,12 @@ METHODS = {
 }
 DRAWN = ("random", "sobol", "lhs")
 """Sampling methods that draw every joint from the tolerances, all with the same weight."""
-KEPT_ROWS = 12
+MAX_LISTED = 12
 """Number of joints without a valid load whose complete results are kept."""
 
 
-class _Tables(NamedTuple):
-    """What one pass over the results keeps.
+class _FirstPass(NamedTuple):
+    """What is kept of the results after one pass over them.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class _Tables(NamedTuple):
     nominal : ndarray of RESULT, shape (1,) or (0,)
         The nominal joint, if the file has one and its results are valid.
     without_load : ndarray of RESULT, shape (m,)
-        The first `KEPT_ROWS` joints that failed or did not settle.
+        The first `MAX_LISTED` joints that failed or did not settle.
     mode_share : ndarray, shape (4, 4)
         Weighted mean over the valid joints; NaN if none is valid or the study does not keep it.
     """
@@ -65,7 +65,7 @@ class _Tables(NamedTuple):
 
 
 class View:
-    """A result file as questions read it. Sample i is row i of every table; the nominal joint is apart.
+    """A result file as questions read it. Element i of every array is sample i; the nominal joint is not among them.
 
     Each part is read and checked when it is first used, and kept. Tables of errors are kept for the first `BLOCK`
     samples; those of larger campaigns are read in blocks.
@@ -107,7 +107,7 @@ class View:
 
     @cached_property
     def numerical_error(self) -> dict[str, float]:
-        """Numerical error that 95 % of the joints stay below, by kind of load; empty without a verification."""
+        """95 % quantile of the checked joints' relative numerical error, by kind of load; empty without checks."""
         if self.verification is None:
             return {}
         checks = {name: check.results for name, check in self.verification.checks.items()}
@@ -145,8 +145,8 @@ class View:
         return np.zeros(len(self.nominal), dtype=np.intp)
 
     @property
-    def without_load(self) -> NDArray[np.void]:
-        """Complete results of the first `KEPT_ROWS` joints that failed or did not settle, RESULT (m,)."""
+    def first_without_load(self) -> NDArray[np.void]:
+        """Complete results of the first `MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
         return self._tables.without_load
 
     @property
@@ -155,7 +155,7 @@ class View:
         return self._tables.mode_share
 
     @cached_property
-    def _tables(self) -> _Tables:
+    def _tables(self) -> _FirstPass:
         skip, store = self.store.first_sample, self.store
         nominal = np.empty(0, RESULT)
         results = np.empty(self.n, [(name, RESULT[name]) for name in LOAD_FIELDS])
@@ -167,14 +167,14 @@ class View:
             begin = max(0, first - skip)
             for name in LOAD_FIELDS:
                 results[name][begin : begin + len(block)] = block[name]
-            if sum(map(len, kept)) < KEPT_ROWS:
-                kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:KEPT_ROWS])
+            if sum(map(len, kept)) < MAX_LISTED:
+                kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:MAX_LISTED])
             valid = np.isin(block["status"], VALID)
             weight = np.ones(len(block)) if self.weights is None else self.weights[begin : begin + len(block)]
             shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
             total += float(weight[valid].sum())
         mean = shares / total if total else np.full((4, 4), np.nan)
-        return _Tables(results, nominal, np.concatenate(kept)[:KEPT_ROWS], mean)
+        return _FirstPass(results, nominal, np.concatenate(kept)[:MAX_LISTED], mean)
 
     def load(self, name: str) -> SampleLoad:
         """Largest load over the revolution of every joint, by its name.
@@ -254,15 +254,15 @@ class View:
         """Whether joints have different weights."""
         return self.method == "importance"
 
-    def check_sample(self, weighted: bool = True) -> None:
-        """Refuse a file whose joints are no sample of a production, or (unless `weighted`) differ in weight.
+    def check_sample(self, allow_weights: bool = True) -> None:
+        """Refuse a file whose joints are no sample of a production, or (unless `allow_weights`) differ in weight.
 
         Raises
         ------
         StoreError
             The hint names what can be used.
         """
-        check_equal_weights(self.store.sampling, self.path, weighted)
+        check_equal_weights(self.store.sampling, self.path, allow_weights)
         if self.method in ("cases", "sweep"):
             remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
             raise StoreError(str(Fault(str(self.path), "holds joints that are no sample of a production", remedy)))

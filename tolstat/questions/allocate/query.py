@@ -183,7 +183,7 @@ def allocated(
 def _check_joints(view: View) -> None:
     """Refuse joints that are not drawn from tolerances, all with the same weight and independently of each other."""
     view.check_drawn()
-    view.check_sample(weighted=False)
+    view.check_sample(allow_weights=False)
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method = "random"'
         found = "holds joints that share errors with others, so that one half of them is no check of the other"

@@ -116,7 +116,7 @@ def against_angle(
         if name not in BUSHING_LOADS:
             raise InputError([Fault(name, "is not a load over the shaft angle", did_you_mean(name, BUSHING_LOADS))])
     view.check_drawn()
-    view.check_sample(weighted=False)
+    view.check_sample(allow_weights=False)
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))

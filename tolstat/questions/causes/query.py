@@ -17,7 +17,7 @@ from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.tolerances.distributions import score
 
-TAIL = 0.9
+TAIL_STARTS_AT = 0.9
 """Share of the joints below the tail, for a load without a limit."""
 MIN_JOINTS = 200
 """Minimum number of valid joints."""
@@ -33,12 +33,16 @@ class Causes(NamedTuple):
     ----------
     load : str
         Its name.
-    joints, used, without_load : int
-        Number of valid joints; of those used for shares and ranks, at most `MAX_JOINTS`; of joints without a valid
-        load, which are left out.
-    level, above : float, int
-        Level at which the tail begins, SI (the study's limit or, without one, the 90 % quantile), and number of joints
-        above it.
+    joints : int
+        Number of valid joints.
+    used : int
+        Number of them used for shares and ranks, at most `MAX_JOINTS`.
+    without_load : int
+        Number of joints without a valid load, which are left out.
+    level : float
+        Level at which the tail begins, SI: the study's limit or, without one, the 90 % quantile.
+    above : int
+        Number of valid joints above it.
     unit : str
         SI unit of the load.
     std : float
@@ -106,7 +110,7 @@ def causes_of(view: View, by: str, confidence: float = 0.95, log: bool = False, 
     ['pin1.offset_t', 'pin2.offset_z']
     """
     view.check_drawn()
-    view.check_sample(weighted=False)
+    view.check_sample(allow_weights=False)
     load = view.load(by)
     if view.study.groups:
         return _of_design(view, load, confidence, log)
@@ -116,26 +120,30 @@ def causes_of(view: View, by: str, confidence: float = 0.95, log: bool = False, 
 
 
 def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> Causes:
-    """Causes from independent joints, all in one distribution of errors."""
+    """Causes from joints that are all drawn from the same tolerances."""
     study = view.study
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
     needed = max(MIN_JOINTS, len(study.tolerances) + 2 * regression.GROUPS)
-    if samples.size < needed or np.ptp(values) == 0:
-        found = f"has {samples.size} joints with a valid load that scatters"
+    if samples.size < needed:
+        found = f"has {samples.size} joints with a valid {load.name}"
         raise StoreError(str(Fault(str(view.path), found, f"run {needed} joints or more")))
+    if np.ptp(values) == 0:
+        remedy = "name another load with --by"
+        found = f"has the same {load.name} in all joints: no error causes it"
+        raise StoreError(str(Fault(str(view.path), found, remedy)))
     if log:
         _check_positive(load.name, values)
     errors = view.errors(samples[:MAX_JOINTS], sampling.columns(study))
     names = scattering(study, errors)
     x = np.column_stack([sampling.values(errors, name) for name in names])
     y = values[:MAX_JOINTS]
-    scattered = np.log(y) if log else y
-    first = sensitivity.first_order(x, scattered, confidence, view.iid)
+    response = np.log(y) if log else y
+    first = sensitivity.first_order(x, response, confidence, view.iid)
     ranks = regression.ranks(x, y, confidence, view.iid)
     parts: dict[str, NamedTuple] = {"first": first, "srrc": ranks}
     if not study.copula.names:
-        parts["total"] = sensitivity.total(x, scattered, confidence, view.iid)
+        parts["total"] = sensitivity.total(x, response, confidence, view.iid)
     level = _tail_level(load)
     above = values > level
     if overrepresentation.FEWEST <= above.sum() <= above.size - overrepresentation.FEWEST:
@@ -158,7 +166,7 @@ def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> C
 def _over_represented(
     view: View, names: list[str], samples: NDArray[np.intp], above: NDArray[np.bool_], confidence: float
 ) -> dict[str, NamedTuple]:
-    """Compare the errors of the first `MAX_JOINTS` joints above the level with those of as many others."""
+    """Compare the errors of the first `MAX_JOINTS` joints above the level with those of at most as many below it."""
     study = view.study
     chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
     errors = view.errors(samples[chosen], sampling.columns(study))
@@ -171,7 +179,7 @@ def _of_design(view: View, load: SampleLoad, confidence: float, log: bool) -> Ca
     path, groups = str(view.path), view.study.groups
     if not view.store.whole:
         raise StoreError(str(Fault(path, "holds a slice of a design", "merge all slices first: tolstat merge")))
-    values = np.where(load.is_valid, load.values, np.nan)
+    values = load.valid_or_nan
     if log:
         _check_positive(load.name, values[load.is_valid])
         values = np.log(values)
@@ -208,7 +216,7 @@ def _check_positive(name: str, values: NDArray[np.float64]) -> None:
 
 
 def _tail_level(load: SampleLoad) -> float:
-    return load.quantile(TAIL).estimate if load.limit is None else load.limit
+    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
 
 
 def _table(names: list[str], parts: dict[str, NamedTuple]) -> pd.DataFrame:

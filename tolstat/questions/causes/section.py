@@ -53,7 +53,7 @@ def _causes(
     causes: list[Causes] = []
     against: list[AgainstAngle] = []
     with asked.noting("causes are left out"):
-        view.check_sample(weighted=False)
+        view.check_sample(allow_weights=False)
         for load in view.leading:
             with asked.noting(f"no causes of {load}"):
                 causes.append(causes_of(view, load, log=load in logarithmic, joints=JOINTS))

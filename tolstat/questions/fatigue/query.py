@@ -89,7 +89,7 @@ def load_cycles(
     shares = [share / total for share in shares]
     first = views[0]
     for view in views:
-        view.check_sample(weighted=False)
+        view.check_sample(allow_weights=False)
         if view is not first:
             _check_same_joints(view, first)
     parts = [_cycles_of(view, names, samples) for view in views]

@@ -27,11 +27,11 @@ class WithoutLoad(NamedTuple):
 
 
 def without_load(view: View) -> list[WithoutLoad]:
-    """Return the first joints without a valid load, see `View.without_load`."""
-    samples = np.flatnonzero(np.isin(view.status, (*FAILED, *UNSETTLED)))[: len(view.without_load)]
+    """Return the first joints without a valid load, see `View.first_without_load`."""
+    samples = np.flatnonzero(np.isin(view.status, (*FAILED, *UNSETTLED)))[: len(view.first_without_load)]
     return [
         WithoutLoad(int(row), Status(int(joint["status"])).label, remedy(joint, view.store.options))
-        for row, joint in zip(view.rows(samples), view.without_load, strict=True)
+        for row, joint in zip(view.rows(samples), view.first_without_load, strict=True)
     ]
 
 

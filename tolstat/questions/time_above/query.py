@@ -83,7 +83,7 @@ def time_above(
     StoreError
         When the file holds no histories, joints that are no sample of a production, or no settled joint.
     """
-    view.check_sample(weighted=False)
+    view.check_sample(allow_weights=False)
     asked = _levels(view, by, levels)
     settled = np.flatnonzero(view.status == Status.OK)
     if not settled.size:

@@ -152,7 +152,7 @@ def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     with ResultStore.open(path, "r+") as store:
         store.record_stop(stop_rule.Outcome(True, look, [39, 60]).record(stop_rule.parse(RULE)))
     notes = report.build(path).notes
-    assert f"stopped by {RULE} at 39 joints; 95% interval corrected for 2 looks: 0.02000 to 0.25000" in notes
+    assert f"stopped by {RULE} at 39 joints; 95 % interval corrected for 2 looks: 0.02000 to 0.25000" in notes
 
 
 @pytest.mark.slow

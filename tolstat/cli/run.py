@@ -208,7 +208,7 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
     say(
         f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
         f"{look.above} above, {look.n_unresolved} failed or not settled\n"
-        f"{stop_rule.CONFIDENCE:.0%} interval {look.lower:.5f} to {look.upper:.5f} "
+        f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f} "
         "(failed and unsettled joints: below at its lower end, above at its upper end), "
         f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; the intervals in the report are not corrected"
     )

@@ -27,6 +27,8 @@ def cost(
     of the core's peak rate; ratios to a dense LAPACK solution, and to scipy's Radau and SUNDIALS' CVODE at an error of
     1e-3; the efficiency of worker processes; start-up times. Everything is timed in turn, in one run: on a machine with
     other load only the ratios count.
+
+    Example: tolstat bench studies/iso2768_f.toml --quick
     """
     from tolstat.benchmarks.cost import run, text
 

@@ -32,6 +32,8 @@ def precision(
     The others are those of scipy and SUNDIALS. Prints the fastest of tolstat and of the others at each error; writes
     COMPARISON.md (page), .csv (every setting), .png and .svg (figure). COMPARISON is a file such as
     studies/precision.toml, which takes four minutes. Use a machine without other load.
+
+    Example: tolstat bench precision studies/precision.toml --quick
     """
     from tolstat.benchmarks import runs
     from tolstat.benchmarks.precision import jobs, page, setup

@@ -151,7 +151,8 @@ def _text(content: str, stem: Path, ending: str) -> Path:
 
 def _stopped(stop: dict[str, Any]) -> str:
     """Sentence about a campaign that its stop rule ended."""
+    confidence = f"{100 * stop['confidence']:.0f} %"
     return (
-        f"stopped by {stop['rule']} at {stop['joints']} joints; {100 * stop['confidence']:.0f} % interval corrected for "
+        f"stopped by {stop['rule']} at {stop['joints']} joints; {confidence} interval corrected for "
         f"{len(stop['looks'])} looks: {stop['lower']:.5f} to {stop['upper']:.5f}. Intervals above are not corrected."
     )

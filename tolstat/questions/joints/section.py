@@ -59,7 +59,8 @@ def _status_section(view: View, asked: Asked) -> Section:
     ]
     joints = query.without_load(view)
     if not joints:
-        return Section("failed", "Failed and unsettled joints", [*blocks, Text("All joints that were simulated have valid loads.")])
+        blocks.append(Text("All joints that were simulated have valid loads."))
+        return Section("failed", "Failed and unsettled joints", blocks)
     table = None
     if view.method != "sweep" and view.count(*VALID):
         with asked.noting("errors of failed and unsettled joints are not compared"):
@@ -67,7 +68,7 @@ def _status_section(view: View, asked: Asked) -> Section:
     if table is not None:
         blocks += [Panels([_errors_panel(table)]), Text(_errors_note(table), small=True)]
     else:
-        said = "Their errors are not compared with those of the others: that takes ten joints or more on either side, all "
+        said = "Their errors are not compared with those of the others, which takes ten joints or more on either side, "
         blocks.append(Text(said + "drawn from the tolerances with equal weight."))
     rows = [[str(joint.row), joint.status, joint.remedy] for joint in joints]
     blocks.append(Table("The first of them", ["row", "status", "what to do"], rows, frozenset({0, 1, 2})))

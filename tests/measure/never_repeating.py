@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
-from tolstat.common.tables import RESULT, SPAN, Method, Motion, Options, Status
+from tolstat.common.tables import RESULT, SPAN, Motion, Options, Status
 from tolstat.kernel.revolution import resolve
 from tolstat.solver import refinement
 from tolstat.solver.reference import first_order
-from tolstat.solver.simulation import _together, simulate_rows
+from tolstat.solver.simulation import _together, explicit_steps, simulate_rows
 
 STUDY = ROOT / "studies" / "iso2768_f.toml"
 STARTED, LONG, DURATION = 100, 1100, 100
@@ -46,11 +46,11 @@ def rattling(n: int) -> NDArray[np.void]:
 
 
 def watch(params: NDArray[np.void], revolutions: int) -> tuple[NDArray[np.void], NDArray[np.void]]:
-    """Results and statistics of all revolutions, with error-controlled steps."""
-    options = Options(method=int(Method.TR_BDF2), rtol=refinement.TOLERANCE, max_revs=revolutions)
+    """Results and statistics of all revolutions, with explicit steps."""
+    options = refinement.settings(Options())._replace(max_revs=revolutions)
     results = np.zeros(len(params), RESULT).view(np.recarray)
     blocks = np.zeros((len(params), revolutions), RESULT).view(np.recarray)
-    list(_together(params, options, False, results, blocks))
+    list(_together(params, options, False, results, blocks, explicit_steps(params, Options())))
     return results.view(np.ndarray), blocks.view(np.ndarray)
 
 

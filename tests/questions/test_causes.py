@@ -109,7 +109,7 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
     few = synthetic.store(tmp_path)
     sweep = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
     for arguments, text in (
-        ((few,), "60 joints with a valid load"),
+        ((few,), "60 joints with a valid cross1.F"),
         ((sweep,), "not drawn from tolerances"),
         ((path, "--by", "cross9.F"), "is not a load"),
     ):

@@ -99,7 +99,8 @@ def reversal_torque(params: NDArray[np.void]) -> Array:
     inertia = params["Js"] + 2 * (params["arm_mass"] * params["R"] ** 2 + params["arm_inertia"][:, 2])
     theta = np.linspace(0, np.pi, 361)
     sine, cosine = np.sin(params["alpha"])[:, None], np.cos(params["alpha"])[:, None]
-    steepest = np.abs(cosine * sine**2 * np.sin(2 * theta) / (1 - (sine * np.cos(theta)) ** 2) ** 2).max(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # an angle of 90 deg is outside the model
+        steepest = np.abs(cosine * sine**2 * np.sin(2 * theta) / (1 - (sine * np.cos(theta)) ** 2) ** 2).max(axis=1)
     return np.asarray(inertia * params["omega"] ** 2 * steepest)
 
 

@@ -466,7 +466,7 @@ def test_all_faults_are_told_at_once():
         ({"mass": [[0.0]]}, "singular"),
         ({"max_substeps": -1}, "max_substeps"),
         ({"max_halvings": 60}, "max_halvings"),
-        ({"t_span": (1, 0)}, "grow"),
+        ({"t_span": (1, 0)}, "increasing"),
     ],
 )
 def test_senseless_arguments_are_refused(change, word):

@@ -216,7 +216,7 @@ def test_the_table_holds_the_errors_against_the_reference(tmp_path: Path) -> Non
         (("steps_per_rev = 24", "steps_per_rev = 2"), "variant[1].solver.steps_per_rev"),
         (("steps_per_rev = 24", "steps = 24"), "variant[1].solver.steps: unknown key"),
         (("[[case]]", '[grid]\n"operation.alpha" = ["1 deg"]\n[[case]]'), "is set by grid already"),
-        (("[[case]]", '[output]\nhistories = "full"\n[[case]]'), "variants have different steps per revolution: 24, 36"),
+        (("[[case]]", '[output]\nhistories = "full"\n[[case]]'), "different steps per revolution: 24, 36"),
     ],
 )
 def test_faults_of_a_variant_name_their_place(tmp_path: Path, change: tuple[str, str], found: str) -> None:

@@ -136,6 +136,7 @@ STAGES = campaign.Stages(
 )
 
 
+@pytest.mark.slow
 def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = partial(campaign.run, stages=STAGES)

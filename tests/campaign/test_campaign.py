@@ -65,6 +65,7 @@ def test_workers_and_blocks_change_no_byte(tmp_path: Path, reference, workers: i
     assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
 
 
+@pytest.mark.slow
 def test_order_of_blocks_changes_no_byte(tmp_path: Path, reference, monkeypatch: pytest.MonkeyPatch) -> None:
     study, expected = reference
     blocks = execution._blocks
@@ -74,6 +75,7 @@ def test_order_of_blocks_changes_no_byte(tmp_path: Path, reference, monkeypatch:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.slow
 def test_interrupted_in_progress_and_resumed(tmp_path: Path, reference, workers: int) -> None:
     study, expected = reference
     path = tmp_path / "a.h5"
@@ -118,6 +120,7 @@ def test_resume_simulates_pending_rows_only(tmp_path: Path) -> None:
         assert sum(simulated) == 43
 
 
+@pytest.mark.slow
 def test_progress_hears_the_start_and_every_block(tmp_path: Path) -> None:
     heard: list[Counts] = []
     campaign.run(fakes.Study(), tmp_path / "a.h5", 2, 8, progress=heard.append, stages=fakes.stages())
@@ -125,6 +128,7 @@ def test_progress_hears_the_start_and_every_block(tmp_path: Path) -> None:
     assert heard[-1] == Counts(40, 40, 4, 4)
 
 
+@pytest.mark.slow
 def test_the_kernel_is_compiled_before_there_are_workers(tmp_path: Path) -> None:
     calls: list[str] = []
     stages = fakes.stages()._replace(warm_up=partial(calls.append, "warm"))
@@ -169,6 +173,7 @@ def test_a_request_to_stop_keeps_finished_blocks(tmp_path: Path, workers: int, n
     assert datasets(path) == datasets(tmp_path / "b.h5")
 
 
+@pytest.mark.slow
 def test_second_ctrl_c_waits_for_nothing(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     process = start(path, workers=2, block=1, seconds=0.4)
@@ -217,6 +222,7 @@ def test_kill_loses_at_most_the_blocks_in_work(tmp_path: Path, long_reference, m
 
 
 @pytest.mark.parametrize("step", ["gather_into", "remove"])
+@pytest.mark.slow
 def test_stopped_while_histories_are_taken_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
     study, path = fakes.Study(output=fakes.Output("full")), tmp_path / "a.h5"
     campaign.run(study, tmp_path / "b.h5", 1, stages=fakes.stages())
@@ -277,6 +283,7 @@ def test_differing_keys_names_missing_ones() -> None:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.slow
 def test_a_bug_in_every_joint_comes_through(tmp_path: Path, workers: int) -> None:
     with pytest.raises(ZeroDivisionError):
         campaign.run(fakes.Study(), tmp_path / "a.h5", workers, 2, stages=fakes.stages(fakes.simulate_and_raise))

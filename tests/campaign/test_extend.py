@@ -83,6 +83,7 @@ def test_an_extended_campaign_is_one_of_that_size(tmp_path: Path, make: Make, me
     assert not list(tmp_path.glob("*.parts"))
 
 
+@pytest.mark.slow
 def test_a_kill_while_extending_leaves_the_old_file(
     tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,6 +146,7 @@ def test_merged_slices_are_one_run(tmp_path: Path, make: Make, method: str, kind
     assert run(study, tmp_path / "c.h5").read_bytes() == (tmp_path / "c.h5").read_bytes()
 
 
+@pytest.mark.slow
 def test_equal_overlaps_are_merged_and_different_ones_refused(tmp_path: Path, make: Make) -> None:
     study = make(60)
     parts = slices(study, tmp_path, 0, 30, 61) + slices(study, tmp_path, 10, 40)
@@ -175,6 +177,7 @@ def test_gaps_and_strangers_are_told_together(tmp_path: Path, make: Make) -> Non
         extend.merge(parts, tmp_path / "c.h5")
 
 
+@pytest.mark.slow
 def test_pending_rows_stay_pending_and_can_be_done_later(tmp_path: Path, make: Make) -> None:
     study = make(60)
     parts = slices(study, tmp_path, 0, 30, 61)

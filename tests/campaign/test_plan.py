@@ -69,6 +69,7 @@ def missed(p: float, width: float, planned: list[int], confidence: float, runs: 
 
 @pytest.mark.parametrize("p", [0.001, 0.01, 0.1, 0.5])
 @pytest.mark.parametrize("width", [0.1, 0.01])
+@pytest.mark.slow
 def test_the_interval_of_a_stopped_campaign_covers(p: float, width: float) -> None:
     """Misses stay below 5 %, here with three standard errors to spare."""
     planned = stop_rule.looks(width, 100_000)
@@ -95,6 +96,7 @@ def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400
     return stop_rule.run_until(made, path, stop_rule.parse(RULE), run)
 
 
+@pytest.mark.slow
 def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     outcome = stopped(path)
@@ -130,6 +132,7 @@ def test_workers_and_blocks_do_not_move_the_stop(tmp_path: Path) -> None:
     assert datasets(tmp_path / "a.h5") == datasets(tmp_path / "b.h5") == datasets(tmp_path / "c.h5")
 
 
+@pytest.mark.slow
 def test_too_few_joints_are_all_simulated(tmp_path: Path) -> None:
     outcome = stopped(tmp_path / "a.h5", n=30)
     assert not outcome.reached
@@ -146,6 +149,7 @@ def test_until_is_for_independent_samples(tmp_path: Path) -> None:
         stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE), lambda row: None)
 
 
+@pytest.mark.slow
 def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=40)
     look = stop_rule.Look(39, 0, 4, 0.02, 0.25)

@@ -71,6 +71,7 @@ def test_a_joint_that_kills_and_one_that_hangs_are_marked(
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.slow
 def test_parameters_that_are_no_numbers_are_not_simulated(
     tmp_path: Path, expected: dict[str, bytes], workers: int
 ) -> None:
@@ -90,6 +91,7 @@ def perturb_badly(joint: object, errors: np.ndarray) -> np.ndarray:
     return params
 
 
+@pytest.mark.slow
 def test_four_workers_change_no_byte(tmp_path: Path, expected: dict[str, bytes]) -> None:
     campaign.run(fakes.Study(), tmp_path / "a.h5", workers=4, block=3, stages=fakes.stages())
     assert datasets(tmp_path / "a.h5") == expected
@@ -116,6 +118,7 @@ def test_all_processes_killed_again_and_again(tmp_path: Path, expected: dict[str
 
 
 @pytest.mark.parametrize("moment", range(5 if LONG else 1))
+@pytest.mark.slow
 def test_workers_killed_at_random_change_no_byte(tmp_path: Path, expected: dict[str, bytes], moment: int) -> None:
     chance, path = random.Random(moment), tmp_path / "a.h5"
     process = start(path, 2, 2, seconds=0.05)
@@ -152,6 +155,7 @@ def test_states_without_results_have_none(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("replaced", [False, True])
+@pytest.mark.slow
 def test_a_file_that_is_deleted_meanwhile_is_put_back(
     tmp_path: Path, expected: dict[str, bytes], replaced: bool
 ) -> None:
@@ -173,6 +177,7 @@ def test_a_file_that_is_deleted_meanwhile_is_put_back(
     assert not replaced or path.read_text() == "of somebody else"
 
 
+@pytest.mark.slow
 def test_a_torn_block_is_simulated_again(tmp_path: Path, expected: dict[str, bytes]) -> None:
     """Status and checksum are on the disk and some of the values are not, as after a power cut."""
     path = tmp_path / "a.h5"
@@ -222,6 +227,7 @@ def everything(path: Path) -> list[tuple[str, bytes]]:
 
 
 @pytest.mark.parametrize("histories", ["none", "full"])
+@pytest.mark.slow
 def test_a_corrupted_file_gives_an_error_or_the_right_data(tmp_path: Path, histories: str) -> None:
     chance, path = random.Random(5), tmp_path / "a.h5"
     campaign.run(fakes.Study(n=12, output=fakes.Output(histories)), path, 1, stages=fakes.stages())
@@ -248,6 +254,7 @@ def test_a_corrupted_file_gives_an_error_or_the_right_data(tmp_path: Path, histo
     assert all(outcomes.values()), outcomes
 
 
+@pytest.mark.slow
 def test_a_campaign_under_way_can_be_looked_at(tmp_path: Path, expected: dict[str, bytes]) -> None:
     path = tmp_path / "a.h5"
     process = start(path, 2, 2, seconds=0.05)
@@ -279,6 +286,7 @@ def simulate_finely(params: np.ndarray, options: Options, histories: str, n_harm
 
 
 @pytest.mark.parametrize("histories", ["none", "full"])
+@pytest.mark.slow
 def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, histories: str) -> None:
     study, path, told = fakes.Study(output=fakes.Output(histories)), tmp_path / "a.h5", []
     stages = fakes.stages(simulate_finely)
@@ -387,6 +395,7 @@ def limited(path: Path, size: int) -> str:
     return ended.stderr.rpartition("StoreError: ")[2]
 
 
+@pytest.mark.slow
 def test_files_that_cannot_grow(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     assert limited(path, 20_000).startswith(f"{path}: cannot be written: ")
@@ -437,6 +446,7 @@ def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expecte
     assert datasets(moved) == expected
 
 
+@pytest.mark.slow
 def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
     study, path = fakes.Study(output=fakes.Output("full")), small_disk / "a.h5"
     with pytest.raises(StoreError, match=r"No space left on device\n  hint: free disk space"):

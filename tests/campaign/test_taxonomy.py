@@ -98,6 +98,7 @@ def of_stand_ins(folder: Path) -> Path:
     return folder / "f.h5"
 
 
+@pytest.mark.slow
 def test_a_campaign_reaches_every_state_of_the_kernel(path: Path) -> None:
     with ResultStore.open(path) as store:
         family = [store.variants[number].family for number in store.design()["variant"]]

@@ -99,6 +99,7 @@ def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse
     assert [(counts.done, counts.total) for counts in told] == [(k, 6) for k in range(7)]
 
 
+@pytest.mark.slow
 def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):
     reference = coarse.checks["reference"].results
     true = force_and_torque(coarse.base, reference)
@@ -211,6 +212,7 @@ def off_by(path, factor, rows=(5, 9)):
         verification.write(store, Verification(1, np.array(rows), base, checks))
 
 
+@pytest.mark.slow
 def test_report_moves_every_load_by_the_numerical_error(tmp_path):
     path = synthetic.store(tmp_path)
     with ResultStore.open(path) as store:

@@ -228,6 +228,7 @@ def test_export_to_a_folder_that_is_not_there(tmp_path):
     assert "hint: " in done.stderr
 
 
+@pytest.mark.slow
 def test_export_into_a_pipe_that_closes_early(tmp_path):
     path = synthetic.store(tmp_path)
     command = f"{sys.executable} -m tolstat export {path} --csv - | head -n 1"
@@ -248,6 +249,7 @@ def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
     assert f"wrote {tmp_path / 'small_exceedance.png'}" in done.stderr
 
 
+@pytest.mark.slow
 def test_report_creates_its_output_folder(tmp_path):
     folder = tmp_path / "new" / "folder"
     done = call("report", synthetic.store(tmp_path), "--out", folder)
@@ -371,6 +373,7 @@ contact.stations = [
 
 
 @pytest.mark.parametrize("command", ["simulate", "plan", "run"])
+@pytest.mark.slow
 def test_probable_mistakes_are_warnings(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("ok", 1.5))

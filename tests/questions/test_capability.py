@@ -46,6 +46,7 @@ def test_ends_are_where_the_estimate_is_at_the_edge_of_its_distribution(cpk, n):
     assert nctdtr(n - 1, scale * upper, scale * cpk) == pytest.approx(0.05, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_interval_of_quantiles_covers_for_a_skew_load():
     load, n, seeds = lognorm(0.5), 6000, 500
     limit = float(load.ppf(0.9999))

@@ -162,6 +162,7 @@ def test_page_has_causes_and_worst_joints_of_the_leading_loads(tmp_path):
         assert [row[1] for row in table.rows] == [value(x, load.unit) for x in values[: tail_section.JOINTS]]
 
 
+@pytest.mark.slow
 def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
     proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
     importance = synthetic.STUDY.replace("n = 60", 'method = "importance"\nn = 300') + proposal
@@ -197,6 +198,7 @@ def test_capability_of_each_limit_and_of_all_together(path):
     assert (table["ppm"] < table["ppm_upper"]).all()
 
 
+@pytest.mark.slow
 def test_capability_command_prints_indices_and_return_loads(path):
     done = run("capability", path, "--one-in", 1000, "--one-in", 1e6)
     assert done.exit_code == 0

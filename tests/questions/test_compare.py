@@ -33,6 +33,7 @@ def truth(share=None, level=None):
     return norm.sf(np.log(level / 1.1)) - norm.sf(np.log(level))
 
 
+@pytest.mark.slow
 def test_paired_differences_cover_over_seeds_and_a_walds_interval_of_rare_shares_does_not(monkeypatch):
     monkeypatch.setattr(difference, "RESAMPLES", 200)
     level, covered, wald = 16.0, [], []  # one in some 300 joints
@@ -145,6 +146,7 @@ def test_other_seeds_are_not_paired(tmp_path):
     assert np.isnan(row["p"])
 
 
+@pytest.mark.slow
 def test_command_prints_tables_and_writes_files(tmp_path):
     a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", factor=1.1)
     done = run("compare", a, b, "--by", "cross1.F", "--out", tmp_path / "out")
@@ -161,6 +163,7 @@ def test_command_prints_tables_and_writes_files(tmp_path):
     assert found["loads"][0]["estimate"] == pytest.approx(found["loads"][0]["b"] - found["loads"][0]["a"])
 
 
+@pytest.mark.slow
 def test_what_cannot_be_compared_is_refused(tmp_path):
     a, sweep = campaign(tmp_path, "a"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
     done = run("compare", a, sweep)

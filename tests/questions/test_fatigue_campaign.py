@@ -104,6 +104,7 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
             assert difference.max() > 1e-6  # truncation shows: the comparison sees a difference
 
 
+@pytest.mark.slow
 def test_a_duty_cycle_of_two_campaigns(campaign):
     files = [campaign("cycles", alpha) for alpha in (15.0, 5.0)]
     both = load_cycles(files, [0.25, 0.75])

@@ -61,6 +61,7 @@ def four_branches(z):
     ("load", "limit", "truth"),
     [(linear, 4.75, norm.sf(4.75)), (four_branches, 4.0, 4 * norm.sf(4.0) - 4 * norm.sf(4.0) ** 2)],
 )
+@pytest.mark.slow
 def test_intervals_cover_over_seeds_and_those_of_independent_states_do_not(load, limit, truth):
     covered, naive, estimates = [], [], []
     for seed in range(SEEDS):
@@ -171,12 +172,14 @@ def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
     assert 0.3 < moved < 0.95
 
 
+@pytest.mark.slow
 def test_the_example_of_the_function_is_right(tmp_path):
     found = doctest.DocTestFinder().find(rare.rare_event, "rare_event", globs={"tolstat": tolstat})[0]
     found.globs |= {"study": load(tmp_path), "path": tmp_path / "example.h5"}
     assert doctest.DocTestRunner().run(found) == (0, 2)
 
 
+@pytest.mark.slow
 def test_level_0_is_the_random_campaign(whole):
     plan, _, path = whole
     drawn = load(plan.path.parent, PLAN.replace("n = 60", "n = 100"), "random")
@@ -215,6 +218,7 @@ def test_stopped_and_gone_on_with_it_is_the_same_in_any_blocks(tmp_path, whole, 
                 np.testing.assert_array_equal(a[group][name][:], b[group][name][:], err_msg=name)
 
 
+@pytest.mark.slow
 def test_joints_without_a_load_are_counted_on_the_side_asked_for(tmp_path, whole):
     _, below, _ = whole
     above = rare.run(asked(load(tmp_path), unresolved="above"), tmp_path / "above.h5", tell=lambda _: None)
@@ -224,6 +228,7 @@ def test_joints_without_a_load_are_counted_on_the_side_asked_for(tmp_path, whole
     assert above.estimate.lower > below.estimate.probability
 
 
+@pytest.mark.slow
 def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
     plan, _, path = whole
     with pytest.raises(StoreError, match=r"sampling.above: 950.0 in the file, 960.0 in the study"):
@@ -236,6 +241,7 @@ def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
         rare.run(plan, path)
 
 
+@pytest.mark.slow
 def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, whole):
     _, found, path = whole
     done = CliRunner().invoke(app, ["rare", str(path), "--json"])

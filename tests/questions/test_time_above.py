@@ -93,6 +93,7 @@ def test_channels_are_components_and_moduli():
     np.testing.assert_allclose(revolutions.channel(loads, "cross3.T") ** 2, (loads[:, :, 2, 3:] ** 2).sum(axis=-1))
 
 
+@pytest.mark.slow
 def test_command_prints_limits_and_writes_curves(path, tmp_path):
     done = run(path, "--by", "cross1.F", "--out", tmp_path / "out")
     assert done.exit_code == 0

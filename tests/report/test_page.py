@@ -277,6 +277,7 @@ def test_wrong_options_write_nothing(path, tmp_path, monkeypatch, arguments, sai
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
     proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
     text = synthetic.STUDY.replace("n = 60", 'method = "importance"\nn = 300') + proposal

@@ -204,6 +204,7 @@ def test_report_of_a_random_view(tmp_path):
     assert (tmp_path / "small_exceedance.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_report_of_a_campaign_under_way_counts_what_is_pending(tmp_path):
     made = report.build(synthetic.store(tmp_path, simulated=31))
     assert "30 joints (random sampling), 0 failed, 0 not settled, 30 still pending" in made.notes
@@ -215,6 +216,7 @@ def test_report_of_a_file_that_has_just_been_made(tmp_path):
     assert len(made.files) == 5
 
 
+@pytest.mark.slow
 def test_report_without_limits_prints_quantiles(tmp_path):
     plain = synthetic.STUDY.partition("[limits]")[0]
     made = report.build(synthetic.store(tmp_path, plain))
@@ -247,6 +249,7 @@ def test_folder_that_is_not_there_and_file_that_is_not_ours(tmp_path):
         report.build(tmp_path / "other.h5")
 
 
+@pytest.mark.slow
 def test_drawing_leaves_the_callers_settings_alone_and_needs_no_pyplot():
     code = (
         "import sys, matplotlib as m; before = m.rcParams.copy();"

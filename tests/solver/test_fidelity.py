@@ -298,6 +298,7 @@ def test_campaign_keeps_its_choice(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("kind", "least"), [("harmonics", 41), ("harmonics+cycles", 90)])
+@pytest.mark.slow
 def test_histories_have_the_steps_that_were_chosen(tmp_path, kind, least):
     text = AUTO + f'[output]\nhistories = "{kind}"\nharmonics = 20\n'
     (tmp_path / "auto.toml").write_text(text, encoding="utf-8")

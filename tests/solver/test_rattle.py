@@ -53,6 +53,7 @@ def test_an_independent_solution() -> None:
     ("point", "rows", "within"),
     [((30, 1500, 100), [3, 10], 0.02), ((15, 3000, 100), [0, 13], 0.02), ((15, 500, 10), [112, 451], 0.01)],
 )
+@pytest.mark.slow
 def test_largest_loads_are_those_of_fine_uniform_steps(
     point: tuple[float, float, float], rows: list[int], within: float
 ) -> None:
@@ -66,6 +67,7 @@ def test_largest_loads_are_those_of_fine_uniform_steps(
         assert (np.abs(found[name] - fine[name]) < within * size).all()
 
 
+@pytest.mark.slow
 def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order() -> None:
     params = np.concatenate([joints(15, 3000, 100, [0, 7, 10, 13, 19]), joints(30, 1500, 100, [10, 13])])
     options = FOLLOWING._replace(max_revs=24)
@@ -96,6 +98,7 @@ def with_explicit_steps(params: np.ndarray, steps: np.ndarray) -> tuple[np.ndarr
     return results.view(np.ndarray), blocks.view(np.ndarray)
 
 
+@pytest.mark.slow
 def test_with_explicit_steps_a_joint_has_the_same_bits_beside_any_others() -> None:
     params = np.concatenate([joints(15, 3000, 100, [0, 7, 10]), joints(30, 1500, 100, [10, 13, 5])])
     steps = simulation.explicit_steps(params, EXPLICIT)

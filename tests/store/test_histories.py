@@ -67,6 +67,7 @@ def test_rows_that_lost_their_histories_are_pending_again(tmp_path: Path, study:
         assert np.flatnonzero(store.status()).tolist() == [4, 5]
 
 
+@pytest.mark.slow
 def test_a_reader_finds_the_histories_in_the_file_that_replaced_its_own(tmp_path: Path, study: fakes.Study) -> None:
     path = tmp_path / "a.h5"
     expected = complete_store(path, study)
@@ -94,6 +95,7 @@ def test_histories_that_are_gone_are_an_error(tmp_path: Path, study: fakes.Study
         store.histories("loads")
 
 
+@pytest.mark.slow
 def test_no_second_writer_while_histories_are_taken_in(
     tmp_path: Path, study: fakes.Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:

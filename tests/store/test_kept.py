@@ -161,6 +161,7 @@ def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
         ResultStore.open(path)
 
 
+@pytest.mark.slow
 def test_slices_and_extensions_are_one_run(tmp_path: Path, make) -> None:  # noqa: F811
     def selected(n: int) -> study.Study:
         made = make(n)

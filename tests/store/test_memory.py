@@ -48,6 +48,7 @@ def read(monkeypatch):
         ("export", "--json", "all.json"),
     ],
 )
+@pytest.mark.slow
 def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     name, *options = command

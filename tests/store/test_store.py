@@ -237,6 +237,7 @@ def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> Non
         ResultStore.open(poor)
 
 
+@pytest.mark.slow
 def test_one_writer_and_any_readers(tmp_path: Path, study: fakes.Study) -> None:
     path = tmp_path / "a.h5"
     code = f"from tolstat.store import ResultStore\nprint(ResultStore.open({str(path)!r}).counts().done)"
@@ -272,6 +273,7 @@ def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monk
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
     code = (
         "import os, signal, pathlib, tolstat.store.result_store\n"

@@ -191,6 +191,7 @@ joint.contact = { law = "stations", stations = [
 """
 
 
+@pytest.mark.slow
 def test_variants_can_have_stations_of_their_own(tmp_path: Path) -> None:
     """The law `mode` written as stations beside `mode` itself and a law with fewer stations: replayed from the file."""
     head, _, rest = TEXT.partition("[grid]")
@@ -229,6 +230,7 @@ def test_each_row_runs_with_its_own_joint(tmp_path: Path) -> None:
         np.testing.assert_array_equal(again.results["T_max"][0], results["T_max"][row])
 
 
+@pytest.mark.slow
 def test_workers_blocks_and_interruptions_change_no_byte(tmp_path: Path) -> None:
     s = load(tmp_path)
 

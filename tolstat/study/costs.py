@@ -38,7 +38,8 @@ class CostEntry(Strict):
     at: Annotated[
         Positive | None,
         Field(
-            description="tolerance (half the band) that costs `cost`; that of the study by default", examples=["0.5 deg"]
+            description="tolerance (half the band) that costs `cost`; that of the study by default",
+            examples=["0.5 deg"],
         ),
     ] = None
     power: Annotated[units.Number, Field(gt=0, le=10, description="exponent of the reciprocal", examples=[2.0])] = 1.0
@@ -48,9 +49,9 @@ class CostEntry(Strict):
     most: Annotated[
         Positive | None, Field(description="largest tolerance that the function allows", examples=["0.030 mm"])
     ] = None
-    keep: Annotated[
-        bool, Field(strict=True, description="whether the tolerance stays as it is", examples=[True])
-    ] = False
+    keep: Annotated[bool, Field(strict=True, description="whether the tolerance stays as it is", examples=[True])] = (
+        False
+    )
 
     @model_validator(mode="after")
     def _in_order(self) -> CostEntry:

@@ -22,30 +22,24 @@ Exponent = Annotated[units.Number, Field(ge=1, le=30)]
 class Settings(Strict):
     """Evaluation of load cycles; affects no result. `read` converts the S–N lines."""
 
-    exponents: Annotated[
-        list[Exponent],
-        Field(
-            default_factory=lambda: [3.0, 5.0, 10.0],
-            min_length=1,
-            description="Wöhler exponents of the damage-equivalent loads",
-            examples=[[5.0]],
-        ),
-    ]
+    exponents: list[Exponent] = Field(
+        default_factory=lambda: [3.0, 5.0, 10.0],
+        min_length=1,
+        description="Wöhler exponents of the damage-equivalent loads",
+        examples=[[5.0]],
+    )
     revolutions: Annotated[
         Positive, Field(description="service life in revolutions of the input shaft", examples=[2e7])
     ] = 1e6
     reference_cycles: Annotated[
         Positive, Field(description="number of cycles that the damage-equivalent loads refer to", examples=[2e6])
     ] = 1e6
-    line: Annotated[
-        dict[str, Any],
-        Field(
-            default_factory=dict,
-            description="S–N lines by channel or pattern",
-            examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
-            json_schema_extra={"x-table": "lines"},
-        ),
-    ]
+    line: dict[str, Any] = Field(
+        default_factory=dict,
+        description="S–N lines by channel or pattern",
+        examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
+        json_schema_extra={"x-table": "lines"},
+    )
 
 
 class LineEntry(Strict):

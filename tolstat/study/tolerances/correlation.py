@@ -28,7 +28,8 @@ class Correlation(Strict):
         list[str],
         Field(
             min_length=1,
-            description="names or patterns of errors that have a tolerance; every pair of them has the correlation `rho`",
+            description="names or patterns of errors that have a tolerance; every pair of them has the "
+            "correlation `rho`",
             examples=[["pin*.diameter"]],
         ),
     ]

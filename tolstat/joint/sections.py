@@ -83,7 +83,8 @@ class Pin(Strict):
         Triple | None,
         Field(
             description="moments of inertia about e, t, z; when left out: those of a solid cylinder of this "
-            "diameter, length and mass"
+            "diameter, length and mass",
+            examples=[["5.78e-5 kg*m^2", "6.42e-5 kg*m^2", "6.42e-5 kg*m^2"]],
         ),
     ] = None
 
@@ -115,7 +116,8 @@ class Arm(Strict):
         Triple | None,
         Field(
             description="moments of inertia about e, t, z; when left out: those of a box with the area moments "
-            "of the section, l_f long along z"
+            "of the section, l_f long along z",
+            examples=[["1.40e-4 kg*m^2", "5.31e-5 kg*m^2", "1.11e-4 kg*m^2"]],
         ),
     ] = None
 

@@ -1,4 +1,4 @@
-"""JSON schemas of whole files. Errors, loads, distributions and keys come from the registries and models that read them."""
+"""JSON schemas of whole files, made from the registries of errors, loads, distributions and from the input models."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
-from tolstat.study.selection import RADIAL_UNITS, UNITS
+from tolstat.study.selection import TOLERANCED, UNITS
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import kinds_of
 
@@ -26,8 +26,6 @@ DEFAULT_JOINT = "cirelli2021"
 """Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
 ERRORS = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
 """Unit of each error that can be given a value."""
-SCATTERING = UNITS | RADIAL_UNITS
-"""Unit of each name that can have a tolerance."""
 
 
 class Section(NamedTuple):
@@ -55,7 +53,8 @@ class Section(NamedTuple):
 def joint() -> Schema:
     """JSON schema of a joint file, with the values of the default joint as examples."""
     values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml")
-    return with_examples(of_model(Joint), values) | {"description": "Nominal joint."}
+    made = with_examples(of_model(Joint), values)
+    return {"title": "Joint of tolstat"} | made | {"description": "Nominal joint."}
 
 
 def overrides() -> Schema:
@@ -65,7 +64,7 @@ def overrides() -> Schema:
         "description": "name of a joint that comes with tolstat, or path of a joint file from the folder of this file",
         "examples": [DEFAULT_JOINT],
     }
-    own = overriding(joint())
+    own = {key: value for key, value in overriding(joint()).items() if key != "title"}
     text = "Joint file, and keys that replace some of its own, such as contact.D_P."
     return own | {"description": text, "properties": {"base": base} | own["properties"]}
 
@@ -78,7 +77,7 @@ def errors() -> Schema:
 
 def tolerances() -> Schema:
     """JSON schema of the errors that scatter: the entry of each error is one of its kinds."""
-    made = {name: {"x-table": _tolerance(name, unit)} for name, unit in SCATTERING.items()}
+    made = {name: {"x-table": _tolerance(name, unit)} for name, unit in TOLERANCED.items()}
     return table(made) | {"description": "How errors scatter, by name or pattern."}
 
 
@@ -106,9 +105,7 @@ def sweep() -> Schema:
 
 def grid() -> Schema:
     """JSON schema of the lists of values that all cases and variants are run at."""
-    made = {
-        name: {"type": "array", "minItems": 1, "items": _quantity(unit)} for name, unit in UNITS.items()
-    }
+    made = {name: {"type": "array", "minItems": 1, "items": _quantity(unit)} for name, unit in UNITS.items()}
     text = "Values at which all cases are run, by name or pattern; several entries make a grid."
     return table(made) | {"description": text}
 
@@ -127,7 +124,7 @@ def _positive(unit: str) -> Schema:
 
 def numbers(low: float, high: float) -> Schema:
     """JSON schema of numbers by name or pattern of errors that scatter."""
-    return table(dict.fromkeys(SCATTERING, {"type": "number", "minimum": low, "maximum": high}))
+    return table({name: {"type": "number", "minimum": low, "maximum": high} for name in TOLERANCED})
 
 
 SECTIONS: dict[str, Section] = {
@@ -165,7 +162,7 @@ def tables() -> dict[str, Schema]:
         "quantity": {"type": ["string", "number"]},
         "lines": table({name: {"x-table": _of_unit(LineEntry.__name__, unit)} for name, unit in CHANNELS.items()}),
     }
-    for name, unit in SCATTERING.items():
+    for name, unit in TOLERANCED.items():
         kinds = [for_unit(of_model(model), unit) for model in kinds_of(name).values()]
         found.setdefault(_tolerance(name, unit), {"anyOf": kinds})
     for unit in dict.fromkeys(UNITS.values()):
@@ -182,7 +179,7 @@ def tables() -> dict[str, Schema]:
 
 def study() -> Schema:
     """JSON schema of a study."""
-    return _file("Study of tolstat", {name: section for name, section in SECTIONS.items()})
+    return _file("Study of tolstat", SECTIONS)
 
 
 def case() -> Schema:

@@ -22,7 +22,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 
 @cache
 def of_model(model: type[BaseModel]) -> Schema:
-    """JSON schema of a model, the models inside it in place of references; the description is the docstring's first part."""
+    """JSON schema of a model, with the models inside it in place of references; only the first part of docstrings."""
     made = model.model_json_schema(by_alias=True)
     definitions = made.pop("$defs", {})
     return _inlined(made, definitions)

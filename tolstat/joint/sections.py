@@ -63,7 +63,7 @@ class Material(Strict):
 
     E: Annotated[Stress, Field(description="Young's modulus")]
     G: Annotated[Stress, Field(description="shear modulus")]
-    nu: Annotated[Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio")]
+    nu: Annotated[Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")]
     rho: Annotated[Density, Field(description="density")]
 
 
@@ -180,10 +180,10 @@ class Bushing(Strict):
     ]
     xi: Annotated[Ratio, Field(description="damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
     cross: BeamAxes | None = Field(
-        default=None, validate_default=True, description="stiffness of a pin's bushing, needed with `given`"
+        default=None, validate_default=True, description="Stiffness of a pin's bushing, needed with `given`"
     )
     fork: BeamAxes | None = Field(
-        default=None, validate_default=True, description="stiffness of an arm's bushing, needed with `given`"
+        default=None, validate_default=True, description="Stiffness of an arm's bushing, needed with `given`"
     )
 
     @field_validator("cross", "fork")

@@ -74,7 +74,7 @@ def _files(path: Path, joint: str) -> Iterator[tuple[Path, str]]:
         study = study.replace(word, value)
     yield path, _header("study") + study
     if joint == OWN:
-        text = "# The joint as designed. Keys behind a # may be left out, as here; their values are those of another joint.\n"
+        text = "# The joint as designed. Keys behind a # may be left out; their values are those of another joint.\n"
         yield path.with_name(base), _header("joint") + text + joint_text()
     for kind in ("study", "joint") if joint == OWN else ("study",):
         yield path.with_name(_schema_name(kind)), json.dumps(schema(kind), indent=1, ensure_ascii=False) + "\n"

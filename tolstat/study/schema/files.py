@@ -218,7 +218,7 @@ def schema(kind: str) -> Schema:
     -------
     dict
     """
-    made = finished(KINDS[kind]())
+    made: Schema = finished(KINDS[kind]())
     definitions = {name: finished(part) for name, part in tables().items()}
     used: dict[str, Any] = {}
     for name in _referred(made, definitions):

@@ -81,9 +81,10 @@ def _dotted(names: Iterable[str]) -> str:
     for feature, halves in of.items():
         alike.setdefault(tuple(halves), []).append(feature)
     found = []
-    for halves, features in alike.items():
+    for alike_halves, features in alike.items():
+        halves = list(alike_halves)
         left = f"(?:{_exact(features)}|{_wild(features)})"
-        if halves == ("",):
+        if halves == [""]:
             found.append(left)
             continue
         wild = [half for half in halves if _by_pattern(f"{features[0]}.{half}")]

@@ -25,7 +25,8 @@ def of_model(model: type[BaseModel]) -> Schema:
     """JSON schema of a model, with the models inside it in place of references; only the first part of docstrings."""
     made = model.model_json_schema(by_alias=True)
     definitions = made.pop("$defs", {})
-    return _inlined(made, definitions)
+    schema: Schema = _inlined(made, definitions)
+    return schema
 
 
 def _inlined(part: Any, definitions: Mapping[str, Schema]) -> Any:

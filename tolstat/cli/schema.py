@@ -17,9 +17,9 @@ def schema(
         typer.Option("--out", metavar="JSON", help="Write the schema to a file instead of standard output."),
     ] = None,
 ) -> None:
-    """Print the JSON schema of a file, by which editors complete and check keys.
+    """Print the JSON schema of a file, for editors.
 
-    A TOML file names its schema in its first line, for Taplo, Tombi and the editors that use them:
+    Editors with Taplo or Tombi complete and check keys by the schema that a TOML file names in its first line:
     #:schema ./study.schema.json
 
     Example: tolstat schema study --out study.schema.json

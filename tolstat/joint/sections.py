@@ -63,7 +63,9 @@ class Material(Strict):
 
     E: Annotated[Stress, Field(description="Young's modulus")]
     G: Annotated[Stress, Field(description="shear modulus")]
-    nu: Annotated[Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")]
+    nu: Annotated[
+        Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
+    ]
     rho: Annotated[Density, Field(description="density")]
 
 

@@ -109,9 +109,7 @@ class Banded(HalfBand):
             examples=["0 mm"],
         ),
     ] = None
-    upper: Annotated[Value | None, Field(description="upper limit of the band", examples=["0.030 mm"])] = (
-        None
-    )
+    upper: Annotated[Value | None, Field(description="upper limit of the band", examples=["0.030 mm"])] = None
 
     def band(self, site: Site) -> tuple[float, float] | None:
         """Lower and upper limit; None where none is given."""

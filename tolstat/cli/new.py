@@ -13,7 +13,7 @@ from tolstat.cli._app import say
 def new(
     name: Annotated[
         Path,
-        typer.Argument(metavar="[NAME]", help="Name of the study, with or without .toml; may begin with a folder."),
+        typer.Argument(metavar="NAME", help="Name of the study, with or without .toml; may begin with a folder."),
     ] = Path("study"),
     joint: Annotated[
         str,

@@ -9,9 +9,10 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
+from pydantic_core import CoreSchema, PydanticCustomError
 
+from tolstat.common import json_schema, units
 from tolstat.common.errors import Fault, InputError
 
 
@@ -19,6 +20,13 @@ class Strict(BaseModel):
     """Base of all input models: unknown keys are faults, values are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the JSON schema with bounds of quantities, see `json_schema.complete`."""
+        schema = handler(core)
+        json_schema.complete(handler.resolve_ref_schema(schema), cls.model_fields, units.SIGNS)
+        return schema
 
 
 ModelT = TypeVar("ModelT", bound=BaseModel)

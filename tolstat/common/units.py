@@ -14,8 +14,10 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from tolstat.common import json_schema
 
 if TYPE_CHECKING:
     import pint
@@ -215,6 +217,10 @@ class Quantity:
             serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
         )
 
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the JSON schema of the quantity as a file writes it."""
+        return json_schema.quantity(self.unit, EXAMPLES[self.unit])
+
 
 def _sign(must: str, remedy: str) -> PydanticCustomError:
     # `strict` replaces {input} by the value as written
@@ -241,6 +247,9 @@ def not_zero(value: float) -> float:
         raise _sign("must not be zero", "give a value other than zero")
     return value
 
+
+SIGNS = {positive: "exclusiveMinimum", not_negative: "minimum"}
+"""Keyword of JSON schema for each validator of a sign."""
 
 Length = Annotated[float, Quantity("m")]
 Area = Annotated[float, Quantity("m^2")]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
@@ -24,7 +24,9 @@ class Joint(Strict):
     Arrays of three or six values that the properties return refer to the local axes (e, t, z) of a pin or arm.
     """
 
-    description: str = ""
+    description: Annotated[
+        str, Field(description="text about the joint, copied to result files", examples=["gearbox A, drawing 4711"])
+    ] = ""
     material: Material
     pin: Pin
     arm: Arm

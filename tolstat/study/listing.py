@@ -15,7 +15,8 @@ from tolstat.joint import Joint, Operation
 from tolstat.joint.model import merged, overridden
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
-from tolstat.study.model import MAX_ROWS, CaseEntry, Range, Solver, VariantEntry
+from tolstat.study.listed import CaseEntry, Range, VariantEntry
+from tolstat.study.model import MAX_ROWS, Solver
 from tolstat.study.selection import UNITS, Assignments, Entry
 
 Section = tuple[int | str, ...]

@@ -24,6 +24,9 @@ UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 RADIAL_UNITS = {f"{feature}.offset_radial": "m" for feature in PINS + HOLES}
 """SI unit of each radial offset, which stands for two columns of the table, offset_t and offset_z, drawn together."""
 
+TOLERANCED = UNITS | RADIAL_UNITS
+"""SI unit of all that ``[tolerances]`` can select."""
+
 
 class Entry(NamedTuple):
     """One entry of a table keyed by error names.

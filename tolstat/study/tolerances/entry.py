@@ -10,7 +10,7 @@ from abc import abstractmethod
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, BeforeValidator, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.files import data_dir
@@ -46,7 +46,8 @@ def _read(value: object, info: ValidationInfo) -> float:
     return units.to_si(value, site.unit)
 
 
-Value = Annotated[float, BeforeValidator(_read)]
+Value = Annotated[float, BeforeValidator(_read), WithJsonSchema({"x-unit": "error"})]
+"""Quantity in the unit of the error that the entry is for."""
 Positive = Annotated[Value, AfterValidator(units.positive)]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
 PositiveLength = Annotated[units.Length, AfterValidator(units.positive)]
@@ -68,9 +69,17 @@ class ToleranceEntry(strict.Strict):
 class HalfBand(ToleranceEntry):
     """Entry with a band that may be given by its half width."""
 
-    plus_minus: Positive | None = None
-    iso2768: Literal["f", "m"] | None = None
-    nominal: PositiveLength | None = None
+    plus_minus: Annotated[
+        Positive | None, Field(description="half width of the band about the nominal value", examples=["0.1 mm"])
+    ] = None
+    iso2768: Annotated[
+        Literal["f", "m"] | None,
+        Field(description="band of this class of ISO 2768-1, for the size `nominal`", examples=["f"]),
+    ] = None
+    nominal: Annotated[
+        PositiveLength | None,
+        Field(description="size for `iso2768`; for an angle its shorter leg", examples=["72.8 mm"]),
+    ] = None
 
     def half_width(self, site: Site) -> float | None:
         """Half width of the band; None where none is given."""
@@ -93,8 +102,14 @@ class HalfBand(ToleranceEntry):
 class Banded(HalfBand):
     """Entry with a band."""
 
-    lower: Value | None = None
-    upper: Value | None = None
+    lower: Annotated[
+        Value | None,
+        Field(
+            description="lower limit of the band",
+            examples=["0 mm"],
+        ),
+    ] = None
+    upper: Annotated[Value | None, Field(description="upper limit of the band", examples=["0.030 mm"])] = None
 
     def band(self, site: Site) -> tuple[float, float] | None:
         """Lower and upper limit; None where none is given."""

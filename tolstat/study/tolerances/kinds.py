@@ -19,16 +19,24 @@ from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Banded, HalfBand, Positive, PositiveNumber, Site, ToleranceEntry, Value
 
-Truncate = Annotated[bool, Field(strict=True)]
+CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
+Truncate = Annotated[
+    bool, Field(strict=True, description="whether parts outside the band are sorted out", examples=[True])
+]
+Cpk = Annotated[PositiveNumber | None, Field(description=f"{CPK}; 1 unless given", examples=[1.33])]
 
 
 class NormalEntry(Banded):
-    """Mean in the middle of the band unless given; sigma from `cpk` (1 unless given) or `std`."""
+    """Mean in the middle of the band, sigma by `cpk`: 0.27 % of the parts are outside at Cpk 1."""
 
     distribution: Literal["normal"]
-    cpk: PositiveNumber | None = None
-    mean: Value | None = None
-    std: Positive | None = None
+    cpk: Cpk = None
+    mean: Annotated[
+        Value | None, Field(description="mean; the middle of the band unless given", examples=["0.01 mm"])
+    ] = None
+    std: Annotated[
+        Positive | None, Field(description="standard deviation, in place of `cpk`", examples=["0.05 mm"])
+    ] = None
     truncate: Truncate = False
 
     def build(self, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
@@ -63,7 +71,7 @@ class NormalEntry(Banded):
 
 
 class UniformEntry(Banded):
-    """Uniform on the band."""
+    """All values of the band are equally probable, none is outside."""
 
     distribution: Literal["uniform"]
 
@@ -73,10 +81,12 @@ class UniformEntry(Banded):
 
 
 class TriangularEntry(Banded):
-    """Triangular on the band, most likely at `peak` (the middle unless given)."""
+    """Most likely at `peak`, none is outside the band."""
 
     distribution: Literal["triangular"]
-    peak: Value | None = None
+    peak: Annotated[
+        Value | None, Field(description="most likely value; the middle of the band unless given", examples=["0 mm"])
+    ] = None
 
     def build(self, site: Site) -> tolerance.Triangular:
         """See `ToleranceEntry.build`."""
@@ -88,13 +98,18 @@ class TriangularEntry(Banded):
 
 
 class LogNormalEntry(Banded):
-    """Lognormal above `threshold` (0 unless given): by band and Cpk of the logarithm, or by mean and std."""
+    """The logarithm of the value above `threshold` is normal: by band and Cpk of the logarithm, or by mean and std."""
 
     distribution: Literal["lognormal"]
-    threshold: Value = 0.0
-    cpk: PositiveNumber | None = None
-    mean: Value | None = None
-    std: Positive | None = None
+    threshold: Annotated[Value, Field(description="least possible value; 0 unless given", examples=["-0.01 mm"])] = 0.0
+    cpk: Cpk = None
+    mean: Annotated[
+        Value | None, Field(description="mean of the value, with `std` in place of a band", examples=["0.02 mm"])
+    ] = None
+    std: Annotated[
+        Positive | None,
+        Field(description="standard deviation of the value, with `mean` in place of a band", examples=["0.01 mm"]),
+    ] = None
     truncate: Truncate = False
 
     def build(self, site: Site) -> tolerance.LogNormal:
@@ -129,11 +144,11 @@ class LogNormalEntry(Banded):
 
 
 class BetaEntry(Banded):
-    """Beta with shapes `a`, `b` on the band."""
+    """Beta distribution with shapes `a`, `b`, stretched over the band."""
 
     distribution: Literal["beta"]
-    a: PositiveNumber
-    b: PositiveNumber
+    a: Annotated[PositiveNumber, Field(description="shape at the lower limit", examples=[2.0])]
+    b: Annotated[PositiveNumber, Field(description="shape at the upper limit", examples=[5.0])]
 
     def build(self, site: Site) -> tolerance.Beta:
         """See `ToleranceEntry.build`."""
@@ -141,11 +156,14 @@ class BetaEntry(Banded):
 
 
 class RayleighEntry(HalfBand):
-    """Radius of an offset whose two coordinates have sigma = plus_minus / (3 cpk) each, or the given `sigma`."""
+    """Radius of an offset in a random direction; its two coordinates are normal with sigma = band / (3 Cpk) each."""
 
     distribution: Literal["rayleigh"]
-    cpk: PositiveNumber | None = None
-    sigma: Positive | None = None
+    cpk: Cpk = None
+    sigma: Annotated[
+        Positive | None,
+        Field(description="standard deviation of each coordinate, in place of `cpk`", examples=["0.03 mm"]),
+    ] = None
     truncate: Truncate = False
 
     def build(self, site: Site) -> tolerance.Rayleigh:
@@ -166,12 +184,14 @@ class RayleighEntry(HalfBand):
 
 
 class MeasuredEntry(ToleranceEntry):
-    """One column of a CSV file with a header row; `unit` is that of the column."""
+    """Measured parts of a CSV file with a header row, drawn with equal probability."""
 
     distribution: Literal["measured"]
-    file: str
-    column: str
-    unit: str | None = None
+    file: Annotated[str, Field(description="path of the CSV file, from the study's folder", examples=["rattle.csv"])]
+    column: Annotated[str, Field(description="name of the column in the header row", examples=["speed_rpm"])]
+    unit: Annotated[
+        str | None, Field(description="unit of the column; needed unless the error is a pure number", examples=["rpm"])
+    ] = None
 
     def build(self, site: Site) -> tolerance.Measured:
         """See `ToleranceEntry.build`."""
@@ -223,6 +243,11 @@ KINDS: dict[str, type[ToleranceEntry]] = {
 RADIAL_KINDS: dict[str, type[ToleranceEntry]] = {"rayleigh": RayleighEntry}
 
 
+def kinds_of(name: str) -> dict[str, type[ToleranceEntry]]:
+    """Entries that an error can have, by the word for ``distribution``."""
+    return RADIAL_KINDS if name.endswith(".offset_radial") else KINDS
+
+
 def distribution(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> Distribution:
     """Distribution that an entry defines.
 
@@ -249,7 +274,7 @@ def distribution(data: object, site: Site, place: str, path: tuple[int | str, ..
     if not isinstance(data, dict):
         remedy = 'write { plus_minus = ..., distribution = "normal", cpk = 1.0 }'
         raise InputError([Fault(where, f"{data!r} is not a tolerance", remedy)])
-    kinds = RADIAL_KINDS if site.name.endswith(".offset_radial") else KINDS
+    kinds = kinds_of(site.name)
     kind = data.get("distribution")
     if kind is None:
         remedy = f"add distribution, one of {', '.join(kinds)}"

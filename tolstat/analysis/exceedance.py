@@ -179,7 +179,7 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) ->
 def simultaneous(n: int, confidence: float = 0.95) -> float:
     """Half width of the simultaneous band of the exceedance curve (Dvoretzky, Kiefer and Wolfowitz 1956).
 
-    With the constant of Massart (1990): P(sup |estimate - truth| > e) <= 2 exp(-2 n e^2), for every distribution.
+    With the constant of Massart (1990): ``P(sup |estimate - truth| > e) <= 2 exp(-2 n e^2)``, for every distribution.
 
     Parameters
     ----------

@@ -274,7 +274,7 @@ FAULTS = {
     "unknown key": (("vary.contact.D_P", "vary.contact.D_X"), "variant[1].vary.contact.D_X: unknown key"),
     "unknown base": (('name = "plain"', 'name = "p"\njoint.base = "x"'), "variant[0].joint.base: no joint is named"),
     "vary without unit": (('to = "75.6 mm"', "to = 75.6"), "variant[1].vary.contact.D_P: 75.6 has no unit"),
-    "vary beyond": (('to = "75.6 mm"', 'to = "77 mm"'), "variant[1].vary.contact.D_P: a pin of 0.077 m does not fit"),
+    "vary beyond": (('to = "75.6 mm"', 'to = "77 mm"'), "variant[1].vary.contact.D_P: a pin of 77 mm does not fit"),
     "vary a word": (
         (
             'vary.contact.D_P = { from = "76.0 mm", to = "75.6 mm" }',

@@ -89,14 +89,14 @@ def validate(
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
-        raise InputError(faults(error, model, place, prefix)) from error
+        raise InputError(faults(error, model, data, place, prefix)) from error
 
 
 def faults(
-    error: ValidationError, model: type[BaseModel], place: str, prefix: tuple[int | str, ...] = ()
+    error: ValidationError, model: type[BaseModel], data: object, place: str, prefix: tuple[int | str, ...] = ()
 ) -> list[Fault]:
-    """Translate pydantic's errors to faults with remedies."""
-    return [_fault(e, model, place, prefix) for e in error.errors(include_url=False)]
+    """Translate pydantic's errors of `data` to faults with remedies."""
+    return [_fault(e, model, data, place, prefix) for e in error.errors(include_url=False)]
 
 
 _REMEDIES = {
@@ -116,12 +116,16 @@ _REMEDIES = {
 """Remedy for a kind of pydantic error, filled from the error's context."""
 
 
-def _fault(e: Any, model: type[BaseModel], place: str, prefix: tuple[int | str, ...]) -> Fault:
+def _fault(e: Any, model: type[BaseModel], data: object, place: str, prefix: tuple[int | str, ...]) -> Fault:
     path = dotted((*prefix, *e["loc"]))
     where = f"{place}: {path}" if path else place
     context = e.get("ctx", {})
     if "remedy" in context:
-        return Fault(where, context["found"].replace("{input}", repr(e["input"])), context["remedy"])
+        found, remedy = context["found"].replace("{input}", repr(e["input"])), context["remedy"]
+        for key in context.get("keys", ()):
+            written = _written(data, e["loc"], key.split("."))
+            found, remedy = (text.replace(f"{{{key}}}", written) for text in (found, remedy))
+        return Fault(where, found, remedy)
     if e["type"] == "extra_forbidden":
         return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), _keys_at(model, e["loc"][:-1])))
     if e["type"] == "missing":
@@ -130,6 +134,23 @@ def _fault(e: Any, model: type[BaseModel], place: str, prefix: tuple[int | str, 
         return Fault(where, f"{e['input']!r} is not allowed", f"write one of {context['expected']}")
     remedy = _REMEDIES.get(e["type"], "give a value of the expected type").format(**context)
     return Fault(where, f"{e['input']!r}: {e['msg'].removeprefix('Input ')}", remedy)
+
+
+def _written(data: object, location: Sequence[int | str], key: Sequence[str]) -> str:
+    """Value of a key as it is written, from the innermost table around a place that has the key."""
+    tables = [data]
+    for part in location:
+        try:
+            tables.append(tables[-1][part])  # type: ignore[index]
+        except (LookupError, TypeError):
+            break
+    for table in reversed(tables):
+        value: Any = table
+        for part in key:
+            value = value.get(part) if isinstance(value, Mapping) else None
+        if value is not None:
+            return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+    return ".".join(key)
 
 
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:
@@ -155,6 +176,10 @@ def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]
     return [f.alias or name for name, f in fields.items()]
 
 
-def refuse(found: str, remedy: str) -> PydanticCustomError:
-    """Error for a validator to raise, which becomes a `Fault` with this text."""
-    return PydanticCustomError("refused", "{found}", {"found": found, "remedy": remedy})
+def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:
+    """Error for a validator to raise, which becomes a `Fault` with this text.
+
+    Each of `keys`, such as ``"D_H"`` or ``"cross.R"``, is replaced where it stands in braces by the value as the file
+    has it: faults show the numbers and units of the user.
+    """
+    return PydanticCustomError("refused", "{found}", {"found": found, "remedy": remedy, "keys": keys})

@@ -21,6 +21,7 @@ from tolstat.joint.sections import (
     NOT_NEGATIVE,
     POSITIVE,
     Array,
+    Diameter,
     Length,
     Material,
     Number,
@@ -212,8 +213,8 @@ class Contact(Strict):
     law: LawName
     n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = OPTIONAL
     stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = OPTIONAL
-    D_H: Length
-    D_P: Length
+    D_H: Diameter
+    D_P: Diameter
     z: Length
     coefficients: Literal["printed", "fitted"] | None = OPTIONAL
     k1u: QuadraticStiffness | None = OPTIONAL
@@ -233,7 +234,7 @@ class Contact(Strict):
     def _fits(cls, value: float, info: ValidationInfo) -> float:
         hole = info.data.get("D_H")
         if hole is not None and value > hole:
-            raise refuse(f"a pin of {value:g} m does not fit into a hole of {hole:g} m", "give D_P <= D_H")
+            raise refuse("a pin of {D_P} does not fit into a hole of {D_H}", "give D_P <= D_H", "D_P", "D_H")
         return value
 
     @field_validator(*COEFFICIENTS)
@@ -274,8 +275,9 @@ class Contact(Strict):
         uniform = info.data.get(name.replace("p", "u"))
         in_use = _has_middle(info) and info.data.get("coefficients") == "printed"
         if in_use and value is not None and uniform is not None and 2.0 * value > uniform:
-            found = f"2 {name} exceeds {name[:2]}u = {uniform:g}: the middle station would be negative"
-            raise refuse(found, f"give {name} <= {name[:2]}u / 2, or another law")
+            of = f"{name[:2]}u"
+            found = f"2 {name} exceeds {of} = {{{of}}}: the middle station would be negative"
+            raise refuse(found, f"give {name} <= {of} / 2, or another law", of)
         return value
 
     @field_validator("H")

@@ -39,7 +39,9 @@ class Joint(Strict):
     def _beside_the_centre(cls, value: Contact, info: ValidationInfo) -> Contact:
         cross = info.data.get("cross")
         if cross is not None and value.z >= 2.0 * cross.R:
-            raise refuse(f"z = {value.z:g} m reaches past the joint centre", "give contact.z < 2 cross.R")
+            keys = ("contact.z", "cross.R")
+            remedy = "give contact.z < 2 cross.R, where cross.R = {cross.R}"
+            raise refuse("z = {contact.z} reaches past the joint centre", remedy, *keys)
         return value
 
     @field_validator("contact")

@@ -22,6 +22,7 @@ POSITIVE = AfterValidator(units.positive)
 NOT_NEGATIVE = AfterValidator(units.not_negative)
 
 Length = Annotated[units.Length, POSITIVE]
+Diameter = Annotated[units.Diameter, POSITIVE]
 Area = Annotated[units.Area, POSITIVE]
 AreaMoment = Annotated[units.AreaMoment, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
@@ -43,7 +44,8 @@ def _poisson(nu: float) -> float:
 def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
     """Refuse moments of inertia that no body has: one exceeds the sum of the two others."""
     if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
-        raise refuse(f"no body has the moments of inertia {inertia}", "give none above the sum of the others")
+        found = "no body has the moments of inertia {inertia}"
+        raise refuse(found, "give none above the sum of the others", "inertia")
     return inertia
 
 
@@ -75,7 +77,7 @@ class Pin(Strict):
     J: AreaMoment
     Jp: AreaMoment | None = None
     chi: Number
-    d: Length
+    d: Diameter
     mass: Mass | None = None
     inertia: Triple | None = None
 

@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BeforeValidator, ValidationInfo, model_vali
 
 from tolstat.common import strict, units
 from tolstat.common.files import data_dir
+from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.distributions import Distribution
@@ -46,8 +47,15 @@ def _read(value: object, info: ValidationInfo) -> float:
     return units.to_si(value, site.unit)
 
 
+def _read_half_width(value: object, info: ValidationInfo) -> float:
+    """Read a quantity that may have the sign ±."""
+    site: Site = (info.context or {})["site"]
+    return units.to_si(value, site.unit, PLUS_MINUS)
+
+
 Value = Annotated[float, BeforeValidator(_read)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
+HalfWidth = Annotated[float, BeforeValidator(_read_half_width), AfterValidator(units.positive)]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
 PositiveLength = Annotated[units.Length, AfterValidator(units.positive)]
 
@@ -68,7 +76,7 @@ class ToleranceEntry(strict.Strict):
 class HalfBand(ToleranceEntry):
     """Entry with a band that may be given by its half width."""
 
-    plus_minus: Positive | None = None
+    plus_minus: HalfWidth | None = None
     iso2768: Literal["f", "m"] | None = None
     nominal: PositiveLength | None = None
 
@@ -87,7 +95,7 @@ class HalfBand(ToleranceEntry):
         try:
             return distributions.iso2768(data_dir() / "iso2768.csv", kind, self.iso2768, self.nominal)
         except ValueError as error:
-            raise refuse(f"nominal: {error}", "give plus_minus") from error
+            raise refuse(f"nominal = {{nominal}}: {error}", "give plus_minus", "nominal") from error
 
 
 class Banded(HalfBand):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args
@@ -12,6 +14,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
+from tolstat.common import toml_lines
 from tolstat.common.errors import Fault, InputError
 
 
@@ -33,7 +36,8 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
         When the file cannot be read or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8") if text is None else text)
+        text = path.read_text(encoding="utf-8") if text is None else text
+        return tomllib.loads(text)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
@@ -42,7 +46,50 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
     except tomllib.TOMLDecodeError as error:
-        raise InputError([Fault(str(path), f"is not TOML: {error}", "correct the syntax there")]) from error
+        line, said, remedy = toml_lines.of_syntax(error, text or "")
+        raise InputError([Fault(f"{path}:{line}", f"is not TOML: {said}", remedy)]) from error
+
+
+def with_lines(faults: Sequence[Fault], place: str, text: str) -> list[Fault]:
+    """Add the line to the place of each fault of a file.
+
+    Parameters
+    ----------
+    faults : sequence of Fault
+        Faults of this file and of others, which stay as they are.
+    place : str
+        What stands before the key path in the places of this file's faults.
+    text : str
+        The file's text, which is TOML.
+
+    Returns
+    -------
+    list of Fault
+        ``study.toml:12: sampling.n`` for ``study.toml: sampling.n``. A missing key has the line of the innermost table
+        around it that the file has; a fault without key path has no line.
+    """
+    lines = {dotted(path): line for path, line in toml_lines.of_keys(text).items()}
+    return [_with_line(fault, place, lines) for fault in faults]
+
+
+def _with_line(fault: Fault, place: str, lines: Mapping[str, int]) -> Fault:
+    path = fault.place.removeprefix(f"{place}: ")
+    if path == fault.place:
+        return fault
+    above = path
+    while above and above not in lines:
+        above = above[: max(above.rfind("."), above.rfind("["), 0)]
+    return replace(fault, place=f"{place}:{lines[above]}: {path}") if above else fault
+
+
+@contextmanager
+def lines_of(path: Path) -> Iterator[None]:
+    """Add lines to the faults of a TOML file that are raised inside, see `with_lines`."""
+    try:
+        yield
+    except InputError as error:
+        text = path.read_text(encoding="utf-8")
+        raise InputError(with_lines(error.faults, str(path), text)) from error
 
 
 def dotted(location: Sequence[int | str]) -> str:
@@ -155,8 +202,9 @@ def _written(data: object, location: Sequence[int | str], key: Sequence[str]) ->
 
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:
     """Remedy for an unknown word: the closest of the allowed ones, else all of them."""
-    close = difflib.get_close_matches(word, allowed, n=1)
-    return f"did you mean {close[0]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
+    spelt = {name.lower(): name for name in allowed}
+    close = difflib.get_close_matches(word.lower(), spelt, n=1)
+    return f"did you mean {spelt[close[0]]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
 
 
 def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:

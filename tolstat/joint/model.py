@@ -108,10 +108,11 @@ def load(
     """
     path = _find(base, f"{place}: {section}", relative_to)
     data = strict.read_toml(path)
-    try:
-        return strict.validate(Joint, overridden(data, overrides), place)
-    except InputError as error:
-        raise InputError(_attributed(error.faults, data, path, place, section)) from error
+    with strict.lines_of(path):
+        try:
+            return strict.validate(Joint, overridden(data, overrides), place)
+        except InputError as error:
+            raise InputError(_attributed(error.faults, data, path, place, section)) from error
 
 
 def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:

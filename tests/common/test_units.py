@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 
 import pytest
 from pydantic_core import PydanticCustomError
 
+from tests.support.environment import ROOT
 from tolstat.common.notation import DIAMETER, PLUS_MINUS
 from tolstat.common.units import diameter, is_diameter, to_si, written
 
@@ -119,3 +122,36 @@ def test_angles_in_minutes_and_seconds(text: str, degrees: float) -> None:
 def test_what_is_no_angle_in_minutes(text: str) -> None:
     with pytest.raises(PydanticCustomError, match="is not a number with a unit"):
         to_si(text, "rad")
+
+
+def documented() -> list[tuple[str, list[str], list[str]]]:
+    """Rows of the table of quantities in the documents: kind, texts that are accepted, texts that are not."""
+    page = (ROOT / "docs" / "tolerances.md").read_text(encoding="utf-8")
+    table = page.partition("| quantity |")[2].partition("\n\n")[0].splitlines()[2:]
+    cells = [line.strip("|").split(" | ") for line in table]
+    return [(kind.split()[0].strip(",| "), *(re.findall("`([^`]+)`", cell) for cell in rest)) for kind, *rest in cells]
+
+
+KINDS = {
+    "length": ("m", ""),
+    "diameter": ("m", DIAMETER),
+    "half": ("m", PLUS_MINUS),
+    "angle": ("rad", ""),
+    "speed": ("rad/s", ""),
+    "torque": ("N*m", ""),
+    "share": ("1", ""),
+}
+
+
+def test_the_documented_quantities_are_read() -> None:
+    rows = documented()
+    assert {kind for kind, *_ in rows} == set(KINDS)
+    for kind, accepted, refused in rows:
+        unit, mark = KINDS[kind]
+        values = [text for text in accepted if text not in ("D_H", "D_P", "pin.d", "plus_minus")]
+        assert values
+        for text in values:
+            assert to_si(json.loads(text), "rad" if "°" in text else unit, mark) > 0.0
+        for text in refused:
+            with pytest.raises(PydanticCustomError):
+                to_si(json.loads(text), unit, mark)

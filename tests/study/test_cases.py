@@ -200,7 +200,7 @@ def test_variants_can_have_stations_of_their_own(tmp_path: Path) -> None:
         for name, own in (("mode", ""), ("point", 'joint.contact.law = "point"'), ("own", STATIONS))
     )
     s = load(tmp_path, text=head + cases + variants)
-    assert campaign.run(s, tmp_path / "a.h5", workers=1, block=4).not_settled == 0
+    assert campaign.run(s, tmp_path / "a.h5", workers=1, block=4).unsettled == 0
     with ResultStore.open(tmp_path / "a.h5") as store:
         results, variant = store.results(), store.design()["variant"]
         params = recorded.parameters(store, np.arange(s.rows))
@@ -213,7 +213,7 @@ def test_variants_can_have_stations_of_their_own(tmp_path: Path) -> None:
 
 def test_each_row_runs_with_its_own_joint(tmp_path: Path) -> None:
     s = small(tmp_path)
-    assert campaign.run(s, tmp_path / "a.h5", workers=1, block=4).not_settled == 0
+    assert campaign.run(s, tmp_path / "a.h5", workers=1, block=4).unsettled == 0
     with ResultStore.open(tmp_path / "a.h5") as store:
         results, design, errors = store.results(), store.design(), store.errors()
         assert store.variants == s.variants

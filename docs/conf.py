@@ -50,8 +50,8 @@ def add_tree(app: Any, docname: str, source: list[str]) -> None:
     branches = []
     for section in re.split(r"^## ", source[0], flags=re.MULTILINE)[1:]:
         caption = section.partition("\n")[0]
-        pages = [page for page in re.findall(r"\]\(([^()\s#]+\.(?:md|ipynb))", section)]
-        pages = [os.path.normpath(f"docs/{page}").rpartition(".")[0] for page in dict.fromkeys(pages)]
+        linked = dict.fromkeys(re.findall(r"\]\(([^()\s#]+\.(?:md|ipynb))", section))
+        pages = [os.path.normpath(f"docs/{page}").rpartition(".")[0] for page in linked]
         listed = "\n".join(f"/{page}" for page in pages if page in app.env.found_docs)
         branches.append(f"```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{listed}\n```")
     source[0] += "\n\n" + "\n\n".join(branches) + "\n"

@@ -50,7 +50,7 @@ def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     study = fakes.Study(output=fakes.Output(request.param))
     path = tmp_path_factory.mktemp("reference") / "a.h5"
     counts = campaign.run(study, path, workers=1, stages=fakes.stages())
-    assert counts == Counts(total=40, done=40, not_settled=4, failed=4)
+    assert counts == Counts(total=40, done=40, unsettled=4, failed=4)
     expected = datasets(path)
     assert ("histories/loads" in expected) == (request.param == "full")
     return study, expected
@@ -396,7 +396,7 @@ def test_progress_lines_once_a_minute() -> None:
 def test_progress_text_before_the_first_joint() -> None:
     text = progress.text(Counts(513, 100, 0, 0), begun=100, seconds=0.0)
     assert text == "100 of 513 joints, 0 failed, 0 not settled"
-    assert progress.text(Counts(513, 100, 4, 0, 3), 100, 0.0).endswith(", 0 failed, 4 not settled, 3 not resolved")
+    assert progress.text(Counts(513, 100, 7, 0, 3), 100, 0.0).endswith(", 0 failed, 4 not settled, 3 not resolved")
     assert "2:00:00 remaining" in progress.text(Counts(7201, 1, 0, 0), begun=0, seconds=1.0)
 
 

@@ -260,6 +260,20 @@ def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, 
     assert CliRunner().invoke(app, ["rare", str(path), "--n", "300"]).exit_code == 2
 
 
+def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
+    plan, found, path = whole
+    monkeypatch.setattr(campaign, "versions", lambda: dict.fromkeys(("tolstat", "sources"), "other"))
+    again = rare.run(plan, path, tell=lambda _: None)
+    assert again.estimate == found.estimate
+    done = CliRunner().invoke(app, ["rare", str(path)])
+    assert done.exit_code == 0, done.stderr
+    with h5py.File(path, "r+") as file:
+        file["results/status"][3] = Status.PENDING
+    done = CliRunner().invoke(app, ["rare", str(path)])
+    assert done.exit_code == 2
+    assert "run the study into another file (--out OTHER.h5), or resume with" in done.stderr
+
+
 def test_every_fault_of_a_question_is_told(tmp_path):
     path = load(tmp_path).path
     for options, text in (

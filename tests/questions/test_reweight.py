@@ -14,6 +14,7 @@ from tolstat import sampling, study
 from tolstat.analysis import reweight
 from tolstat.cli import app
 from tolstat.common.errors import InputError
+from tolstat.common.tables import Simulation, Status
 from tolstat.questions.reweight import query as campaigns
 from tolstat.store import ResultStore
 from tolstat.study.change import changed
@@ -194,6 +195,19 @@ def test_command_prints_a_table_and_json(tmp_path):
     refused = CliRunner().invoke(app, ["reweight", str(path), "--set", "pin9.offset_t.cpk=1"])
     assert refused.exit_code == 2
     assert "selects no error" in refused.stderr
+
+
+def test_a_campaign_without_a_valid_load_is_refused(tmp_path):
+    path = campaign(tmp_path)
+    with ResultStore.open(path, "r+") as store:
+        results = store.results()
+        results["status"] = Status.NEWTON_FAILED
+        store.write(np.arange(store.n), Simulation(results, {}))
+    done = CliRunner().invoke(app, ["reweight", str(path), "--set", "pin1.offset_t.plus_minus=0.09 mm"])
+    assert done.exit_code == 2
+    assert "holds no joint with a valid load: cross1.F" in done.stderr
+    assert f"hint: see why: tolstat status {path}" in done.stderr
+    assert done.stdout == ""
 
 
 def test_a_study_without_limits_has_quantiles(tmp_path):

@@ -13,6 +13,7 @@ from tolstat import cli, sampling, study
 from tolstat.analysis import exceedance
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import CHANNELS, Options, Simulation
+from tolstat.questions.time_above import rendering
 from tolstat.questions.time_above.query import time_above
 from tolstat.solver.simulation import history_specs
 from tolstat.store import ResultStore, revolutions
@@ -110,6 +111,17 @@ def test_command_prints_limits_and_writes_curves(path, tmp_path):
         "cross1.F",
         *(f"fork{i}.T" for i in (1, 2, 3, 4)),
     }
+
+
+def test_shares_have_their_unit_with_intervals_and_without(path):
+    with ResultStore.open(path) as store:
+        table = time_above(store.view(), ["cross1.F"], ["700 N"]).table
+    without = table.assign(**{name: np.nan for name in table if name.endswith(("_lower", "_upper"))})
+    cells = []
+    for shown in (table, without):
+        cells = [cell(row) for row in shown.to_dict("records") for _, cell, *_ in rendering.LEVELS[1:]]
+        assert all(cell.endswith(" %") for cell in cells), cells
+    assert "(" not in "".join(cells)
 
 
 def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_path):

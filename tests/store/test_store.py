@@ -121,7 +121,7 @@ def test_counts(tmp_path: Path, study: fakes.Study) -> None:
     part.results["status"] = [Status.NOT_PERIODIC, Status.NOT_SETTLED, Status.NOT_FINITE, Status.NOT_RESOLVED]
     with new_store(tmp_path / "a.h5", study) as store:
         store.write(rows, part)
-        assert store.counts() == Counts(total=12, done=4, not_settled=2, failed=1, not_resolved=1)
+        assert store.counts() == Counts(total=12, done=4, unsettled=3, failed=1, not_resolved=1)
 
 
 @pytest.mark.slow

@@ -236,7 +236,7 @@ def _check_same(store: ResultStore, study: Study, rows: range) -> None:
     if not differing:
         code = f"commit {store.git_commit}" if store.git_commit else "the version that began it"
         found = "was begun by another version of the code"
-        remedy = f"give another file: --out OTHER.h5, or resume with {code}"
+        remedy = f"run the study into another file (--out OTHER.h5), or resume with {code}"
     now = versions()
     for name, noun in (("tolstat", "version"), ("sources", "hash")):
         held = store.versions.get(name, "unknown")

@@ -176,9 +176,7 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
         raise InputError([Fault("--until", found, 'write sampling.method = "random" in the study')])
     if not selected_results.holds(study.output.columns, rule.load):
         remedy = f"add {', '.join(LOADS[rule.load].columns)}"
-        raise InputError(
-            [Fault(f"{study.path}: output.results", f"leaves out {rule.load}, which --until needs", remedy)]
-        )
+        raise InputError([study.fault("output.results", f"leaves out {rule.load}, which --until needs", remedy)])
     planned = looks(rule.width, study.samples)
     first = study.first_sample
     for joints in planned:

@@ -324,7 +324,7 @@ def check_study(
     number = parse_joints(joints)
     if plan.solver.fidelity == "auto":
         found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
-        raise InputError([Fault(f"{plan.path}: solver.fidelity", found, remedy)])
+        raise InputError([plan.fault("solver.fidelity", found, remedy)])
     seed = plan.sampling.seed if seed is None else seed
     first = 0 if number is None else plan.first_sample
     rows = choose(np.arange(first, plan.rows), number, seed)

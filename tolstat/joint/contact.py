@@ -21,6 +21,7 @@ from tolstat.joint.sections import (
     NOT_NEGATIVE,
     POSITIVE,
     Array,
+    Diameter,
     Length,
     Material,
     Number,
@@ -223,9 +224,9 @@ class Contact(Strict):
         description="stations of one's own, for law `stations`",
         examples=[[{"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0}]],
     )
-    D_H: Annotated[Length, Field(description="diameter of the hole")]
+    D_H: Annotated[Diameter, Field(description="diameter of the hole")]
     D_P: Annotated[
-        Length, Field(description="diameter of the pin, not above `D_H`; the radial clearance is (D_H - D_P)/2")
+        Diameter, Field(description="diameter of the pin, not above `D_H`; the radial clearance is (D_H - D_P)/2")
     ]
     z: Annotated[Length, Field(description="length of the contact")]
     coefficients: Literal["printed", "fitted"] | None = Field(
@@ -273,7 +274,7 @@ class Contact(Strict):
     def _fits(cls, value: float, info: ValidationInfo) -> float:
         hole = info.data.get("D_H")
         if hole is not None and value > hole:
-            raise refuse(f"a pin of {value:g} m does not fit into a hole of {hole:g} m", "give D_P <= D_H")
+            raise refuse("a pin of {D_P} does not fit into a hole of {D_H}", "give D_P <= D_H", "D_P", "D_H")
         return value
 
     @field_validator(*COEFFICIENTS)
@@ -314,8 +315,9 @@ class Contact(Strict):
         uniform = info.data.get(name.replace("p", "u"))
         in_use = _has_middle(info) and info.data.get("coefficients") == "printed"
         if in_use and value is not None and uniform is not None and 2.0 * value > uniform:
-            found = f"2 {name} exceeds {name[:2]}u = {uniform:g}: the middle station would be negative"
-            raise refuse(found, f"give {name} <= {name[:2]}u / 2, or another law")
+            of = f"{name[:2]}u"
+            found = f"2 {name} exceeds {of} = {{{of}}}: the middle station would be negative"
+            raise refuse(found, f"give {name} <= {of} / 2, or another law", of)
         return value
 
     @field_validator("H")

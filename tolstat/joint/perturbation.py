@@ -30,7 +30,7 @@ ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
 
 def _check_misalignment(alpha: float) -> float:
     if not abs(alpha) < np.pi / 2:
-        raise refuse(f"a Cardan joint cannot turn at {np.degrees(alpha):g} deg", "give less than 90 deg")
+        raise refuse("a Cardan joint cannot turn at {alpha}", "give less than 90 deg", "alpha")
     return alpha
 
 

@@ -22,6 +22,7 @@ POSITIVE = AfterValidator(units.positive)
 NOT_NEGATIVE = AfterValidator(units.not_negative)
 
 Length = Annotated[units.Length, POSITIVE]
+Diameter = Annotated[units.Diameter, POSITIVE]
 Area = Annotated[units.Area, POSITIVE]
 AreaMoment = Annotated[units.AreaMoment, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
@@ -43,7 +44,8 @@ def _poisson(nu: float) -> float:
 def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
     """Refuse moments of inertia that no body has: one exceeds the sum of the two others."""
     if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
-        raise refuse(f"no body has the moments of inertia {inertia}", "give none above the sum of the others")
+        found = "no body has the moments of inertia {inertia}"
+        raise refuse(found, "give none above the sum of the others", "inertia")
     return inertia
 
 
@@ -79,7 +81,7 @@ class Pin(Strict):
         AreaMoment | None, Field(description="polar moment of the section; when left out: 2 J, that of a circle")
     ] = None
     chi: Annotated[Number, Field(description="shear factor of the section, 1.11 for a circle")]
-    d: Annotated[Length, Field(description="diameter of the solid cylinder whose inertia the pin has")]
+    d: Annotated[Diameter, Field(description="diameter of the solid cylinder whose inertia the pin has")]
     mass: Annotated[Mass | None, Field(description="mass; when left out: rho A l")] = None
     inertia: Annotated[
         Triple | None,

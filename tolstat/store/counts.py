@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import FAILED, Status
+from tolstat.common.tables import FAILED, UNSETTLED, Status
 
 
 class Counts(NamedTuple):
@@ -19,17 +19,17 @@ class Counts(NamedTuple):
         All joints.
     done : int
         Joints that are not pending.
-    not_settled : int
-        Joints whose status is NOT_SETTLED or NOT_PERIODIC.
+    unsettled : int
+        Joints whose status is in `tables.UNSETTLED`.
     failed : int
         Joints without results.
     not_resolved : int
-        Joints whose largest loads still change with finer steps.
+        Those of the unsettled joints whose largest loads still change with finer steps.
     """
 
     total: int
     done: int
-    not_settled: int
+    unsettled: int
     failed: int
     not_resolved: int = 0
 
@@ -41,7 +41,7 @@ class Counts(NamedTuple):
     @property
     def shortfall(self) -> str:
         """``"1 failed, 0 not settled"``, and how many are not resolved if any are."""
-        words = f"{self.failed} failed, {self.not_settled} not settled"
+        words = f"{self.failed} failed, {self.unsettled - self.not_resolved} not settled"
         return words + (f", {self.not_resolved} not resolved" if self.not_resolved else "")
 
     def after(self, status: NDArray[np.uint8]) -> Counts:
@@ -53,7 +53,7 @@ class Counts(NamedTuple):
         return Counts(
             self.total,
             self.done + len(status) - count(Status.PENDING),
-            self.not_settled + count(Status.NOT_SETTLED, Status.NOT_PERIODIC),
+            self.unsettled + count(*UNSETTLED),
             self.failed + count(*FAILED),
             self.not_resolved + count(Status.NOT_RESOLVED),
         )

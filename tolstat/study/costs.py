@@ -129,7 +129,8 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
             cost = strict.validate(CostEntry, entry.value, str(path), prefix=entry.path, context=context)
             found |= dict.fromkeys(names, cost)
     if faults:
-        raise InputError(faults)
+        toml = path.suffix != ".csv"
+        raise InputError(strict.with_lines(faults, str(path), path.read_text(encoding="utf-8")) if toml else faults)
     kept = CostEntry(cost=0.0, keep=True)
     return [Cost(t.width, tuple(found.get(name, kept) for name in t.names)) for t in tolerances]
 

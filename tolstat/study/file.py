@@ -62,6 +62,8 @@ class StudyFile:
         self.place = str(path)
         self.data = read_toml(path, text)
         self.text = path.read_text(encoding="utf-8") if text is None else text
+        self._lined = text is None
+        self._overridden: set[str] = set()
         self._faults: list[Fault] = []
         self._claims = Assignments(self.place)
         self._toleranced: dict[str, str] = {}
@@ -76,15 +78,19 @@ class StudyFile:
         Raises
         ------
         InputError
-            With every fault.
+            With every fault; those of the file have its lines, unless their value is from the command line.
         """
-        if self._faults:
-            raise InputError(self._faults)
+        if not self._faults:
+            return
+        lined = strict.with_lines(self._faults, self.place, self.text) if self._lined else self._faults
+        pairs = zip(self._faults, lined, strict=True)
+        raise InputError([fault if fault.place in self._overridden else found for fault, found in pairs])
 
     def override(self, section: str, key: str, value: object) -> None:
         """Replace a value of the file by one from the command line."""
         if isinstance(self.data.setdefault(section, {}), dict):
             self.data[section][key] = value
+        self._overridden.add(f"{self.place}: {section}.{key}")
 
     def model(self, section: str, model: type[ModelT], *, required: bool = False) -> ModelT | None:
         """Read a section that is one model; the model has its defaults where the file lacks the section."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from tolstat.common import units
+from tolstat.common.notation import PLUS_MINUS
 from tolstat.study import rewriting, selection
 from tolstat.study.study import Study
 from tolstat.study.tolerances.density_ratio import unbounded
@@ -65,7 +66,7 @@ class Tolerance(NamedTuple):
             del entry["iso2768"], entry["nominal"]
         for key in _WIDTHS:
             if key in entry:
-                value = factor * units.to_si(entry[key], self.site.unit)
+                value = factor * units.to_si(entry[key], self.site.unit, PLUS_MINUS)
                 entry[key] = units.written(value, self.site.unit, entry[key], digits)
         ends = [key for key in ("lower", "upper") if key in entry]
         if ends:

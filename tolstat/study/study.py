@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.strict import with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.study.design import Design, flat
@@ -56,6 +57,11 @@ class Case:
     def name(self) -> str:
         """Name of the file without folder and ending."""
         return self.path.stem
+
+    def fault(self, key: str, found: str, remedy: str) -> Fault:
+        """Fault of a key of the file, with its line."""
+        (lined,) = with_lines([Fault(f"{self.path}: {key}", found, remedy)], str(self.path), self.text)
+        return lined
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ class Side(NamedTuple):
     def unresolved(self) -> int:
         """Number of these joints that failed or did not settle."""
         counts = Counts.of(self.view.status[self.samples])
-        return counts.failed + counts.not_settled + counts.not_resolved
+        return counts.failed + counts.unsettled
 
     def load(self, name: str) -> SampleLoad:
         """Load of these joints."""

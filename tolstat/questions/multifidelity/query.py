@@ -174,7 +174,7 @@ def _plans(study: Study, low: str, high: str, folder: Path, pilot: int) -> tuple
         faults.append(Fault("low", f"{low!r} is the same as {high!r}", "give a cheaper one"))
     if study.sampling.method != "random":
         found = f"is {study.sampling.method!r}: the intervals hold for independent samples only"
-        faults.append(Fault(f"{study.path}: sampling.method", found, 'use "random"'))
+        faults.append(study.fault("sampling.method", found, 'use "random"'))
     if faults:
         raise InputError(faults)
     output = study.output.model_copy(update={"histories": "none"})

@@ -7,6 +7,7 @@ the loads in the file determine the next joints, so that an interrupted run resu
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable
@@ -27,6 +28,7 @@ from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS
 from tolstat.store import ResultStore
+from tolstat.store.recall import differing_keys
 from tolstat.study import Study, subset_of
 from tolstat.study.model import Subset
 from tolstat.study.selection import limit_of
@@ -190,7 +192,7 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     Raises
     ------
     StoreError
-        When the file is of another study, limit or settings, or was begun by other code.
+        When the file is of another study, limit or settings, or lacks joints and was begun by other code.
     Interrupted, WorkerDied
         As `campaign.run`; the same call resumes.
     """
@@ -200,10 +202,15 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     unresolved: list[int] = []
     first, told = plan.first_sample, 0
     rows = _rows(out) or first + settings.per_level
-    _simulate(plan, out, rows, rows, workers, tell)  # also checks that the file is of the same plan
+    held = _is_done(_sized(plan, rows), out)  # by any version of the code: reading it needs no simulation
+    if not held:
+        _simulate(plan, out, rows, rows, workers, tell)  # also checks that the file is of the same plan and code
     while not walk.done:
         stage = range(first, first + walk.next.parent.size)
         if rows < stage.stop:
+            if held:
+                _simulate(plan, out, rows, rows, workers, tell)  # nothing to simulate: checks before rows are appended
+                held = False
             rows = stage.stop
             _append(plan, out, stage, walk.next)
             _simulate(plan, out, rows, len(stage), workers, tell)
@@ -231,6 +238,15 @@ def _rows(out: Path) -> int:
         return 0
     with ResultStore.open(out) as store:
         return store.n
+
+
+def _is_done(plan: Study, out: Path) -> bool:
+    """Whether the file has all rows of the study simulated."""
+    if not out.exists():
+        return False
+    with ResultStore.open(out) as store:
+        differing = differing_keys(store.identity, json.loads(json.dumps(plan.identity())))
+        return store.complete and not differing
 
 
 def _sized(plan: Study, rows: int) -> Study:
@@ -266,7 +282,7 @@ def _loads(plan: Study, settings: Subset, out: Path, stage: range, joints: Candi
     parent = np.where(joints.parent < 0, -1, joints.parent + plan.first_sample)
     if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():
         found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
-        raise StoreError(str(Fault(str(out), found, "run the simulation again with another --out")))
+        raise StoreError(str(Fault(str(out), found, "run the study again into another file (--out)")))
     loads = LOADS[settings.load].of(results).copy()
     valid = split(loads, results["status"])[0]
     loads[~valid] = math.inf if settings.unresolved == "above" else -math.inf

@@ -78,7 +78,8 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
     InputError
         With the faults of the settings, and every error whose new distribution exceeds the range of the old one.
     StoreError
-        When the joints of the file are not drawn from tolerances, or none of them is possible under the new ones.
+        When the joints of the file are not drawn from tolerances, none of them is possible under the new ones, or none
+        has a valid load.
 
     Examples
     --------
@@ -102,6 +103,9 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
     except ValueError as error:
         raise StoreError(str(Fault(str(view.path), str(error), "run a study with these tolerances"))) from error
     loads = [view.load(name).only(done) for name in view.limits or view.shown_loads]
+    if lacking := [load.name for load in loads if not load.is_valid.any()]:
+        found = f"holds no joint with a valid load: {', '.join(lacking)}"
+        raise StoreError(str(Fault(str(view.path), found, f"see why: tolstat status {view.path}")))
     if view.limits:
         rows = [_share_above(load, weights, view.limits[load.name], confidence) for load in loads]
     else:

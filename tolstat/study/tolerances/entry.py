@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, Wit
 
 from tolstat.common import strict, units
 from tolstat.common.files import data_dir
+from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.distributions import Distribution
@@ -48,7 +49,18 @@ def _read(value: object, info: ValidationInfo) -> float:
 
 Value = Annotated[float, BeforeValidator(_read), WithJsonSchema({"x-unit": "error"})]
 """Quantity in the unit of the error that the entry is for."""
+
+
+def _read_half_width(value: object, info: ValidationInfo) -> float:
+    """Read a quantity that may have the sign ±."""
+    site: Site = (info.context or {})["site"]
+    return units.to_si(value, site.unit, PLUS_MINUS)
+
+
 Positive = Annotated[Value, AfterValidator(units.positive)]
+HalfWidth = Annotated[
+    float, BeforeValidator(_read_half_width), AfterValidator(units.positive), WithJsonSchema({"x-unit": "error"})
+]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
 PositiveLength = Annotated[units.Length, AfterValidator(units.positive)]
 
@@ -70,7 +82,7 @@ class HalfBand(ToleranceEntry):
     """Entry with a band that may be given by its half width."""
 
     plus_minus: Annotated[
-        Positive | None, Field(description="half width of the band about the nominal value", examples=["0.1 mm"])
+        HalfWidth | None, Field(description="half width of the band about the nominal value", examples=["0.1 mm"])
     ] = None
     iso2768: Annotated[
         Literal["f", "m"] | None,
@@ -96,7 +108,7 @@ class HalfBand(ToleranceEntry):
         try:
             return distributions.iso2768(data_dir() / "iso2768.csv", kind, self.iso2768, self.nominal)
         except ValueError as error:
-            raise refuse(f"nominal: {error}", "give plus_minus") from error
+            raise refuse(f"nominal = {{nominal}}: {error}", "give plus_minus", "nominal") from error
 
 
 class Banded(HalfBand):

@@ -6,6 +6,7 @@ No statistics of the errors of Cardan crosses are published: the distribution is
 from __future__ import annotations
 
 import csv
+import json
 import math
 from pathlib import Path
 from typing import Annotated, Literal
@@ -272,7 +273,8 @@ def distribution(data: object, site: Site, place: str, path: tuple[int | str, ..
     """
     where = f"{place}: {strict.dotted(path)}"
     if not isinstance(data, dict):
-        remedy = 'write { plus_minus = ..., distribution = "normal", cpk = 1.0 }'
+        half = json.dumps(data, ensure_ascii=False) if isinstance(data, str) else "..."
+        remedy = f'write {{ plus_minus = {half}, distribution = "normal", cpk = 1.0 }}'
         raise InputError([Fault(where, f"{data!r} is not a tolerance", remedy)])
     kinds = kinds_of(site.name)
     kind = data.get("distribution")

@@ -19,8 +19,6 @@ PURE = rf"^\s*{NUMBER}\s*%?\s*$"
 """Pattern of a text that is a number, for quantities without unit."""
 _SIGN = r"(?:±|\+/?[-−]|[⌀ØøΦφ∅]|[Dd]ia(?:meter|\.)?)?"
 WITH_UNIT = rf"^\s*{_SIGN}\s*{NUMBER}\s*(?:1\s*/|[eE][^\d+-]|[A-DF-Za-df-zµμ°′'%/(])"
-    rf"^\s*(?:±|\+/?[-−]|[⌀ØøΦφ∅]|[Dd]ia(?:meter|\.)?)?\s*{NUMBER}\s*(?:1\s*/|[eE][^\d+-]|[A-DF-Za-df-zµμ°′'%/(])"
-)
 """Pattern of the beginning of a quantity with a unit. It accepts more than is read: the unit is checked by `units`.
 Without look-around, which some editors' regular expressions lack."""
 

@@ -21,6 +21,7 @@ from tolstat.questions.accuracy import rendering as accuracy
 from tolstat.questions.capability import query as capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.exceedance.rendering import LIMIT_DASH, LIMITS
+from tolstat.questions.show import section as show
 from tolstat.store.view import View
 
 WORDS = {"yes": "kept", "no": "not kept", "open": "open"}
@@ -39,6 +40,7 @@ def section(view: View, asked: Asked) -> Section:
         blocks.append(Cards(_basis(view)))
         if view.sampled:
             blocks.append(Text("The study sets no limits, so there is no verdict. Its loads are below."))
+    blocks += show.legend(view, asked)
     blocks += [Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes]
     return Section("verdict", "Verdict", blocks)
 

@@ -48,18 +48,18 @@ def draw(ax: Axes, pairs: Mapping[str, Pair], nominal: tuple[float, float], z: f
 
 
 def _kind(ax: Axes, kind: str, pair: Pair, nominal: tuple[float, float], z: float) -> None:
-    """Draw pin and hole side by side, with the axes between them and the meaning above."""
+    """Draw the pin above the hole, with the axes beside them and the meaning above."""
     unit = 0.5 * (nominal[0] + z)
-    apart = 0.5 * nominal[1] + 2.0 * WALL * nominal[1] + 0.5 * unit
-    for name, feature, diameter, place in (("pin", pair.pin, nominal[0], -apart), ("hole", pair.hole, nominal[1], apart)):
-        middle = np.array([place, 0.0])
+    edge, apart = (0.5 + WALL) * nominal[1] + 0.3 * unit, 0.5 * z + 0.62 * unit
+    for name, feature, diameter, place in (("pin", pair.pin, nominal[0], apart), ("hole", pair.hole, nominal[1], -apart)):
+        middle = np.array([0.0, place])
         _feature(ax, kind, name, feature, diameter, z, middle)
-        ink.label(ax, middle - np.array([0.0, 0.5 * z + 0.62 * unit]), name, fontsize=ink.SMALL)
-    ink.triad(ax, np.array([0.0, -0.25 * z]), np.eye(3), view(kind), 0.34 * unit, kind)
-    wide, tall = 1.9 * apart, 0.5 * z + 0.75 * unit
-    for text, y, weight in ((kind, 0.96, "bold"), (MEANINGS[kind], 0.83, "normal")):
+        ink.label(ax, middle + np.array([edge + 0.06 * unit, 0.0]), name, ha="left", fontsize=ink.SMALL)
+    ink.triad(ax, np.array([-edge - 0.55 * unit, 0.0]), np.eye(3), view(kind), 0.48 * unit, kind, size=7.0)
+    tall = apart + 0.5 * z + 0.5 * unit
+    for text, y, weight in ((kind, 0.99, "bold"), (MEANINGS[kind], 0.9, "normal")):
         ax.text(0.5, y, text, transform=ax.transAxes, ha="center", va="top", fontsize=ink.SMALL, fontweight=weight)
-    ink.frame(ax, (-wide, -tall), (wide, tall + 0.9 * unit))
+    ink.frame(ax, (-edge - 1.3 * unit, -tall), (edge + 0.9 * unit, tall + 1.0 * unit))
 
 
 def _feature(ax: Axes, kind: str, name: str, feature: Feature, diameter: float, z: float, middle: Array) -> None:
@@ -78,7 +78,7 @@ def _feature(ax: Axes, kind: str, name: str, feature: Feature, diameter: float, 
     reach = 0.5 * z + 0.22 * (diameter + z)
     ink.axis(ax, middle - reach * up, middle + reach * up)
     ink.axis(ax, centre - reach * e, centre + reach * e, color=ink.MOVED, lw=1.0)
-    look = {"color": ink.MARKED, "lw": 1.8}
+    look = {"color": ink.MARKED, "lw": 1.6, "mutation_scale": 7.0}
     if kind == "diameter":
         edge = np.array([0.5 * diameter, 0.0])
         more = np.array([0.5 * (feature.diameter - diameter), 0.0])

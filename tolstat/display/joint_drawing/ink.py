@@ -90,17 +90,15 @@ def bushing(ax: Axes, at: Array, name: str, size: float, marked: bool) -> None:
         line(ax, at - span, at + span, color="white" if marked else INK, zorder=4.1)
 
 
-def triad(ax: Axes, at: Array, axes: Array, view: View, length: float, name: str, which: str = "etz") -> None:
+def triad(ax: Axes, at: Array, axes: Array, view: View, length: float, name: str, size: float = 10.0) -> None:
     """Draw the axes e, t, z of a part, rows of `axes` (3, 3), from a place on the drawing.
 
     An axis towards the reader is a circle with a point, one away from the reader a circle with a cross.
     """
     for letter, direction in zip("etz", axes, strict=True):
-        if letter not in which:
-            continue
         way = view.of(direction)
         if np.hypot(*way) > 0.5:
-            arrow(ax, at, at + length * way, f"{name}.{letter}")
+            arrow(ax, at, at + length * way, f"{name}.{letter}", mutation_scale=size)
             label(ax, at + 1.28 * length * way, letter, style="italic")
             continue
         part(ax, circle(at, 0.16 * length), "white", f"{name}.{letter}", linewidth=THIN, zorder=5.5)

@@ -49,7 +49,7 @@ def errors(pairs: Mapping[str, Pair], d: Dimensions) -> Panel:
     """What a positive error of each kind means; `pairs` as `error_kinds.draw` takes them."""
     said = "; ".join(f"{kind}: {meaning}" for kind, meaning in error_kinds.MEANINGS.items())
     draw = partial(error_kinds.draw, pairs=pairs, nominal=(d.pin, d.hole), z=d.z)
-    return Panel("error-kinds", "What a positive error means", said, draw, (WIDTH, 4.6), bare=True)
+    return Panel("error-kinds", "What a positive error means", said, draw, (WIDTH, 6.6), bare=True)
 
 
 def one(pairs: Sequence[Pair], d: Dimensions, title: str, key: str) -> Panel:

@@ -78,7 +78,7 @@ def _feature(point: Array, axis: Array, triad: Array, diameter: float) -> Featur
 def positive(joint: Joint) -> dict[str, Pair]:
     """Pin 1 and hole 4, each with a positive error of one kind, by kind; large enough to be drawn as they are."""
     unit = 0.5 * (joint.contact.D_P + joint.contact.z)
-    sizes = {"offset": 0.22 * unit, "tilt": np.radians(14.0), "diameter": 0.3 * unit}
+    sizes = {"offset": 0.26 * unit, "tilt": np.radians(15.0), "diameter": 0.4 * unit}
     found = {}
     for kind in KINDS:
         errors = nominal_errors(1, Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0))

@@ -1,5 +1,4 @@
-"""Registry of the questions: a folder each, whose query takes a `store.view.View`, a study that it simulates, or
-a joint.
+"""Registry of the questions: a folder each, whose query takes a `store.view.View`, a study to simulate, or a joint.
 
 Commands, public names, sections of the page and the JSON summary come from here, in this order; `report`, `verify` and
 `status` print more than one question and are commands of their own. Modules are imported on first use.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
-
 import numpy as np
 from matplotlib.axes import Axes
 
@@ -17,17 +15,17 @@ def enlargement(d: Dimensions) -> float:
     return round_number(0.1 * d.pin / d.clearance) if d.clearance > 0.0 else 1.0
 
 
-def draw(ax: Axes, d: Dimensions, marked: Container[str] = ()) -> None:
+def draw(ax: Axes, d: Dimensions) -> None:
     """Draw pin and hole in section with their diameters, length of the contact and clearance.
 
-    Parameters are those of `front.draw`.
+    Parameters are the first two of `front.draw`.
     """
     factor, up, middle = enlargement(d), np.array([0.0, 1.0]), np.zeros(2)
     hole = d.pin + 2.0 * factor * d.clearance
     wall = d.eye - 0.5 * d.hole
-    for side in walls(middle, up, d.z, hole, wall):
-        ink.part(ax, side, ink.OUTPUT, "arm4", hatch=HATCH)
-    ink.part(ax, around(middle, up, d.z, d.pin), ink.CROSS, "pin1")
+    for i, side in enumerate(walls(middle, up, d.z, hole, wall), 1):
+        ink.part(ax, side, ink.OUTPUT, f"detail.arm4.{i}", hatch=HATCH)
+    ink.part(ax, around(middle, up, d.z, d.pin), ink.CROSS, "detail.pin1")
     tall, wide = 0.5 * d.z, 0.5 * hole + wall
     unit = 0.5 * (d.pin + d.z)
     ink.axis(ax, np.array([0.0, -tall - 0.1 * unit]), np.array([0.0, tall + 0.12 * unit]))
@@ -41,7 +39,9 @@ def draw(ax: Axes, d: Dimensions, marked: Container[str] = ()) -> None:
     corner = np.array([0.5 * hole, -tall])
     ink.dimension(ax, corner * mirror, corner, 0.46 * unit * low, f"hole ⌀ {ink.millimetres(d.hole)}")
     right = np.array([wide, tall])
-    ink.dimension(ax, right * np.array([1.0, -1.0]), right, 0.14 * unit * np.array([1.0, 0.0]), f"z = {ink.millimetres(d.z)}")
+    ink.dimension(
+        ax, right * np.array([1.0, -1.0]), right, 0.14 * unit * np.array([1.0, 0.0]), f"z = {ink.millimetres(d.z)}"
+    )
     gap = np.array([0.25 * (d.pin + hole), tall])
     foot = gap + np.array([0.12 * unit, 0.22 * unit])
     ink.line(ax, gap - np.array([0.0, 0.3 * d.z]), foot)

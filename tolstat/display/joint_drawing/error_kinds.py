@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,7 +21,13 @@ MEANINGS = {
     "diameter": "pin thicker, hole wider",
 }
 """Kinds of errors, and what a positive value does."""
-DASHED = {"facecolor": "none", "edgecolor": "#666666", "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9, "zorder": 3}
+DASHED: dict[str, Any] = {
+    "facecolor": "none",
+    "edgecolor": "#666666",
+    "linestyle": (0.0, (4.0, 2.0)),
+    "linewidth": 0.9,
+    "zorder": 3,
+}
 
 
 def view(kind: str) -> View:
@@ -51,7 +58,10 @@ def _kind(ax: Axes, kind: str, pair: Pair, nominal: tuple[float, float], z: floa
     """Draw the pin above the hole, with the axes beside them and the meaning above."""
     unit = 0.5 * (nominal[0] + z)
     edge, apart = (0.5 + WALL) * nominal[1] + 0.3 * unit, 0.5 * z + 0.62 * unit
-    for name, feature, diameter, place in (("pin", pair.pin, nominal[0], apart), ("hole", pair.hole, nominal[1], -apart)):
+    for name, feature, diameter, place in (
+        ("pin", pair.pin, nominal[0], apart),
+        ("hole", pair.hole, nominal[1], -apart),
+    ):
         middle = np.array([0.0, place])
         _feature(ax, kind, name, feature, diameter, z, middle)
         ink.label(ax, middle + np.array([edge + 0.06 * unit, 0.0]), name, ha="left", fontsize=ink.SMALL)
@@ -68,22 +78,22 @@ def _feature(ax: Axes, kind: str, name: str, feature: Feature, diameter: float, 
     centre, e, up = middle + seen.of(feature.point), seen.of(feature.axis), np.array([0.0, 1.0])
     if name == "pin":
         ink.part(ax, around(centre, e, z, feature.diameter), ink.CROSS, f"{kind}.pin", edgecolor=ink.MOVED)
-        ink.part(ax, around(middle, up, z, diameter), "none", f"{kind}.pin.nominal", **DASHED)
+        ink.part(ax, around(middle, up, z, diameter), "none", **DASHED)
     else:
         wall = WALL * diameter
-        for side in walls(centre, e, z, feature.diameter, wall):
-            ink.part(ax, side, ink.OUTPUT, f"{kind}.hole", hatch=HATCH, edgecolor=ink.MOVED)
+        for i, side in enumerate(walls(centre, e, z, feature.diameter, wall), 1):
+            ink.part(ax, side, ink.OUTPUT, f"{kind}.hole.{i}", hatch=HATCH, edgecolor=ink.MOVED)
         for side in walls(middle, up, z, diameter, wall):
-            ink.part(ax, side, "none", f"{kind}.hole.nominal", **DASHED)
+            ink.part(ax, side, "none", **DASHED)
     reach = 0.5 * z + 0.22 * (diameter + z)
     ink.axis(ax, middle - reach * up, middle + reach * up)
     ink.axis(ax, centre - reach * e, centre + reach * e, color=ink.MOVED, lw=1.0)
-    look = {"color": ink.MARKED, "lw": 1.6, "mutation_scale": 7.0}
+    look: dict[str, Any] = {"color": ink.MARKED, "lw": 1.6, "mutation_scale": 7.0}
     if kind == "diameter":
         edge = np.array([0.5 * diameter, 0.0])
         more = np.array([0.5 * (feature.diameter - diameter), 0.0])
-        for sign in (-1.0, 1.0):
-            ink.arrow(ax, middle + sign * edge, middle + sign * (edge + more), f"{kind}.{name}.arrow", **look)
+        for i, sign in enumerate((-1.0, 1.0), 1):
+            ink.arrow(ax, middle + sign * edge, middle + sign * (edge + more), f"{kind}.{name}.arrow.{i}", **look)
     elif kind.startswith("tilt"):
         ink.arrow(ax, middle + reach * up, middle + reach * e, f"{kind}.{name}.arrow", **look)
     else:

@@ -62,12 +62,15 @@ def arrow(ax: Axes, tail: Array, tip: Array, name: str = "", **given: Any) -> No
     drawn.set_gid(name or None)
 
 
-def dimension(ax: Axes, a: Array, b: Array, away: Array, text: str, **given: Any) -> None:
-    """Draw a dimension between two places, its line shifted by `away`, with the text beyond the line."""
+def dimension(ax: Axes, a: Array, b: Array, away: Array, text: str, first: float = 0.08) -> None:
+    """Draw a dimension between two places, its line shifted by `away`, with the text beyond the line.
+
+    `first` is the share of the way to the line at which the extension line of `a` begins.
+    """
     a, b, away = (np.asarray(x, float) for x in (a, b, away))
-    for end in (a, b):
-        line(ax, end + 0.08 * away, end + 1.06 * away, lw=0.5, color="#666666")
-    both = {"arrowstyle": "<|-|>,head_width=0.12,head_length=0.35", "lw": 0.7}
+    for end, begin in ((a, first), (b, 0.08)):
+        line(ax, end + begin * away, end + 1.03 * away, lw=0.5, color="#666666")
+    both: dict[str, Any] = {"arrowstyle": "<|-|>,head_width=0.12,head_length=0.35", "lw": 0.7}
     arrow(ax, a + away, b + away, **both)
     side = away / np.hypot(*away)
     middle = 0.5 * (a + b) + away
@@ -77,7 +80,7 @@ def dimension(ax: Axes, a: Array, b: Array, away: Array, text: str, **given: Any
         "fontsize": SMALL,
         "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.6},
     }
-    ax.annotate(text, tuple(middle), xytext=tuple(3.0 * side), textcoords="offset points", **(look | given))
+    ax.annotate(text, tuple(middle), xytext=tuple(3.0 * side), textcoords="offset points", **look)
 
 
 def bushing(ax: Axes, at: Array, name: str, size: float, marked: bool) -> None:
@@ -105,8 +108,9 @@ def triad(ax: Axes, at: Array, axes: Array, view: View, length: float, name: str
         if direction @ view.towards > 0:
             part(ax, circle(at, 0.045 * length), INK, linewidth=0.0, zorder=5.6)
         else:
-            for way in ((0.11, 0.11), (0.11, -0.11)):
-                line(ax, at - length * np.array(way), at + length * np.array(way), zorder=5.6)
+            for slope in (1.0, -1.0):
+                half = 0.11 * length * np.array([1.0, slope])
+                line(ax, at - half, at + half, zorder=5.6)
         others = -view.of(axes.sum(axis=0))
         others /= max(np.hypot(*others), 1e-9)
         label(ax, at + 0.42 * length * others, letter, style="italic")

@@ -14,9 +14,9 @@ from tolstat.display.joint_drawing.geometry import ALONG_T, ALONG_Z, KINDS, Arra
 HEADS = (("e", "µm"), ("t", "µm"), ("z", "µm"), ("tilt t", "deg"), ("tilt z", "deg"), ("⌀", "µm"))
 """Heads of the columns of numbers: names of `KINDS`, and units."""
 WAYS = {"along_z": ALONG_Z, "along_t": ALONG_T}
-HEAD, FOOT, VIEW = 0.12, 0.1, 0.215
+HEAD, FOOT, VIEW = 0.12, 0.1, 0.225
 """Shares of the drawing: height of head and foot, width of a view."""
-PLACES = (0.0, *np.linspace(0.255, 0.985, 6))
+PLACES = (0.0, *np.linspace(0.27, 0.985, 6))
 """Places of names and numbers, relative to the width left for them."""
 SIZE = 7.6
 
@@ -103,14 +103,14 @@ def _pair(ax: Axes, pair: Pair, pin: float, z: float, factor: float, way: str, s
     inner, outer = seen.of(_axis(pair.pin, factor, z))
     a, b = seen.of(_axis(pair.hole, factor, z))
     open_half = 0.5 * pin + 0.5 * factor * (pair.hole.diameter - pin)
-    wall = 0.12 * (pin + z)
-    for sign in (-1.0, 1.0):
+    wall = 0.08 * (pin + z)
+    for i, sign in enumerate((-1.0, 1.0), 1):
         near, far = sign * open_half * side, sign * (open_half + wall) * side
         outline = np.array([a + near, b + near, b + far, a + far])
-        ink.part(ax, outline, ink.OUTPUT, f"{pair.names[1]}.{way}", hatch=HATCH, linewidth=0.9)
+        ink.part(ax, outline, ink.OUTPUT, f"{pair.names[1]}.{way}.{i}", hatch=HATCH, linewidth=0.9)
     outline = np.array([inner - half * side, outer - half * side, outer + half * side, inner + half * side])
     ink.part(ax, outline, ink.CROSS, f"{pair.names[0]}.{way}", linewidth=0.9, alpha=0.85, zorder=2)
-    tall, wide = 0.5 * z + 0.18 * (pin + z), 0.5 * pin + wall + 0.26 * (pin + z)
+    tall, wide = 0.5 * z + 0.18 * (pin + z), 0.5 * pin + wall + 0.2 * (pin + z)
     ink.axis(ax, np.array([0.0, -tall]), np.array([0.0, tall]))
     ink.frame(ax, (-wide, -tall), (wide, tall))
 
@@ -127,5 +127,5 @@ def _numbers(ax: Axes, pair: Pair) -> None:
 
 
 def _written(kind: str, value: float) -> str:
-    number = f"{np.degrees(value):.3f}" if kind.startswith("tilt") else f"{1e6 * value:.1f}"
+    number = f"{np.degrees(value):.2f}" if kind.startswith("tilt") else f"{1e6 * value:.1f}"
     return number.replace("-", "−") if float(number) else "0"

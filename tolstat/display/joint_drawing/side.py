@@ -12,6 +12,7 @@ from matplotlib.patches import Arc
 from tolstat.display.joint_drawing import ink
 from tolstat.display.joint_drawing.front import HATCH
 from tolstat.display.joint_drawing.geometry import SIDE, Array, Dimensions, around, bar, circle
+from tolstat.display.style import INK
 
 
 def draw(ax: Axes, d: Dimensions, marked: Container[str] = ()) -> None:
@@ -30,8 +31,8 @@ def draw(ax: Axes, d: Dimensions, marked: Container[str] = ()) -> None:
     ink.axis(ax, np.array([0.0, -d.end - 0.1 * d.R]), np.array([0.0, d.end + 0.1 * d.R]))
     _angle(ax, d, along, reach)
     place = sizes.end - 0.12 * d.R
-    _turning(ax, np.array([-place, 0.0]), np.array([1.0, 0.0]), sizes.shaft, "ω", "omega", -1.0)
-    _turning(ax, place * along, along, sizes.shaft, "T_r", "torque", 1.0)
+    _turning(ax, np.array([-place, 0.0]), np.array([1.0, 0.0]), sizes.shaft, "ω", "side.omega", -1.0)
+    _turning(ax, place * along, along, sizes.shaft, "T_r", "side.torque", 1.0)
     _names(ax, d, marked, sizes.yoke, sizes.shaft)
     width, height = sizes.end + 0.2 * d.R, d.end + 0.56 * d.R
     ink.frame(ax, (-width, -height), (width, height))
@@ -60,13 +61,13 @@ def _input_fork(ax: Axes, d: Dimensions, sizes: _Sizes) -> None:
     upper = [(-sizes.end, sizes.shaft), (back, sizes.shaft), (back, outer), (eye, outer), (eye, high), (hole, high)]
     upper += [(hole, low), (eye, low), (eye, inner), (-sizes.yoke, inner)]
     whole = np.array(upper + [(z, -x) for z, x in reversed(upper)])
-    ink.part(ax, whole, ink.INPUT, "input_fork", zorder=1)
+    ink.part(ax, whole, ink.INPUT, "side.input_fork", zorder=1)
     for k in (0, 1):
         e = SIDE.of(d.triads[4 + k, 0])
-        for sign in (-1.0, 1.0):
+        for i, sign in enumerate((-1.0, 1.0), 1):
             middle = SIDE.of(d.centres[4 + k]) + sign * np.array([0.5 * (d.eye + 0.5 * d.hole), 0.0])
             wall = around(middle, e, d.z, d.eye - 0.5 * d.hole)
-            ink.part(ax, wall, ink.INPUT, f"arm{k + 1}", hatch=HATCH, zorder=1.1)
+            ink.part(ax, wall, ink.INPUT, f"side.arm{k + 1}.{i}", hatch=HATCH, zorder=1.1)
 
 
 def _cross(ax: Axes, d: Dimensions, marked: Container[str]) -> None:
@@ -75,9 +76,9 @@ def _cross(ax: Axes, d: Dimensions, marked: Container[str]) -> None:
         if d.root < d.R - 0.5 * d.z:
             ink.part(ax, bar(d.root * e, (d.R - 0.5 * d.z) * e, d.neck), ink.CROSS, zorder=2)
         edge = ink.OUTLINED if f"pin{k + 1}" in marked else {}
-        ink.part(ax, around(SIDE.of(d.centres[k]), e, d.z, d.pin), ink.CROSS, f"pin{k + 1}", zorder=2.1, **edge)
+        ink.part(ax, around(SIDE.of(d.centres[k]), e, d.z, d.pin), ink.CROSS, f"side.pin{k + 1}", zorder=2.1, **edge)
     h = d.root
-    ink.part(ax, np.array([(-h, -h), (h, -h), (h, h), (-h, h)]), ink.CROSS, "hub", zorder=2)
+    ink.part(ax, np.array([(-h, -h), (h, -h), (h, h), (-h, h)]), ink.CROSS, "side.hub", zorder=2)
 
 
 def _output_fork(ax: Axes, d: Dimensions, sizes: _Sizes, along: Array, marked: Container[str]) -> None:
@@ -86,10 +87,10 @@ def _output_fork(ax: Axes, d: Dimensions, sizes: _Sizes, along: Array, marked: C
     shaft, yoke, bridge, end = sizes
     for begin, stop, width in ((0.0, yoke, beam), (bridge, end, 2.0 * shaft), (yoke, bridge, max(beam, 2.4 * shaft))):
         ink.part(ax, bar(centre + begin * along, centre + stop * along, width), ink.OUTPUT, zorder=3)
-    ink.part(ax, circle(centre, d.eye), ink.OUTPUT, "arm4", zorder=3.1)
-    ink.part(ax, circle(centre, 0.5 * d.hole), "white", "hole4", zorder=3.2, linewidth=ink.THIN)
+    ink.part(ax, circle(centre, d.eye), ink.OUTPUT, "side.arm4", zorder=3.1)
+    ink.part(ax, circle(centre, 0.5 * d.hole), "white", "side.hole4", zorder=3.2, linewidth=ink.THIN)
     edge = ink.OUTLINED if "pin1" in marked else {"linewidth": ink.THIN}
-    ink.part(ax, circle(SIDE.of(d.centres[0]), 0.5 * d.pin), ink.CROSS, "pin1", zorder=3.3, **edge)
+    ink.part(ax, circle(SIDE.of(d.centres[0]), 0.5 * d.pin), ink.CROSS, "side.pin1", zorder=3.3, **edge)
 
 
 def _angle(ax: Axes, d: Dimensions, along: Array, reach: float) -> None:
@@ -99,7 +100,9 @@ def _angle(ax: Axes, d: Dimensions, along: Array, reach: float) -> None:
     if abs(degrees) > 0.5:
         size = 2.0 * (reach - 0.02 * d.R)
         ends = sorted((0.0, degrees))
-        ax.add_patch(Arc((0.0, 0.0), size, size, theta1=ends[0], theta2=ends[1], lw=ink.THIN, color=ink.INK, gid="alpha"))
+        ax.add_patch(
+            Arc((0.0, 0.0), size, size, theta1=ends[0], theta2=ends[1], lw=ink.THIN, color=INK, gid="side.alpha")
+        )
     below = -np.sign(degrees or 1.0)
     ink.label(ax, np.array([reach - 0.02 * d.R, below * 0.13 * d.R]), said, ha="right")
 
@@ -109,7 +112,7 @@ def _turning(ax: Axes, at: Array, along: Array, shaft: float, text: str, name: s
     up = sense * np.array([-along[1], along[0]])
     angle = np.linspace(-0.75 * np.pi / 2, 0.75 * np.pi / 2, 30)
     arc = at + np.outer(np.sin(angle), 1.35 * shaft * up) - np.outer(np.cos(angle), 0.45 * shaft * along)
-    ax.plot(arc[:, 0], arc[:, 1], color=ink.INK, lw=ink.THICK, zorder=5)
+    ax.plot(arc[:, 0], arc[:, 1], color=INK, lw=ink.THICK, zorder=5)
     ink.arrow(ax, arc[-4], arc[-1], name)
     ink.label(ax, arc[-1] + 0.42 * shaft * up, text, style="italic")
 
@@ -123,7 +126,7 @@ def _names(ax: Axes, d: Dimensions, marked: Container[str], yoke: float, shaft: 
         _called(ax, marker, np.array([marker[0], 0.0]) + (d.end + 0.13 * d.R) * e, name, _look(marked, name), d.R)
         ink.bushing(ax, marker, name, 0.045 * d.R, name in marked)
         ink.label(ax, SIDE.of(d.centres[4 + k]) + np.array([d.eye + 0.06 * d.R, 0.0]), f"arm {k + 1}", ha="left")
-        ink.triad(ax, (d.end + 0.15 * d.R) * e, d.triads[4 + k], SIDE, 0.25 * d.R, f"arm{k + 1}")
+        ink.triad(ax, (d.end + 0.15 * d.R) * e, d.triads[4 + k], SIDE, 0.25 * d.R, f"side.arm{k + 1}")
     marker, along = SIDE.of(d.markers[7]), SIDE.of(d.triads[7, 2])
     across = np.array([-along[1], along[0]])
     free = -1.0 if d.alpha >= 0.0 else 1.0  # side of the input axis that the output fork leaves free

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import ERROR, HOLES, PINS
+from tolstat.common.tables import HOLES, PINS
 from tolstat.display.joint_drawing.geometry import KINDS, Array, Dimensions, Feature, Pair
 from tolstat.joint import Joint, Operation, nominal_errors, perturb
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, FRAME_I, PIN
+
 
 def dimensions(joint: Joint, alpha: float) -> Dimensions:
     """Dimensions of a joint and the pose of its ideal parts at the input angle 0.

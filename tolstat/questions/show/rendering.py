@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from tolstat.joint import Joint
 
+
 def draw_joint(joint: Joint, alpha: float, title: str = "", columns: int = 2) -> Figure:
     """Draw a joint from its dimensions: the cross in its holes, both shafts, a pin in its hole.
 
@@ -46,7 +47,9 @@ def draw_joint(joint: Joint, alpha: float, title: str = "", columns: int = 2) ->
 def draw_errors(joint: Joint) -> Figure:
     """Draw what a positive error of each kind means, on pin 1 and hole 4 of a joint."""
     panel = sheets.errors(query.positive(joint), query.dimensions(joint, 0.0))
-    notes = ("Dashed: without error. e points away from the centre of the joint; every pin and hole has its own e, t, z.",)
+    notes = (
+        "Dashed: without error. e points away from the centre of the joint; every pin and hole has its own e, t, z.",
+    )
     return sheets.figure([panel], "Errors of a pin and a hole", notes)
 
 

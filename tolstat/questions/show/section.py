@@ -8,22 +8,25 @@ from tolstat.common.loads import LOADS
 from tolstat.common.tables import SIMULATED
 from tolstat.display import text
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Block, Panel, Panels, Section, Text
+from tolstat.display.blocks import Panel, Panels, Section, Text
 from tolstat.display.joint_drawing import sheets
 from tolstat.questions.show import query
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
+LEGEND = (
+    "The joint from its own dimensions. Marked: where the limits are exceeded most. Loads of cross1–4 act on the pins, "
+    "those of fork1–4 on the arms; their components are along and about the axes e, t, z of each."
+)
+"""Text below the drawings of `legend`."""
 
-def legend(view: View, asked: Asked) -> list[Block]:
-    """Drawing of the joint in which bushings and pins of the leading loads stand out; empty if it cannot be read."""
+
+def legend(view: View, asked: Asked) -> list[Panel]:
+    """Drawings of the joint in which bushings and pins of the leading loads stand out; empty if it cannot be read."""
     with asked.noting("the joint is not drawn"):
         alpha = float(view.store.identity["operation.alpha"])
         marked = sorted({name.rpartition(".")[0] for name in view.leading} - {""})
-        front, side, _ = sheets.joint(query.dimensions(joint_of(view.store, 0), alpha), marked)
-        said = f"The joint. Marked: {', '.join(marked)}. " if marked else "The joint. "
-        said += "Loads of cross1–4 act on the pins, those of fork1–4 on the arms, along and about the axes e, t, z of each."
-        return [Panels([front, side]), Text(said, small=True)]
+        return list(sheets.joint(query.dimensions(joint_of(view.store, 0), alpha), marked))
     return []
 
 

@@ -127,5 +127,8 @@ def _numbers(ax: Axes, pair: Pair) -> None:
 
 
 def _written(kind: str, value: float) -> str:
-    number = f"{np.degrees(value):.2f}" if kind.startswith("tilt") else f"{1e6 * value:.1f}"
+    if kind.startswith("tilt"):
+        number = f"{np.degrees(value):.2f}"
+    else:
+        number = f"{1e6 * value:.{0 if abs(value) >= 1e-4 else 1}f}"
     return number.replace("-", "−") if float(number) else "0"

@@ -103,8 +103,9 @@ def _angle(ax: Axes, d: Dimensions, along: Array, reach: float) -> None:
         ax.add_patch(
             Arc((0.0, 0.0), size, size, theta1=ends[0], theta2=ends[1], lw=ink.THIN, color=INK, gid="side.alpha")
         )
-    below = -np.sign(degrees or 1.0)
-    ink.label(ax, np.array([reach - 0.02 * d.R, below * 0.13 * d.R]), said, ha="right")
+    covered = 1.45 * _sizes(d).shaft - (reach - 0.5 * d.R) * np.tan(np.radians(abs(degrees)))
+    below = -np.sign(degrees or 1.0) * max(0.13 * d.R, covered)
+    ink.label(ax, np.array([reach - 0.02 * d.R, below]), said, ha="right")
 
 
 def _turning(ax: Axes, at: Array, along: Array, shaft: float, text: str, name: str, sense: float) -> None:
@@ -130,7 +131,7 @@ def _names(ax: Axes, d: Dimensions, marked: Container[str], yoke: float, shaft: 
     marker, along = SIDE.of(d.markers[7]), SIDE.of(d.triads[7, 2])
     across = np.array([-along[1], along[0]])
     free = -1.0 if d.alpha >= 0.0 else 1.0  # side of the input axis that the output fork leaves free
-    places = [np.array([d.eye + 0.16 * d.R, free * row * d.R]) for row in (0.42, 0.6)]
+    places = [np.array([d.eye + 0.16 * d.R, free * row * d.R]) for row in (0.53, 0.7)]
     edge = yoke * along + 0.3 * free * min(d.arm[0], 2.0 * d.eye) * across
     _called(ax, edge, places[0], "arm 4, arm 3 behind", {}, d.R)
     _called(ax, marker, places[1], "fork4, fork3 behind", _look(marked, "fork3", "fork4"), d.R)

@@ -150,7 +150,9 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
             inner_left, outer_left, outer_right, inner_right = found[f"{PINS[i]}.{way}"]
             left, other = (found[f"{HOLES[arm]}.{way}.{k}"] for k in (1, 2))
             for end, s in ((0, -0.5 * z), (1, 0.5 * z)):
-                apart = par["pin_point"][i] + s * par["pin_axis"][i] - par["hole_point"][arm] - s * par["hole_axis"][arm]
+                apart = (
+                    par["pin_point"][i] + s * par["pin_axis"][i] - par["hole_point"][arm] - s * par["hole_axis"][arm]
+                )
                 drawn_left = (inner_left, outer_left)[end][0] - left[end][0]
                 drawn_right = other[end][0] - (inner_right, outer_right)[end][0]
                 assert drawn_left == pytest.approx(factor * (par["clearance"][i] + apart @ right), abs=2e-8 * factor)

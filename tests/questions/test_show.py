@@ -24,7 +24,8 @@ from tolstat.display.asked import Asked
 from tolstat.display.joint_drawing import error_kinds, front, one_joint, side
 from tolstat.display.joint_drawing.geometry import FRONT, KINDS, SIDE
 from tolstat.joint import nominal_errors, perturb
-from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, BUSHING_LUMP, FRAME, HUB, PIN, TRIAD
+from tolstat.kernel.mechanics import bushing
+from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, FRAME, PIN, TRIAD
 from tolstat.questions.show import query, rendering, section, source
 from tolstat.store import ResultStore
 
@@ -95,17 +96,13 @@ def test_side_view_has_the_output_fork_at_the_misalignment(cirelli):
         assert along(found[name]) @ SIDE.of(np.cross(shaft, SIDE.towards)) * sense > 0.8
 
 
-def test_markers_are_those_of_the_kernels_bushings(cirelli):
+def test_markers_are_those_of_the_kernels_bushings(cirelli, params):
     """`bushing.markers` gives places in axes of the base: hub, input shaft, output shaft."""
     d, frames = query.dimensions(cirelli, ALPHA), naive.frames(0.0, ALPHA)
     assert d.triads == pytest.approx(axes_of_parts())
-    for i, lump in enumerate(BUSHING_LUMP):
-        e, z = TRIAD[lump, 0], np.array([0.0, 0.0, 1.0])
-        if BUSHING_BASE[i] == HUB:
-            base = cirelli.cross.r_b * e
-        else:
-            base = cirelli.cross.R * e + (-1 if i < 6 else 1) * cirelli.arm.l_f * z
-        assert d.markers[i] == pytest.approx(frames[FRAME[BUSHING_BASE[i]]] @ base)
+    for i, base in enumerate(BUSHING_BASE):
+        _, on_base = bushing.markers(i, params(ALPHA)[0])
+        assert d.markers[i] == pytest.approx(frames[FRAME[base]] @ np.array(on_base))
 
 
 @pytest.fixture(scope="module")

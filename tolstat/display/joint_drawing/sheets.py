@@ -18,7 +18,7 @@ WIDTH = 4.9
 """Width of a panel, inches."""
 NOTES = (
     "⊕ bushings: cross1–4 carry the pins, fork1–4 the arms.",
-    "Their loads F and T act on the pin or arm; their parts are along and about its e, t, z.",
+    "Their loads F and T act on the pin or arm; components are along and about its e, t, z.",
     "pin1.contact: force between pin 1 and the hole of arm 4.",
     "⊙ axis towards the reader, ⊗ away from the reader.",
     "Blue: cross; orange: input fork; green: output fork.",
@@ -82,11 +82,13 @@ def figure(panels: Sequence[Panel], title: str, notes: Sequence[str] = (), colum
     heights = [max(panel.size[1] for panel in row) + 0.34 for row in rows]
     if beside:
         heights[-1] = max(heights[-1], foot)
-    width, height = columns * WIDTH, sum(heights) + 0.5 + (0.0 if beside else foot)
+    head = wrap(title, 44 * columns)
+    above = 0.26 + 0.24 * len(head)
+    width, height = columns * WIDTH, sum(heights) + above + (0.0 if beside else foot)
     with drawing.settings():
         sheet = Figure(figsize=(width, height))
-        sheet.text(0.2 / width, 1.0 - 0.15 / height, title, fontsize=12.5, fontweight="bold", va="top")
-        top = height - 0.5
+        sheet.text(0.2 / width, 1.0 - 0.15 / height, "\n".join(head), fontsize=12.5, fontweight="bold", va="top")
+        top = height - above
         for row, room in zip(rows, heights, strict=True):
             for k, panel in enumerate(row):
                 left = k * WIDTH

@@ -11,6 +11,7 @@ from tolstat.common.strict import did_you_mean
 from tolstat.study import selection
 from tolstat.study.file import nominal_value
 from tolstat.study.study import Study
+from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.kinds import distribution
@@ -93,7 +94,7 @@ def _entries(study: Study) -> dict[str, dict[str, Any]]:
     """Entry of each error that scatters, from the study's text."""
     table = tomllib.loads(study.text).get("tolerances", {})
     found: dict[str, dict[str, Any]] = {}
-    for entry in selection.entries(table, "tolerances"):
+    for entry in fits.entries(table, fits.read(table, study.name)):
         if isinstance(entry.value, Mapping):
             found |= {name: dict(entry.value) for name in selection.select(entry.pattern, study.tolerances)}
     return found

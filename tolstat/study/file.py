@@ -14,14 +14,17 @@ from tolstat.common.loads import LOADS, UNIT_OF_LOAD
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
+from tolstat.joint.model import merged
 from tolstat.study import fatigue, listing, proposal, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import RADIAL_UNITS, UNITS, Assignments, Entry
+from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
+from tolstat.study.tolerances.fits import Fit
 from tolstat.study.tolerances.kinds import distribution
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
@@ -96,8 +99,14 @@ class StudyFile:
             return strict.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
         return None
 
-    def joint(self) -> Joint | None:
-        """``[joint]``: a joint file by name or path, and keys that replace some of its own."""
+    def fit(self) -> Fit | None:
+        """``tolerances.fit``: the fit of all pins in their holes."""
+        with gather(self._faults):
+            return fits.read(self.data.get("tolerances"), self.place)
+        return None
+
+    def joint(self, fit: Fit | None = None) -> Joint | None:
+        """``[joint]``: a joint file by name or path, and keys that replace some of its own; diameters by the fit."""
         table = self._table("joint")
         base = table.get("base")
         if base is None:
@@ -106,9 +115,19 @@ class StudyFile:
             self._fault(("joint", "base"), f"{base!r} is not a text", "give a name in data/joints or a path")
         else:
             overrides = {key: value for key, value in table.items() if key != "base"}
+            if fit is not None:
+                overrides = merged(overrides, {"contact": self._diameters(fit, overrides)})
             with gather(self._faults):
                 return joint.load(base, overrides, self.place, self.path.parent)
         return None
+
+    def _diameters(self, fit: Fit, overrides: Mapping[str, Any]) -> dict[str, str]:
+        """Nominal diameters of the fit; note diameters that the study sets beside it."""
+        own = overrides.get("contact")
+        for key in fit.diameters:
+            if isinstance(own, Mapping) and key in own:
+                self._fault(("joint", "contact", key), "is set by tolerances.fit already", "remove one of the two")
+        return fit.diameters
 
     def errors(self) -> dict[str, float]:
         """``[errors]``: the errors that every joint has."""
@@ -116,10 +135,10 @@ class StudyFile:
             return selection.fixed_errors(self._table("errors"), ("errors",), self.place, self._claims)
         return {}
 
-    def tolerances(self, operation: Operation | None) -> dict[str, Distribution]:
+    def tolerances(self, operation: Operation | None, fit: Fit | None = None) -> dict[str, Distribution]:
         """``[tolerances]``: how each error scatters."""
         scatter: dict[str, Distribution] = {}
-        for entry in self._entries("tolerances"):
+        for entry in fits.entries(self._table("tolerances"), fit):
             with gather(self._faults):
                 selected = selection.resolve(entry, UNITS | RADIAL_UNITS, self.place)
                 with gather(self._faults):

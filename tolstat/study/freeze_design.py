@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from tolstat.study import selection
+from tolstat.study.selection import Entry
 from tolstat.study.tolerances.correlation import Copula
 
 
@@ -27,13 +28,13 @@ class Group(NamedTuple):
     names: tuple[str, ...]
 
 
-def groups(table: Mapping[str, Any], names: Iterable[str], copula: Copula, by: str) -> tuple[Group, ...]:
+def groups(entries: Iterable[Entry], names: Iterable[str], copula: Copula, by: str) -> tuple[Group, ...]:
     """Groups of the errors of a study.
 
     Parameters
     ----------
-    table : mapping
-        ``[tolerances]`` of the study.
+    entries : iterable of Entry
+        Entries of ``[tolerances]``.
     names : iterable of str
         Errors that scatter.
     copula : Copula
@@ -50,7 +51,6 @@ def groups(table: Mapping[str, Any], names: Iterable[str], copula: Copula, by: s
     if by == "error":
         parts = [Group(name, (name,)) for name in every]
     else:
-        entries = selection.entries(table)
         parts = [Group(entry.pattern, tuple(selection.select(entry.pattern, every))) for entry in entries]
     for i, j in np.argwhere(np.triu(copula.matrix, 1)):
         one, other = (next(p for p in parts if copula.names[k] in p.names) for k in (i, j))

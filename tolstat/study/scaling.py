@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from tolstat.common import units
 from tolstat.study import rewriting, selection
 from tolstat.study.study import Study
+from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.density_ratio import unbounded
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
@@ -94,7 +95,7 @@ def tolerances(study: Study) -> list[Tolerance]:
     found = []
     table = tomllib.loads(study.text).get("tolerances", {})
     known = selection.UNITS | selection.RADIAL_UNITS
-    for entry in selection.entries(table, "tolerances"):
+    for entry in fits.entries(table, fits.read(table, study.name)):
         names = tuple(selection.select(entry.pattern, study.tolerances))
         own = names and not names[0].startswith(("operation.", "material."))
         if own and entry.value["distribution"] in SCALED and not set(names) & set(study.copula.names):
@@ -140,10 +141,18 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     InputError
         See `rewriting.with_keys`.
     """
-    table = tomllib.loads(study.text)["tolerances"]
-    changes = {
-        entry.path: dict.fromkeys(entry.value) | dict(entries[entry.pattern])
-        for entry in selection.entries(table, "tolerances")
-        if entry.pattern in entries
-    }
-    return rewriting.with_keys(study.text, {("sampling",): {"seed": seed}, **changes}, f"{study.name}.toml")
+    data = tomllib.loads(study.text)
+    fit = fits.read(data["tolerances"], study.name)
+    every = list(fits.entries(data["tolerances"], fit))
+    changes: dict[tuple[int | str, ...], dict[str, Any]] = {("sampling",): {"seed": seed}}
+    for entry in every:
+        if entry.pattern in entries and entry.path != fits.PATH:
+            changes[entry.path] = dict.fromkeys(entry.value) | dict(entries[entry.pattern])
+    diameters = {entry.pattern: entry.value for entry in every if entry.path == fits.PATH}
+    if fit is not None and diameters.keys() & entries.keys():  # its zones have changed: state what a fit stands for
+        changes["tolerances",] = {fits.KEY: None} | {key: entries.get(key, own) for key, own in diameters.items()}
+        if "contact" in data["joint"]:
+            changes["joint", "contact"] = dict(fit.diameters)
+        else:
+            changes["joint",] = {"contact": fit.diameters}
+    return rewriting.with_keys(study.text, changes, f"{study.name}.toml")

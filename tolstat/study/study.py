@@ -21,6 +21,7 @@ from tolstat.study.file import StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.proposal import Proposal
+from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 
@@ -231,11 +232,12 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     file = StudyFile(Path(path), SECTIONS, text)
     if n is not None:
         file.override("sampling", "n", n)
-    joint = file.joint()
+    fit = file.fit()
+    joint = file.joint(fit)
     operation = file.model("operation", Operation, required=True)
     solver = file.model("solver", Solver)
     errors = file.errors()
-    tolerances = file.tolerances(operation)
+    tolerances = file.tolerances(operation, fit)
     copula = file.correlation()
     proposals = file.proposals()
     sampling = file.model("sampling", Sampling, required=True)
@@ -246,7 +248,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     listed = None
     moved: tuple[Group, ...] = ()
     if sampling is not None and sampling.method == "pick_freeze":
-        moved = groups(file.data.get("tolerances", {}), tolerances, copula, sampling.groups)
+        moved = groups(fits.entries(file.data.get("tolerances", {}), fit), tolerances, copula, sampling.groups)
     if sampling is not None and sampling.method == "cases":
         listed = file.listed(joint, operation, solver)
     if sampling is not None:

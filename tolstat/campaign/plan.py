@@ -36,6 +36,8 @@ QUANTILES = (0.95, 0.99, 0.999)
 ORDINARY = 680.0
 """Work of a joint that does not rattle, from `studies/iso2768_f.toml` with the default settings, Newton iterations."""
 CONFIDENCE = 0.95
+DRAWN = 1 << 14
+"""Largest number of joints whose clearances are computed."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,23 @@ class Reversals:
 
 
 @dataclass(frozen=True)
+class Assembly:
+    """Joints that do not go together, because a pin is larger than its hole: they have no result.
+
+    Attributes
+    ----------
+    misfits, of : int
+        Number of such joints, and of joints whose clearances were computed: the first `DRAWN` of the campaign.
+    interval : tuple of float, optional
+        Clopper-Pearson interval of their share; None if samples are not independent.
+    """
+
+    misfits: int
+    of: int
+    interval: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
 class Plan:
     """Predicted cost and precision of a campaign.
 
@@ -114,6 +133,8 @@ class Plan:
         Predictions for the study's limits; empty if samples are not independent.
     reversals : Reversals
         Joints that rattle.
+    assembly : Assembly
+        Joints that do not go together.
     wilks : dict of float to int
         Minimum number of joints for a one-sided bound, by quantile.
     """
@@ -133,6 +154,7 @@ class Plan:
     limits: list[LimitPlan]
     wilks: dict[float, int]
     reversals: Reversals
+    assembly: Assembly
 
 
 def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
@@ -178,7 +200,16 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
         limits=_limits(study, simulation.results[valid]) if iid else [],
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(params, simulation.results),
+        assembly=_assembly(study, iid),
     )
+
+
+def _assembly(study: Study, iid: bool) -> Assembly:
+    rows = np.arange(study.first_sample, min(study.rows, study.first_sample + DRAWN))
+    errors = draw(study, range(rows[0], rows[-1] + 1))
+    misfits = int((perturbed(study, rows, errors, perturb)["clearance"] < 0.0).any(axis=1).sum())
+    lower, upper = exceedance.clopper_pearson(misfits, rows.size, CONFIDENCE)
+    return Assembly(misfits, rows.size, (float(lower), float(upper)) if iid else None)
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals:

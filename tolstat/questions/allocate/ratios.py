@@ -14,7 +14,8 @@ from tolstat import sampling
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.density_ratio import log_mean_square, unbounded
-from tolstat.study.tolerances.distributions import Distribution, Normal, Rayleigh
+from tolstat.study.tolerances.distributions import Distribution, Normal
+from tolstat.study.tolerances.radial import Rayleigh
 
 Entries = dict[str, dict[str, Any]]
 """Keys of entries of ``[tolerances]`` by pattern."""
@@ -33,7 +34,7 @@ class DensityRatios:
 
     def __init__(self, tolerances: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
         self._tolerances = tolerances
-        self._values = [[sampling.values(errors, name) for name in t.names] for t in tolerances]
+        self._values = [[sampling.values(study, errors, name) for name in t.names] for t in tolerances]
         self._old = [t.distribution(t.entry) for t in tolerances]
         self._old_density = [self._log_density(i, old) for i, old in enumerate(self._old)]
         keep = lru_cache(maxsize=4 * len(tolerances))

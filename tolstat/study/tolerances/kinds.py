@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import Banded, HalfBand, Positive, PositiveNumber, Site, ToleranceEntry, Value
+from tolstat.study.tolerances.entry import Banded, HalfBand, Positive, PositiveNumber, SingleEntry, Site, Value
 
 Truncate = Annotated[bool, Field(strict=True)]
 
@@ -165,7 +165,7 @@ class RayleighEntry(HalfBand):
         return tolerance.Rayleigh(sigma, radius if self.truncate else None)
 
 
-class MeasuredEntry(ToleranceEntry):
+class MeasuredEntry(SingleEntry):
     """One column of a CSV file with a header row; `unit` is that of the column."""
 
     distribution: Literal["measured"]

@@ -22,7 +22,8 @@ from tolstat.common.units import diameter, is_diameter, to_si, written
 from tolstat.study import Study, load_case
 from tolstat.study import file as study_file
 from tolstat.study.model import Solver
-from tolstat.study.tolerances.distributions import Normal, Rayleigh
+from tolstat.study.tolerances.distributions import Normal
+from tolstat.study.tolerances.radial import Rayleigh
 
 STUDIES = ROOT / "studies"
 

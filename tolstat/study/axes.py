@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -123,6 +123,10 @@ class Axis:
     room: float = math.inf
     reach: float = math.nan
 
+    def describe(self) -> dict[str, float]:
+        """Numbers that determine the errors, besides what is drawn, as JSON values: those that matter for the axis."""
+        return {key: value for key, value in asdict(self).items() if key != "name" and math.isfinite(value)}
+
     def fill(self, table: Table, drawn: Mapping[str, Array]) -> None:
         """Set the errors.
 
@@ -186,8 +190,8 @@ class Axis:
         """Share of the zone's radius that an axis of this slope leaves to its middle."""
         if math.isinf(self.room):
             return np.ones(slope.shape[1])
-        left: Array = 1.0 - np.hypot(*slope) * self.over / (2.0 * self.room)
-        return np.maximum(left, 1e-9)  # zero would lose where in the zone the middle is
+        taken: Array = np.hypot(*slope) * self.over / (2.0 * self.room)
+        return np.maximum(1.0 - taken, 1e-9)  # zero would lose where in the zone the middle is
 
 
 def component(name: str, vector: Array) -> Array:

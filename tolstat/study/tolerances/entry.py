@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, BeforeValidator, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.files import data_dir
@@ -37,8 +37,10 @@ class Site(NamedTuple):
         Folder that the path of a CSV file is relative to.
     reach : float
         Distance of the middle of pins and holes from the joint's centre, m; for pairs only.
-    oriented : bool
-        For a position: whether another entry tolerances the direction of the same axis.
+    shared : bool
+        For a zone: whether the axis has a position and a zone of direction.
+    direction : ToleranceEntry, optional
+        For the position of such an axis: the entry for its direction.
     """
 
     name: str
@@ -46,7 +48,8 @@ class Site(NamedTuple):
     center: float
     folder: Path
     reach: float = math.nan
-    oriented: bool = False
+    shared: bool = False
+    direction: ToleranceEntry | None = None
 
 
 class Meaning(NamedTuple):
@@ -82,6 +85,7 @@ def _read(value: object, info: ValidationInfo) -> float:
 Value = Annotated[float, BeforeValidator(_read)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
+Truncate = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[units.Length, AfterValidator(units.positive)]
 
 
@@ -138,18 +142,18 @@ class Toleranced(NamedTuple):
         Pattern as written in the study.
     keys : dict
         Keys of the entry, as written.
-    models : dict
-        Entry as read by site: the errors or zones that the pattern selects.
+    models : tuple of (Site, ToleranceEntry)
+        The errors or zones that the pattern selects, and the entry as read for each.
     """
 
     pattern: str
     keys: Mapping[str, Any]
-    models: dict[Site, ToleranceEntry]
+    models: tuple[tuple[Site, ToleranceEntry], ...]
 
     @property
     def quantities(self) -> dict[str, Distribution]:
         """Distribution of each quantity that the entry draws."""
-        return {name: d for site, model in self.models.items() for name, d in model.quantities(site).items()}
+        return {name: d for site, model in self.models for name, d in model.quantities(site).items()}
 
 
 class HalfBand(SingleEntry):
@@ -181,8 +185,7 @@ class HalfBand(SingleEntry):
         half = self.half_width(site)
         if half is None:
             return "no band"
-        source = f" of ISO 2768-{self.iso2768}" if self.iso2768 else ""
-        return f"half width{source}: {units.shown(half, site.unit)}"
+        return f"half width {units.shown(half, site.unit)}"
 
 
 class Banded(HalfBand):
@@ -216,4 +219,4 @@ class Banded(HalfBand):
         """See `SingleEntry.number`."""
         if self.lower is None or self.upper is None:
             return super().number(site)
-        return f"limits: {units.shown(self.lower, site.unit)} to {units.shown(self.upper, site.unit)}"
+        return f"limits {units.shown(self.lower, site.unit)} to {units.shown(self.upper, site.unit)}"

@@ -16,14 +16,15 @@ from tolstat.campaign.executors import available_workers
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation
+from tolstat.display import text
 from tolstat.joint import ideal, perturb
-from tolstat.sampling import dimensions, draw, origin_blocks
+from tolstat.sampling import dimensions, draw, origin_blocks, streams
 from tolstat.solver import refinement
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store.histories import attach_scales, create_dataset
 from tolstat.store.recorded import perturbed, settings, variants
 from tolstat.store.result_file import attributes, fill
-from tolstat.study.selection import columns_of
+from tolstat.study.tolerances import meaning
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -110,7 +111,7 @@ class Plan:
     rows : int
         Number of joints, including the nominal joint.
     dimensions : int
-        Number of errors that scatter; a radial error counts as two.
+        Number of errors that scatter; a vector of a zone counts as two.
     pilot : int
         Number of joints simulated for this plan.
     failed, unsettled : int
@@ -135,6 +136,8 @@ class Plan:
         Joints that rattle.
     assembly : Assembly
         Joints that do not go together.
+    tolerances : list of dict
+        What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
     wilks : dict of float to int
         Minimum number of joints for a one-sided bound, by quantile.
     """
@@ -155,6 +158,7 @@ class Plan:
     wilks: dict[float, int]
     reversals: Reversals
     assembly: Assembly
+    tolerances: list[dict[str, Any]]
 
 
 def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
@@ -186,7 +190,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
     status = simulation.results["status"]
     return Plan(
         rows=study.rows,
-        dimensions=len({column for name in study.tolerances for column in columns_of(name)}),
+        dimensions=len(streams(study)),
         pilot=len(rows),
         failed=int(np.isin(status, FAILED).sum()),
         unsettled=int(np.isin(status, UNSETTLED).sum()),
@@ -201,6 +205,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(params, simulation.results),
         assembly=_assembly(study, iid),
+        tolerances=text.records(meaning.table(study.entries)),
     )
 
 

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tolstat.cli._app import Workers, announce_compilation, as_text, print_warnings
+from tolstat.common import units
+from tolstat.display import text
+from tolstat.display.table import Column
+from tolstat.display.table import as_text as as_table
 
 if TYPE_CHECKING:
     from tolstat.campaign.plan import Plan
+
+MEANINGS = [
+    Column("tolerance", lambda row: str(row["entry"])),
+    Column("its number", lambda row: str(row["number"])),
+    Column("error", lambda row: str(row["errors"])),
+    Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
+    Column("outside", lambda row: text.percent(math.nan if row["outside"] is None else row["outside"])),
+]
+"""What the entries of [tolerances] mean; `outside` is the share of the parts outside the band or zone."""
 
 
 def plan(
@@ -63,7 +77,16 @@ def _lines(made: Plan) -> str:
         for limit in made.limits
     ]
     lines += [f"joints for a 95 % bound of the {100 * q:g} % quantile: {n}" for q, n in made.wilks.items()]
-    return "\n".join(lines)
+    return "\n".join(lines + _meanings(made))
+
+
+def _meanings(made: Plan) -> list[str]:
+    """Table of what each entry of [tolerances] means."""
+    if not made.tolerances:
+        return []
+    import pandas as pd
+
+    return ["", as_table(MEANINGS, pd.DataFrame(made.tolerances))]
 
 
 def _rattle_warning(made: Plan) -> list[str]:

@@ -7,7 +7,6 @@ pydantic validates, so that a wrong or missing unit is reported with the other f
 from __future__ import annotations
 
 import math
-import re
 import sys
 import tokenize
 from dataclasses import dataclass
@@ -16,6 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from tolstat.common import notation
+from tolstat.common.notation import DIAMETER, PLUS_MINUS, Written
 
 if TYPE_CHECKING:
     import pint
@@ -49,6 +51,12 @@ DISPLAY_UNITS = {
 """Unit in which figures show errors of each SI unit, and the factor to it."""
 
 
+def shown(value: float, unit: str, digits: int = 3) -> str:
+    """Text of an SI value for people: ``shown(1e-4, "m")`` is ``"0.1 mm"``."""
+    name, factor = DISPLAY_UNITS.get(unit, (unit, 1.0))
+    return f"{factor * value:.{digits}g} {name}".rstrip()
+
+
 @cache
 def registry() -> pint.UnitRegistry[float]:
     """Return the only unit registry (created on first use, which takes some 0.3 s)."""
@@ -59,24 +67,10 @@ def registry() -> pint.UnitRegistry[float]:
     return units
 
 
-_QUANTITY = re.compile(
-    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)(?![a-z]))"
-    r"\s*(?P<unit>|(?:1?\s*/\s*)?[A-Za-zµμ°%][\w µμ°%*/^().·⁻¹²³⁴-]{0,40})\s*",
-    re.ASCII | re.IGNORECASE,
-)
-"""A number and a unit. Anything else is refused: pint would read "1,5 mm" as 15 mm and "0,1 mm" as nothing."""
-
-
 @lru_cache(maxsize=1024)
-def _parsed(text: str) -> Any:
-    """Parse a text as a quantity, None if it is not one; cached, because variants of a joint share most values."""
-    found = _QUANTITY.fullmatch(text)
-    if found is None:
-        return None
-    unit = found["unit"].replace("·", "*")
-    if unit.startswith("/"):
-        unit = f"1{unit}"
-    return registry().Quantity(float(found["number"]), unit or "dimensionless")
+def _parsed(written: Written) -> Any:
+    """Give the number its unit; cached, because variants of a joint share most values."""
+    return registry().Quantity(written.number, notation.pint_unit(written.unit) or "dimensionless")
 
 
 _NOT_PARSED = (
@@ -86,12 +80,13 @@ _NOT_PARSED = (
 """Exceptions besides pint's own that its parser raises for a text that is not a unit."""
 
 
-def _fault(found: str, unit: str) -> PydanticCustomError:
-    remedy = f'write "{EXAMPLES.get(unit, "1 " + unit)}"' if unit != "1" else "write a number without unit"
+def _fault(found: str, unit: str, remedy: str = "") -> PydanticCustomError:
+    example = f'write "{EXAMPLES.get(unit, "1 " + unit)}"' if unit != "1" else "write a number without unit"
+    remedy = remedy or example
     return PydanticCustomError("quantity", "{found}", {"found": found, "remedy": remedy})
 
 
-def to_si(value: object, unit: str) -> float:
+def to_si(value: object, unit: str, mark: str = "") -> float:
     """Convert a quantity as written in a file to an SI float.
 
     Parameters
@@ -100,19 +95,19 @@ def to_si(value: object, unit: str) -> float:
         A string such as ``"0.1 mm"``; a bare number only where `unit` is ``"1"``.
     unit : str
         SI unit that the value must be convertible to.
+    mark : str
+        Sign that may stand before the number: `DIAMETER` or `PLUS_MINUS` of `notation`. All others are refused.
 
     Returns
     -------
     float
-        Value in `unit`.
+        Value in `unit`. A sign does not change it: ``"⌀0.1 mm"`` is 1e-4 m, the diameter.
 
     Raises
     ------
     pydantic_core.PydanticCustomError
-        For a missing, unknown or wrong unit, or a value that is not finite.
+        For a missing, unknown or wrong unit, a sign that means another quantity, or a value that is not finite.
     """
-    import pint
-
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise _fault(f"{value!r} is not a quantity", unit)
     if isinstance(value, (int, float)):
@@ -121,9 +116,60 @@ def to_si(value: object, unit: str) -> float:
         if not abs(value) <= sys.float_info.max:  # also an integer too long for a float
             raise _fault(f"{value!r} is not a finite number", unit)
         return float(value)
+    read = notation.read(value)
+    if read is None:
+        comma = ", with a decimal point" if "," in value else ""
+        raise _fault(f"{value!r} is not a number with a unit{comma}", unit)
+    si = _value(read, unit, value)
+    if not math.isfinite(si):
+        raise _fault(f"{value!r} is not a finite number", unit)
+    if read.mark not in ("", mark):
+        raise _marked(read, value, unit, mark)
+    return si
+
+
+def is_diameter(value: object) -> bool:
+    """Whether a quantity as written in a file has the sign of a diameter: ``"⌀0.1 mm"``, ``"dia 0.1 mm"``."""
+    read = notation.read(value) if isinstance(value, str) else None
+    return read is not None and read.mark == DIAMETER
+
+
+def diameter(value: object) -> float:
+    """Diameter of a round zone, m: a length that must have the sign of a diameter.
+
+    Raises
+    ------
+    pydantic_core.PydanticCustomError
+        For a value without the sign, and as `to_si`.
+    """
+    si = to_si(value, "m", DIAMETER)
+    if not is_diameter(value):
+        raise _fault(f"{value!r} is not marked as a diameter", "m", f'write "{DIAMETER}{value}" or "dia {value}"')
+    return si
+
+
+def _marked(read: Written, value: str, unit: str, mark: str) -> PydanticCustomError:
+    """Fault of a value with a sign that means another quantity."""
+    plain = f"{_short(read.number)} {read.unit}".strip()
+    half = f"{_short(0.5 * read.number)} {read.unit}".strip()
+    if mark == PLUS_MINUS:
+        return _fault(f"{value!r} is a diameter where a half width is meant", unit, f'write half of it: "{half}"')
+    remedy = f'write "{plain}"'
+    if read.mark == DIAMETER:
+        remedy += f', or "{half}" where a radius is meant'
+    return _fault(f"{value!r} is {notation.NAMES[read.mark]} where another quantity is meant", unit, remedy)
+
+
+def _short(number: float) -> str:
+    return f"{number:.12g}"
+
+
+def _value(read: Written, unit: str, value: str) -> float:
+    """Value in `unit`, which `value` must be convertible to."""
+    import pint
+
     try:
-        quantity = _parsed(value)
-        si = math.nan if quantity is None else _convert(quantity, unit, value)
+        return _convert(_parsed(read), unit, value)
     except PydanticCustomError:
         raise
     except pint.DimensionalityError as error:
@@ -132,12 +178,6 @@ def to_si(value: object, unit: str) -> float:
         raise _fault(f"{value!r} has an unknown unit", unit) from error
     except (pint.PintError, *_NOT_PARSED) as error:
         raise _fault(f"{value!r} is not a number with a unit", unit) from error
-    if quantity is None:
-        comma = ", with a decimal point" if "," in value else ""
-        raise _fault(f"{value!r} is not a number with a unit{comma}", unit)
-    if not math.isfinite(si):
-        raise _fault(f"{value!r} is not a finite number", unit)
-    return si
 
 
 def _convert(quantity: Any, unit: str, value: str) -> float:
@@ -149,17 +189,41 @@ def _convert(quantity: Any, unit: str, value: str) -> float:
         raise _fault(f"{value!r} has no unit", unit)
     if unit == "rad/s":
         return _speed(quantity, value)
+    if unit == "rad" and set(dict(quantity.unit_items())) - ANGLES:
+        raise _fault(f"{value!r} cannot be a value in {unit}", unit)
     return float(quantity.to(unit).magnitude)
 
 
+ANGLES = frozenset(
+    f"{prefix}{name}"
+    for prefix in ("", "milli", "micro")
+    for name in ("radian", "degree", "arcminute", "arcsecond", "grade", "turn")
+)
+"""Names of the units of an angle in the registry."""
+_ROTATIONS = {f"{prefix}revolutions_per_{time}" for prefix in ("", "kilo") for time in ("second", "minute", "hour")}
+
+
 def _speed(quantity: Any, value: str) -> float:
-    """Angular velocity, rad/s: 1/min and min^-1 count revolutions, as on drawings; Hz is refused."""
-    dimensions = {name: registry().get_dimensionality(name) for name, _ in quantity.unit_items()}
-    for name, dimension in dimensions.items():
-        if dimension == {"[time]": -1} and not name.startswith("revolutions_per"):
-            raise _fault(f"{value!r} is ambiguous (1 Hz may mean 1 rad/s or 2 pi rad/s)", "rad/s")
-    per_revolution = all(dimension == {"[time]": 1} for dimension in dimensions.values())
-    return float(quantity.to("rad/s").magnitude) * (2.0 * math.pi if per_revolution else 1.0)
+    """Angular velocity, rad/s; a value that may be in revolutions or in radians is refused.
+
+    A speed is an angle over a time, or revolutions over a time by name (rpm). 1/min and min^-1 mean revolutions, as on
+    drawings (ISO 80000-3 gives them to the rotational frequency only). Hz and 1/s are units of both.
+    """
+    units = dict(quantity.unit_items())
+    dimensions = {name: dict(registry().get_dimensionality(name)) for name in units}
+    of_time = [name for name, dimension in dimensions.items() if dimension == {"[time]": 1} and units[name] == -1]
+    of_angle = [name for name in units if name in ANGLES and units[name] == 1]
+    if len(units) == 1 and (set(units) <= _ROTATIONS and set(units.values()) == {1}):
+        return float(quantity.to("rad/s").magnitude)
+    if len(units) == 2 and of_time and of_angle:
+        return float(quantity.to("rad/s").magnitude)
+    if list(units) == of_time == ["minute"]:
+        return float(quantity.to("rad/s").magnitude) * 2.0 * math.pi
+    if quantity.dimensionality == {"[time]": -1} and not set(units) & ANGLES:
+        number = _short(quantity.to("1/s").magnitude)
+        remedy = f'write "{number} rev/s" or "{number} rad/s"'
+        raise _fault(f"{value!r} is ambiguous: revolutions or radians", "rad/s", remedy)
+    raise _fault(f"{value!r} cannot be a value in rad/s", "rad/s")
 
 
 def written(value: float, unit: str, like: object, digits: int = 12) -> str | float:
@@ -179,14 +243,14 @@ def written(value: float, unit: str, like: object, digits: int = 12) -> str | fl
     Returns
     -------
     str or float
-        ``"0.08 mm"``, or a number where `like` has no unit.
+        ``"0.08 mm"``, with the sign of `like`, or a number where `like` has no unit.
     """
-    number, name = value, ""
-    if isinstance(like, str) and (found := _QUANTITY.fullmatch(like)) is not None:
-        name = found["unit"]
+    number, name, mark = value, "", ""
+    if isinstance(like, str) and (read := notation.read(like)) is not None:
+        name, mark = read.unit, read.mark
         number = value / to_si(f"1 {name}" if name else 1.0, unit)
     number = float(f"{number:.{digits}g}")
-    return f"{number!r} {name}" if name else number
+    return f"{mark}{number!r} {name}" if name else number
 
 
 @dataclass(frozen=True)

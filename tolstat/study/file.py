@@ -16,16 +16,16 @@ from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import merged
 from tolstat.study import fatigue, listing, proposal, selection
+from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
-from tolstat.study.selection import RADIAL_UNITS, UNITS, Assignments, Entry
-from tolstat.study.tolerances import fits
+from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
+from tolstat.study.tolerances import fits, reading
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
-from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.fits import Fit
-from tolstat.study.tolerances.kinds import distribution
+from tolstat.study.tolerances.reading import Nominal, Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
 
@@ -135,21 +135,22 @@ class StudyFile:
             return selection.fixed_errors(self._table("errors"), ("errors",), self.place, self._claims)
         return {}
 
-    def tolerances(self, operation: Operation | None, fit: Fit | None = None) -> dict[str, Distribution]:
-        """``[tolerances]``: how each error scatters."""
-        scatter: dict[str, Distribution] = {}
+    def tolerances(self, joint: Joint | None, operation: Operation | None, fit: Fit | None) -> Tolerances:
+        """``[tolerances]``: how errors scatter."""
+        written = []
         for entry in fits.entries(self._table("tolerances"), fit):
             with gather(self._faults):
-                selected = selection.resolve(entry, UNITS | RADIAL_UNITS, self.place)
+                selected = selection.resolve(entry, TOLERANCED, self.place)
                 with gather(self._faults):
                     self._claims.claim(entry, selected)
-                self._toleranced |= {name: (UNITS | RADIAL_UNITS)[name] for name in selected}
-                for name in selected:
-                    center = nominal_value(name, operation)
-                    if center is not None:
-                        site = Site(name, self._toleranced[name], center, self.path.parent)
-                        scatter[name] = distribution(entry.value, site, self.place, entry.path)
-        return scatter
+                self._toleranced |= {name: TOLERANCED[name] for name in selected}
+                written.append((entry, selected))
+        found = reading.read(written, Nominal(joint, operation, self.path.parent), self.place, self._faults)
+        drawn: dict[str, list[str]] = {}
+        for quantity in found.distributions:
+            drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)
+        self._toleranced = {q: unit for name, unit in self._toleranced.items() for q in drawn.get(name, [name])}
+        return found
 
     def correlation(self) -> Copula:
         """``[[correlation]]``: correlation of errors with a tolerance; call `tolerances` first."""
@@ -295,10 +296,3 @@ class StudyFile:
 
     def _fault(self, path: tuple[int | str, ...], found: str, remedy: str) -> None:
         self._faults.append(Fault(f"{self.place}: {strict.dotted(path)}", found, remedy))
-
-
-def nominal_value(name: str, operation: Operation | None) -> float | None:
-    """Value of an error in the nominal joint (SI); None for an operating point that could not be read."""
-    if name.startswith("operation."):
-        return None if operation is None else float(getattr(operation, name.removeprefix("operation.")))
-    return 1.0 if name == "material.E_factor" else 0.0

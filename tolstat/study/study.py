@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,15 +16,16 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
+from tolstat.study.axes import Axis
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.proposal import Proposal
-from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.entry import Toleranced
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,12 @@ class Study(Case):
     errors : dict
         Fixed errors of every joint except the nominal one (SI).
     tolerances : dict
-        Error name to distribution; ``pin1.offset_radial`` stands for offset_t and offset_z of a feature.
+        Name to distribution of each quantity that is drawn: an error; or a vector of a zone, such as
+        ``pin1.position_inner``, with the distribution of its radius.
+    entries : tuple of Toleranced
+        Entries of ``[tolerances]`` with what they select.
+    axes : dict of str to Axis
+        Features and pairs with zones: how the errors follow from what is drawn.
     copula : Copula
         Correlation of the errors.
     proposals : tuple of Proposal
@@ -92,6 +99,8 @@ class Study(Case):
     sampling: Sampling
     output: Output
     tolerances: dict[str, Distribution] = field(default_factory=dict)
+    entries: tuple[Toleranced, ...] = ()
+    axes: Mapping[str, Axis] = field(default_factory=dict)
     copula: Copula = field(default_factory=Copula)
     proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
@@ -168,6 +177,8 @@ class Study(Case):
             "sweep": [[list(axis.names), axis.start, axis.stop, axis.points] for axis in self.sweep],
             "output": self.output.identity(),
         }
+        if self.axes:
+            parts["axes"] = {name: axis.describe() for name, axis in self.axes.items()}
         if self.proposals:
             parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
         if self.groups:
@@ -237,7 +248,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     operation = file.model("operation", Operation, required=True)
     solver = file.model("solver", Solver)
     errors = file.errors()
-    tolerances = file.tolerances(operation, fit)
+    read = file.tolerances(joint, operation, fit)
     copula = file.correlation()
     proposals = file.proposals()
     sampling = file.model("sampling", Sampling, required=True)
@@ -248,7 +259,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     listed = None
     moved: tuple[Group, ...] = ()
     if sampling is not None and sampling.method == "pick_freeze":
-        moved = groups(fits.entries(file.data.get("tolerances", {}), fit), tolerances, copula, sampling.groups)
+        moved = groups(read.entries, copula, sampling.groups)
     if sampling is not None and sampling.method == "cases":
         listed = file.listed(joint, operation, solver)
     if sampling is not None:
@@ -273,7 +284,9 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         errors=errors,
         sampling=sampling,
         output=output,
-        tolerances=tolerances,
+        tolerances=read.distributions,
+        entries=read.entries,
+        axes=read.axes,
         copula=copula,
         proposals=proposals,
         sweep=sweep,

@@ -19,10 +19,9 @@ from tolstat.common.strict import Strict
 from tolstat.common.tables import HOLES, PINS
 from tolstat.study import selection
 from tolstat.study.selection import Entry
-from tolstat.study.tolerances import iso286
+from tolstat.study.tolerances import iso286, kinds
 from tolstat.study.tolerances.distributions import Distribution, Normal
 from tolstat.study.tolerances.entry import PositiveLength, PositiveNumber, Site
-from tolstat.study.tolerances.kinds import distribution
 
 KEY = "fit"
 PATH = ("tolerances", KEY)
@@ -146,8 +145,11 @@ def read(table: object, place: str) -> Fit | None:
         raise InputError([Fault(where, f"{data!r} is not a fit", f"write {EXAMPLE}")])
     entry = strict.validate(FitEntry, data, place, prefix=PATH)
     zones = entry.zones
-    sites = (Site(f"{feature}.diameter", "m", 0.0, Path()) for feature in (HOLES[0], PINS[0]))
-    hole, pin = (distribution(entry.scatter(zone), site, place, PATH) for zone, site in zip(zones, sites, strict=True))
+    deviations = []
+    for feature, zone in zip((HOLES[0], PINS[0]), zones, strict=True):
+        site = Site(f"{feature}.diameter", "m", 0.0, Path())
+        deviations.append(kinds.entry(entry.scatter(zone), site, place, PATH).quantities(site)[site.name])
+    hole, pin = deviations
     share = larger(pin, hole, 1e-6 * (zones.hole.middle - zones.shaft.middle))
     if zones.kind != "clearance":
         raise InputError([_refusal(entry, zones, share, f"{where}.code")])

@@ -1,0 +1,96 @@
+"""Quantities as drawings write them: the sign before the number, angles in minutes, units without a dot between."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+DIAMETER = "⌀"
+PLUS_MINUS = "±"
+NAMES = {DIAMETER: "a diameter", PLUS_MINUS: "a band"}
+"""What a value with each sign is."""
+
+
+class Written(NamedTuple):
+    """A quantity as it is written.
+
+    Attributes
+    ----------
+    mark : str
+        `DIAMETER`, `PLUS_MINUS`, or empty.
+    number : float
+        The number before the unit.
+    unit : str
+        The unit as written; empty for a pure number.
+    """
+
+    mark: str
+    number: float
+    unit: str
+
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)(?![a-z])"
+_QUANTITY = re.compile(
+    rf"\s*(?P<number>{_NUMBER})"
+    r"\s*(?P<unit>|(?:1?\s*/\s*)?[A-Za-zµμ°%][\w µμ°%*/^().·⁻¹²³⁴-]{0,40})\s*",
+    re.ASCII | re.IGNORECASE,
+)
+"""A number and a unit. Anything else is refused: pint would read "1,5 mm" as 15 mm and "0,1 mm" as nothing."""
+
+_MARK = re.compile(r"\s*(?:(?P<diameter>[⌀ØøΦφ∅]|dia(?:meter\b|\.|\b|(?=\d)))|(?P<band>±|\+/?[-−]))\s*", re.IGNORECASE)
+_MARK_BEHIND = re.compile(r"(?<=[\w.])\s+dia\.?\s*", re.IGNORECASE)
+
+_MINUTE, _SECOND = "['′’]", "(?:[\"″”]|''|′′|’’)"
+_ANGLE = re.compile(
+    r"\s*(?P<sign>[+-]?)\s*(?=\d)"
+    rf"(?:(?P<degrees>\d+)\s*°\s*)?(?:(?P<minutes>\d+(?:\.\d+)?)\s*{_MINUTE}(?!['′’])\s*)?"
+    rf"(?:(?P<seconds>\d+(?:\.\d+)?)\s*{_SECOND}\s*)?",
+    re.ASCII,
+)
+"""Degrees, minutes and seconds, of which any may be left out."""
+
+_SPELLINGS = (
+    (re.compile(r"(?<![A-Za-z])([kMmd]?N)(m|cm|mm)(?![A-Za-z])"), r"\1*\2"),
+    (re.compile(r"(?<![A-Za-z])(?:U|r|tr)(?![A-Za-z])"), "turn"),
+    (re.compile(r"(?<![A-Za-z])(?:RPM|Rpm|UPM|UpM|Upm)(?![A-Za-z])"), "rpm"),
+    (re.compile(r"·"), "*"),
+    (re.compile(r"^\s*/"), "1/"),
+)
+"""Spellings that pint does not know or takes for something else, and what is meant: Nm, U/min, r/min, RPM."""
+
+
+def read(text: str) -> Written | None:
+    """Sign, number and unit of a quantity as it stands on a drawing; None if it is none."""
+    mark, rest = "", text
+    if (found := _MARK.match(text)) is not None:
+        mark, rest = (DIAMETER if found["diameter"] else PLUS_MINUS), text[found.end() :]
+        if rest[:1] in ("+", "-"):
+            return None
+    elif (found := _MARK_BEHIND.search(text)) is not None and found.end() == len(text):
+        mark, rest = DIAMETER, text[: found.start()]
+    angle = _degrees(rest)
+    if angle is not None:
+        return Written(mark, angle, "deg")
+    found = _QUANTITY.fullmatch(rest)
+    return None if found is None else Written(mark, float(found["number"]), found["unit"])
+
+
+def pint_unit(unit: str) -> str:
+    """Spell a unit as pint reads it."""
+    for spelt, meant in _SPELLINGS:
+        unit = spelt.sub(meant, unit)
+    return unit
+
+
+def _degrees(text: str) -> float | None:
+    """Degrees of an angle with minutes or seconds; None for other texts, and for 60 or more beside a larger unit."""
+    found = _ANGLE.fullmatch(text)
+    if found is None or not (found["minutes"] or found["seconds"]):
+        return None
+    degrees, minutes, seconds = (float(found[name] or 0.0) for name in ("degrees", "minutes", "seconds"))
+    whole = "." not in (found["minutes"] or "") or not found["seconds"]
+    below = (not found["degrees"] or minutes < 60.0) and (not (found["degrees"] or found["minutes"]) or seconds < 60.0)
+    if not (whole and below):
+        return None
+    size = degrees + minutes / 60.0 + seconds / 3600.0
+    return -size if found["sign"] == "-" else size

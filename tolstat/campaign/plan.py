@@ -136,6 +136,8 @@ class Plan:
         Joints that rattle.
     assembly : Assembly
         Joints that do not go together.
+    fit : list of str
+        What the fit of the study means, as lines of text; empty without one.
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
     wilks : dict of float to int
@@ -158,6 +160,7 @@ class Plan:
     wilks: dict[float, int]
     reversals: Reversals
     assembly: Assembly
+    fit: list[str]
     tolerances: list[dict[str, Any]]
 
 
@@ -205,6 +208,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(params, simulation.results),
         assembly=_assembly(study, iid),
+        fit=[] if study.fit is None else study.fit.meaning,
         tolerances=text.records(meaning.table(study.entries)),
     )
 

@@ -70,6 +70,7 @@ def _lines(made: Plan) -> str:
         f"time: {_duration(made.seconds)} on {made.workers} cores",
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",
+        *made.fit,
     ]
     lines += [f"width of the 95 % interval at P = {share:g}: {width:.2g}" for share, width in made.widths.items()]
     lines += [

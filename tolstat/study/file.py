@@ -68,6 +68,7 @@ class StudyFile:
         self._faults: list[Fault] = []
         self._claims = Assignments(self.place)
         self._toleranced: dict[str, str] = {}
+        self._accepted: set[str] = set()
         allowed = list(sections)
         for key in self.data:
             if key not in allowed:
@@ -146,6 +147,7 @@ class StudyFile:
                 self._toleranced |= {name: TOLERANCED[name] for name in selected}
                 written.append((entry, selected))
         found = reading.read(written, Nominal(joint, operation, self.path.parent), self.place, self._faults)
+        self._accepted = {bonus.diameter for bonus in found.rejecting}
         drawn: dict[str, list[str]] = {}
         for quantity in found.distributions:
             drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)
@@ -158,7 +160,12 @@ class StudyFile:
         entries = self._list("correlation", Correlation)
         if len(self._faults) == before:
             with gather(self._faults):
-                return assemble(entries, self._toleranced, self.place)
+                copula = assemble(entries, self._toleranced, self.place)
+                for name in sorted(self._accepted & set(copula.names)):
+                    remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
+                    found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
+                    self._fault(("correlation",), found, remedy)
+                return copula
         return Copula()
 
     def proposals(self) -> tuple[Proposal, ...]:

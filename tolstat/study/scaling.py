@@ -92,8 +92,9 @@ class Tolerance(NamedTuple):
 def tolerances(study: Study) -> list[Tolerance]:
     """Entries of a study that can be scaled, in its order; not those of operating point and material.
 
-    Left out are entries with correlated errors, which cannot be scaled independently, and the position of an axis whose
-    direction has a zone, too: that zone must stay the smaller one, and bounds where the middle is.
+    Left out are entries with correlated errors, which cannot be scaled independently; the position of an axis whose
+    direction has a zone, too: that zone must stay the smaller one, and bounds where the middle is; and positions with a
+    bonus with their diameters.
     """
     found = []
     for entry in study.entries:
@@ -101,6 +102,7 @@ def tolerances(study: Study) -> list[Tolerance]:
         names = tuple(entry.quantities)
         own = not site.name.startswith(("operation.", "material."))
         refined = any(one.shared and one.name.endswith(".position") for one, _ in entry.models)
+        refined |= any(study.has_bonus(one.name) for one, _ in entry.models)
         if own and not refined and entry.keys["distribution"] in SCALED and not set(names) & set(study.copula.names):
             found.append(Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site)))
     return found
@@ -145,17 +147,18 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
         See `rewriting.with_keys`.
     """
     data = tomllib.loads(study.text)
-    fit = fits.read(data["tolerances"], study.name)
-    every = list(fits.entries(data["tolerances"], fit))
+    every = list(fits.entries(data["tolerances"], study.fit))
     changes: dict[tuple[int | str, ...], dict[str, Any]] = {("sampling",): {"seed": seed}}
     for entry in every:
         if entry.pattern in entries and entry.path != fits.PATH:
             changes[entry.path] = dict.fromkeys(entry.value) | dict(entries[entry.pattern])
     diameters = {entry.pattern: entry.value for entry in every if entry.path == fits.PATH}
-    if fit is not None and diameters.keys() & entries.keys():  # its zones have changed: state what a fit stands for
+    if (
+        study.fit is not None and diameters.keys() & entries.keys()
+    ):  # its zones have changed: state what a fit stands for
         changes["tolerances",] = {fits.KEY: None} | {key: entries.get(key, own) for key, own in diameters.items()}
         if "contact" in data["joint"]:
-            changes["joint", "contact"] = dict(fit.diameters)
+            changes["joint", "contact"] = dict(study.fit.diameters)
         else:
-            changes["joint",] = {"contact": fit.diameters}
+            changes["joint",] = {"contact": study.fit.diameters}
     return rewriting.with_keys(study.text, changes, f"{study.name}.toml")

@@ -26,6 +26,7 @@ from tolstat.study.proposal import Proposal
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.fits import Fit
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,8 @@ class Study(Case):
         What is stored of each joint.
     groups : tuple of Group
         Errors that ``sampling.method`` ``pick_freeze`` exchanges together; empty for other methods.
+    fit : Fit, optional
+        Fit by ISO 286 that gives the diameters.
     """
 
     sampling: Sampling
@@ -108,6 +111,7 @@ class Study(Case):
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
     groups: tuple[Group, ...] = ()
+    fit: Fit | None = None
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -133,6 +137,12 @@ class Study(Case):
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where joints are not listed."""
         return self.listed.table if self.listed else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
+
+    def has_bonus(self, name: str) -> bool:
+        """Whether `name` is a position with a bonus by maximum material, or the diameter of such a feature."""
+        feature, _, key = name.partition(".")
+        axis = self.axes.get(feature)
+        return axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
 
     @property
     def samples(self) -> int:
@@ -287,6 +297,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         tolerances=read.distributions,
         entries=read.entries,
         axes=read.axes,
+        fit=fit,
         copula=copula,
         proposals=proposals,
         sweep=sweep,

@@ -22,6 +22,21 @@ from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.moments import outside, standard_deviation
 
 
+class Diameter(NamedTuple):
+    """Tolerance of the diameter of a pin or hole.
+
+    Attributes
+    ----------
+    band : tuple of float, optional
+        Lower and upper limit, m.
+    distribution : Distribution
+        Distribution of the error.
+    """
+
+    band: tuple[float, float] | None
+    distribution: Distribution
+
+
 class Site(NamedTuple):
     """What an entry is for.
 
@@ -41,6 +56,8 @@ class Site(NamedTuple):
         For a zone: whether the axis has a position and a zone of direction.
     direction : ToleranceEntry, optional
         For the position of such an axis: the entry for its direction.
+    diameter : Diameter, optional
+        For the position of a pin or hole: the tolerance of its diameter.
     """
 
     name: str
@@ -50,6 +67,7 @@ class Site(NamedTuple):
     reach: float = math.nan
     shared: bool = False
     direction: ToleranceEntry | None = None
+    diameter: Diameter | None = None
 
 
 class Meaning(NamedTuple):

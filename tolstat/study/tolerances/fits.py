@@ -32,6 +32,8 @@ PAIRS = len(PINS)
 EXAMPLE = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
 _KEYS_OF = {"cpk": "normal", "truncate": "normal", "a": "beta", "b": "beta"}
 """Keys of one distribution, which others do not have."""
+NEGLIGIBLE = 1e-12
+"""Probability of a misfit that is not told."""
 _POINTS = 4000
 """Number of midpoints in probability of each diameter."""
 
@@ -112,6 +114,17 @@ class Fit(NamedTuple):
         }
 
     @property
+    def meaning(self) -> list[str]:
+        """Lines of text: zones of the fit, and the share of joints that do not go together if there are any."""
+        zones = self.entry.zones
+        hole, pin = (f"{_signed(zone.lower)} to {_signed(zone.upper)} um" for zone in zones)
+        found = f"fit {self.entry.code} at {1e3 * self.entry.basic:g} mm: hole {hole}, pin {pin}"
+        lines = [f"{found}, clearance {zones.least:g} to {zones.largest:g} um"]
+        if self.misfit > NEGLIGIBLE:
+            lines.append(f"fit: {_percent(self.misfit_joints)} of the joints do not go together")
+        return lines
+
+    @property
     def misfit_joints(self) -> float:
         """Share of joints of which at least one pair does not go together, if the diameters are independent."""
         return _any_pair(self.misfit)
@@ -159,10 +172,14 @@ def read(table: object, place: str) -> Fit | None:
 def _refusal(entry: FitEntry, zones: iso286.Zones, share: float, where: str) -> Fault:
     article = "an" if zones.kind == "interference" else "a"
     found = (
-        f"{entry.code} is {article} {zones.kind} fit, clearance {zones.least:+g} to {zones.largest:+g} um: "
+        f"{entry.code} is {article} {zones.kind} fit, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
         f"{_percent(_any_pair(share))} of the joints do not go together ({_percent(share)} of the pairs)"
     )
     return Fault(where, found, "give a clearance fit, such as H7/g6, H7/f7 or H8/e8")
+
+
+def _signed(value: float) -> str:
+    return f"{value:+g}" if value else "0"
 
 
 def _percent(share: float) -> str:

@@ -41,8 +41,9 @@ def plan(
     """Predict time, memory and precision of a campaign.
 
     Simulates a few joints (pilot) and writes nothing. Prints time, memory and file size of the campaign, the width of
-    the 95 % interval of exceedances and of each limit's exceedance, and the number of joints that a 95 % bound of a
-    quantile needs.
+    the 95 % interval of exceedances and of each limit's exceedance, the number of joints that a 95 % bound of a
+    quantile needs, and what each entry of [tolerances] means: half width, radius or diameter, standard deviation of the
+    error, share of the parts outside.
 
     Example: tolstat plan studies/iso2768_f.toml
     """

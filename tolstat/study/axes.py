@@ -200,7 +200,8 @@ class Axis:
         if math.isinf(self.room):
             return np.ones(slope.shape[1])
         taken: Array = np.hypot(*slope) * self.over / (2.0 * self.room)
-        return np.maximum(1.0 - taken, 1e-9)  # zero would lose where in the zone the middle is
+        left: Array = np.maximum(1.0 - taken, 1e-9)  # zero would lose where in the zone the middle is
+        return left
 
 
 def _finite(values: Mapping[str, Any]) -> dict[str, Any]:

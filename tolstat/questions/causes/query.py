@@ -52,9 +52,9 @@ class Causes(NamedTuple):
         Sum of the first-order indices; R^2 of the rank regression, NaN for a pick-freeze design.
     table : DataFrame
         One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
-        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and ``size``; the last two also with
-        ``_p``, and NaN if too few joints are on either side of the level. For a pick-freeze design, one row per group
-        of errors, with ``first`` and ``total`` only.
+        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and
+        ``size``; the last two also with ``_p``, and NaN if too few joints are on either side of the level. For a
+        pick-freeze design, one row per group of errors, with ``first`` and ``total`` only.
     """
 
     load: str

@@ -21,9 +21,9 @@ def table(entries: Sequence[Toleranced]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``entry``, its pattern; ``number``, what its number is; ``errors``, keys of the errors as a pattern; ``unit`` and
-        ``sigma``, standard deviation of each of these errors, SI, where several entries set an error the part of this
-        one; ``outside``, share of the parts outside the band or zone, NaN without either.
+        ``entry``, its pattern; ``number``, what its number is; ``errors``, keys of the errors as a pattern; ``unit``
+        and ``sigma``, standard deviation of each of these errors, SI (where several entries set an error, the part of
+        this one); ``outside``, share of the parts outside the band or zone, NaN without either.
     """
     rows: dict[tuple[Any, ...], dict[str, None]] = {}
     for entry in entries:
@@ -33,9 +33,8 @@ def table(entries: Sequence[Toleranced]) -> pd.DataFrame:
                 key = (entry.pattern, found.number, found.unit, sigma, f"{found.outside:.6g}")
                 rows.setdefault(key, {}).update(dict.fromkeys(name.partition(".")[2] for name in found.errors))
     columns = ["entry", "number", "unit", "sigma", "outside", "errors"]
-    made = pd.DataFrame(
-        [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()], columns=columns
-    )
+    cells = [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()]
+    made = pd.DataFrame(cells, columns=columns)
     return made[["entry", "number", "errors", "unit", "sigma", "outside"]]
 
 

@@ -109,7 +109,7 @@ def test_rejection_is_that_of_part_by_part() -> None:
         one.number: one for entry in loaded.entries for site, model in entry.models for one in model.meaning(site)
     }
     told = next(text for text in shares if "Ⓜ" in text)
-    assert told == f"diameter 0.1 mm Ⓜ, {100 * (1 - kept.mean()):.2g} % rejected"
+    assert told == f"⌀0.1 mm Ⓜ, {100 * (1 - kept.mean()):.2g} % rejected"
     offset = next(one for one in shares.values() if one.number == told)
     middle = np.concatenate([0.5 * (inner + outer)[0] for _, inner, outer in drawn])
     found = meaning.table(loaded.entries).set_index("errors")["sigma"]
@@ -221,6 +221,6 @@ def test_correlated_diameters_may_fill_their_zones() -> None:
 def test_changes_are_refused_and_scaling_leaves_both_out() -> None:
     loaded = load("reject")
     for setting in ("pin*.diameter.cpk=2", "pin*.position.cp=2"):
-        with pytest.raises(InputError, match="the position has a bonus by maximum material"):
+        with pytest.raises(InputError, match="a position with a bonus by maximum material cannot be changed"):
             changed(loaded, [setting])
     assert scaling.tolerances(loaded) == []

@@ -96,7 +96,7 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
 def _check_bonus(study: Study, name: str, place: str) -> None:
     """Refuse changes of a position with a bonus and of its diameter: they move what a part's zone is."""
     if study.has_bonus(name):
-        found = f"{name} cannot be changed: the position has a bonus by maximum material"
+        found = "a position with a bonus by maximum material cannot be changed, nor its diameter"
         raise InputError([Fault(place, found, "run a study of its own")])
 
 

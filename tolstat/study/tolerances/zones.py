@@ -172,7 +172,8 @@ class PositionEntry(ZoneEntry):
         if (bonus := self.bonus(site)) is not None and site.diameter is not None:
             parts = Accepted(site.diameter.distribution, bonus)
             end = math.sqrt(0.5 * average(parts, bonus.mean_square))
-            number += f" Ⓜ, {100 * (1 - parts.share):.2g} % rejected" if bonus.rule == REJECT else " Ⓜ, filled"
+            rule = f"{100 * (1 - parts.share):.2g} % rejected" if bonus.rule == REJECT else "filled"
+            number = f"⌀{units.shown(self.zone.size, 'm')} Ⓜ, {rule}"
         if isinstance(site.direction, OrientationEntry):
             middle, slope = end * self._room_left(site.direction), site.direction._deviation()
         else:

@@ -193,23 +193,30 @@ def test_scores_give_the_same_errors(make: Make) -> None:
         np.testing.assert_allclose(again[name], sampling.draw(s)[1:][name], rtol=1e-8, atol=1e-14)
 
 
+PLACED, TURNED = '"pin1.' + POSITION % "normal", '"pin1.' + DIRECTION % ("perpendicularity", "normal")
+TILTED = '"pin1.tilt_t" = { plus_minus = "1 deg", distribution = "normal" }\n'
+TIED = '[[correlation]]\nbetween = ["pin*.position"]\nrho = 0.5\n'
+
+
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ('"pin1.' + (POSITION % "normal").replace("⌀", ""), 'must say that it is a diameter.*write "⌀0.1 mm"'),
-        ('"pin1.' + (POSITION % "uniform").replace(" }", ", cp = 1.0 }"), "no effect on a uniform distribution"),
-        ('"pin1.' + (DIRECTION % ("angularity", "normal")).replace("⌀", ""), 'add about = "t" or "z"'),
-        ('"pin1.' + (DIRECTION % ("angularity", "normal")).replace(" }", ', about = "t" }'), "about has no effect"),
-        ('"pin1.' + POSITION % "normal" + '"pin1.tilt_t" = { plus_minus = "1 deg", distribution = "normal" }\n', "already"),
+        (PLACED.replace("⌀", ""), 'must say that it is a diameter.*write "⌀0.1 mm"'),
+        (PLACED.replace('"normal"', '"uniform", cp = 1.0'), "no effect on a uniform distribution"),
+        (TURNED.replace("⌀", ""), 'add about = "t" or "z"'),
+        (TURNED.replace(" }", ', about = "t" }'), "about has no effect"),
+        (PLACED + TILTED, "pin1.tilt_t is set by tolerances.pin1.position already"),
         ('"hole2.' + POSITION % "normal" + COMMON % "input_holes", "hole2.tilt_z is set by"),
-        ('"pin1.' + POSITION % "normal" + '"pin1.' + (DIRECTION % ("perpendicularity", "normal")).replace("0.04", "0.2"), "larger than the position's zone"),
-        ('"pin1.' + POSITION % "normal" + '"pin1.' + (DIRECTION % ("perpendicularity", "normal")).replace("20 mm", "2 mm"), "allows a tilt of 1.15 deg, the position only 0.26 deg"),
-        ('"pin1.' + POSITION % "normal" + '"pin1.' + (DIRECTION % ("angularity", "normal")).replace(" }", ", truncate = false }"), "has parts outside its zone"),
-        ('"pin1.coaxiality" = { zone = "⌀1 mm", over = "1 mm", distribution = "normal" }\n', "selects nothing"),
-        ('"pin*.' + POSITION % "normal" + '[[correlation]]\nbetween = ["pin*.position"]\nrho = 0.5\n', "is a zone: it cannot"),
+        (TURNED + TURNED.replace("perpendicularity", "angularity"), "pin1.tilt_z is set by"),
+        (PLACED + TURNED.replace("0.04", "0.2"), "⌀0.2 mm is larger than the position's zone, ⌀0.1 mm"),
+        (PLACED + TURNED.replace("20 mm", "2 mm"), "allows a tilt of 1.15 deg, the position only 0.26 deg"),
+        (PLACED + TURNED.replace(" }", ", truncate = false }"), "has parts outside its zone"),
+        (PLACED + TURNED.replace("⌀", "").replace(" }", ', about = "t" }'), "is between planes beside a position"),
+        (PLACED.replace("position", "coaxiality"), "selects nothing"),
+        (PLACED.replace("pin1", "pin*") + TIED, "is a zone: it cannot"),
         ('"pin1.position" = "⌀0.1 mm"\n', "is not a tolerance.*over = "),
     ],
-)  # fmt: skip
+)
 def test_zones_that_cannot_be(make: Make, text: str, found: str) -> None:
     with pytest.raises(InputError, match="(?s)" + found):
         make(text, n=10)
@@ -225,3 +232,23 @@ def test_a_pattern_selects_pairs_by_their_underscore_only(make: Make) -> None:
         "input_holes.position",
         "output_holes.position",
     ]
+
+
+@pytest.mark.parametrize("bounded", ["", ", truncate = false"])
+@pytest.mark.parametrize("name", ["pin2", "output_holes"])
+def test_meaning_has_the_deviations_of_the_draws(make: Make, name: str, bounded: str) -> None:
+    place = f'"{name}.position" = {{ zone = "⌀0.3 mm", over = "160 mm", distribution = "normal"{bounded} }}\n'
+    turn = f'"{name}.angularity" = {{ zone = "⌀0.2 mm", over = "120 mm", distribution = "normal"{bounded} }}\n'
+    for entries in ((place,), (turn,), (place, turn)):
+        s = make(*entries)
+        errors = sampling.draw(s)
+        parts = [part for entry in s.entries for site, model in entry.models for part in model.meaning(site)]
+        assert {own.partition("_")[0] for part in parts for own in part.errors} >= {f"{first_of(name)}.tilt"}
+        for part in parts:
+            for column in part.errors:
+                assert _std(errors, column) == pytest.approx(part.sigma, rel=0.03), (entries, column)
+
+
+def first_of(name: str) -> str:
+    """First feature of a pair, or the feature."""
+    return axes.PAIRS.get(name, (name,))[0]

@@ -9,22 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tolstat.cli._app import Workers, announce_compilation, as_text, print_warnings
-from tolstat.common import units
-from tolstat.display import text
-from tolstat.display.table import Column
-from tolstat.display.table import as_text as as_table
 
 if TYPE_CHECKING:
     from tolstat.campaign.plan import Plan
-
-MEANINGS = [
-    Column("tolerance", lambda row: str(row["entry"])),
-    Column("its number", lambda row: str(row["number"])),
-    Column("error", lambda row: str(row["errors"])),
-    Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
-    Column("outside", lambda row: text.percent(math.nan if row["outside"] is None else row["outside"])),
-]
-"""What the entries of [tolerances] mean; `outside` is the share of the parts outside the band or zone."""
 
 
 def plan(
@@ -88,7 +75,17 @@ def _meanings(made: Plan) -> list[str]:
         return []
     import pandas as pd
 
-    return ["", as_table(MEANINGS, pd.DataFrame(made.tolerances))]
+    from tolstat.common import units
+    from tolstat.display import table, text
+
+    columns = [
+        table.Column("tolerance", lambda row: str(row["entry"])),
+        table.Column("its number", lambda row: str(row["number"])),
+        table.Column("error", lambda row: str(row["errors"])),
+        table.Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
+        table.Column("outside", lambda row: text.percent(math.nan if row["outside"] is None else row["outside"])),
+    ]
+    return ["", table.as_text(columns, pd.DataFrame(made.tolerances))]
 
 
 def _rattle_warning(made: Plan) -> list[str]:

@@ -212,7 +212,7 @@ def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def component(name: str, vector: Array) -> Array:
     """Slope in one plane, (n,): its component that a rotation about t or about z changes."""
-    return -vector[1] if name.endswith("_t") else vector[0]
+    return np.asarray(-vector[1] if name.endswith("_t") else vector[0])
 
 
 def of_component(name: str, slope: Array) -> Array:

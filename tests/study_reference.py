@@ -19,9 +19,11 @@ from tolstat.study.schema import files
 from tolstat.study.schema.parts import of_model
 from tolstat.study.selection import TOLERANCED
 from tolstat.study.tolerances.entry import Banded
-from tolstat.study.tolerances.kinds import kinds_of
+from tolstat.study.tolerances.fits import FitEntry
+from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
 
 BAND = tuple(Banded.model_fields)
+ZONES = tuple(key for key in ZONE_KINDS if key != "offset_radial")
 BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 
 
@@ -67,11 +69,13 @@ def kind(own: Mapping[str, Any]) -> str:
 def toml(value: Any) -> str:
     """Value as TOML writes it."""
     if isinstance(value, Mapping):
-        inner = (f"{k if k.isidentifier() else json.dumps(k)} = {toml(v)}" for k, v in value.items())
+        inner = (
+            f"{k if k.isidentifier() else json.dumps(k, ensure_ascii=False)} = {toml(v)}" for k, v in value.items()
+        )
         return "{ " + ", ".join(inner) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(map(toml, value)) + "]"
-    return json.dumps(value)
+    return json.dumps(value, ensure_ascii=False)
 
 
 def model_table(model: Any) -> str:
@@ -110,6 +114,8 @@ def distributions() -> Iterator[str]:
     """Entries of [tolerances], one after another."""
     of: dict[str, tuple[Any, list[str]]] = {}
     for name in TOLERANCED:
+        if name.partition(".")[2] in ZONES:
+            continue
         for word, model in kinds_of(name).items():
             of.setdefault(word, (model, []))[1].append(name)
     for word, (model, names) in of.items():
@@ -121,6 +127,13 @@ def distributions() -> Iterator[str]:
             text += f" For {', '.join(f'`{key}`' for key in dict.fromkeys(n.partition('.')[2] for n in names))} only."
         text += f" Band: {', '.join(band)}." if band else ""
         yield text + (f"\n\n{key_table(own, made['required'])}" if own else "")
+
+
+def zones() -> str:
+    """Table of the keys of all zones."""
+    made = [of_model(model) for key in ZONES for model in dict.fromkeys(ZONE_KINDS[key].values())]
+    own = {key: value for part in made for key, value in part["properties"].items()}
+    return key_table(own, made[0]["required"])
 
 
 def errors() -> str:
@@ -170,7 +183,7 @@ def tables() -> dict[str, str]:
         if "patternProperties" not in section.schema()
     }
     found = {name: key_table(made["properties"], made.get("required", ())) for name, made in with_keys.items()}
-    entries = {"sweep": SweepEntry, "range": Range, "line": LineEntry, "cost": CostEntry}
+    entries = {"sweep": SweepEntry, "range": Range, "line": LineEntry, "cost": CostEntry, "fit": FitEntry}
     return (
         found
         | {name: model_table(model) for name, model in entries.items()}
@@ -179,6 +192,7 @@ def tables() -> dict[str, str]:
             "joint file": "\n\n".join(joint_tables()),
             "band": key_table(of_model(Banded)["properties"]),
             "distributions": "\n\n".join(distributions()),
+            "zones": zones(),
             "error names": errors(),
             "loads": loads(),
             "result names": results(),

@@ -17,11 +17,12 @@ from scipy.special import ndtr, ndtri
 from tolstat.common import draw_records
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import nominal_errors
-from tolstat.study import Study
+from tolstat.study import Study, axes
 from tolstat.study.design import Design, sobol
 from tolstat.study.model import SweepAxis
 from tolstat.study.proposal import component, weights
-from tolstat.study.selection import columns_of
+from tolstat.study.tolerances.distributions import score
+from tolstat.study.tolerances.radial import plane_scores
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]
@@ -95,7 +96,7 @@ def _origin(study: Study, rows: range) -> Table:
     table["component"] = -1  # the nominal joint
     numbers = study.sampling.samples(rows)
     drawn = table[len(rows) - len(numbers) :]
-    scores, drawn["component"] = _proposed(study, columns(study), numbers)
+    scores, drawn["component"] = _proposed(study, streams(study), numbers)
     drawn["weight"] = weights(study.proposals, scores)
     return table
 
@@ -106,15 +107,15 @@ def scores(study: Study, numbers: range) -> Array:
     Returns
     -------
     ndarray, (len(numbers), d)
-        One column for each of the d `columns`.
+        One column for each of the d `streams`.
     """
-    return np.column_stack([ndtri(u) for u in _uniforms(columns(study), numbers, study).values()])
+    return np.column_stack([ndtri(u) for u in _uniforms(streams(study), numbers, study).values()])
 
 
 def noise(study: Study, level: int, first: int, count: int) -> Array:
     """Independent standard normal numbers of a level of a subset simulation, from number `first` on, (count, d)."""
-    streams = (_stream(study.sampling.seed, f"subset {level} {name}", first) for name in columns(study))
-    return np.column_stack([ndtri(np.maximum(stream.random(count), 2.0**-54)) for stream in streams])
+    own = (_stream(study.sampling.seed, f"subset {level} {name}", first) for name in streams(study))
+    return np.column_stack([ndtri(np.maximum(stream.random(count), 2.0**-54)) for stream in own])
 
 
 def from_scores(study: Study, scores: Array) -> Table:
@@ -125,7 +126,7 @@ def from_scores(study: Study, scores: Array) -> Table:
     study : Study
         Its tolerances, correlation and fixed errors are applied.
     scores : ndarray, (n, d)
-        Standard normal scores, one column for each of `columns`, as the function `scores` returns them.
+        Standard normal scores, one column for each of `streams`, as the function `scores` returns them.
 
     Returns
     -------
@@ -134,19 +135,70 @@ def from_scores(study: Study, scores: Array) -> Table:
     table = nominal_errors(len(scores), study.operation)
     for name, value in study.errors.items():
         table[name] = value
-    _fill_from(table, study, {name: _probability(z) for name, z in zip(columns(study), scores.T, strict=True)})
+    _fill_from(table, study, {name: _probability(z) for name, z in zip(streams(study), scores.T, strict=True)})
     return table
 
 
-def values(errors: Table, name: str) -> Array:
-    """Values that were drawn from the distribution of an error, (n,), SI: for ``pin1.offset_radial`` the radii."""
-    own = columns_of(name)
-    return np.asarray(errors[name] if len(own) == 1 else np.hypot(*(errors[column] for column in own)))
+def values(study: Study, errors: Table, name: str) -> Array:
+    """Values that were drawn from the distribution of a quantity.
+
+    Parameters
+    ----------
+    study : Study
+        Its axes tell how errors follow from what is drawn.
+    errors : ndarray, shape (n,), dtype ERROR
+        Errors of joints, with the columns of the quantity at least.
+    name : str
+        A quantity of the study.
+
+    Returns
+    -------
+    ndarray, (n,)
+        SI; of a vector the radius.
+    """
+    if not axes.is_zone(name):
+        return np.asarray(errors[name])
+    vector = _vector(study, errors, name)
+    return axes.component(name, vector) if axes.is_component(name) else np.asarray(np.hypot(*vector))
+
+
+def components(study: Study, errors: Table) -> dict[str, Array]:
+    """Independent numbers from which the errors of joints follow: what load statistics are told against.
+
+    Returns
+    -------
+    dict of str to ndarray, (n,)
+        Of each quantity its `values`; of a vector its two `plane_scores`, named ``pin1.position_inner_t``, ``..._z``.
+    """
+    found: dict[str, Array] = {}
+    for name, distribution in study.tolerances.items():
+        if axes.is_zone(name) and not axes.is_component(name):
+            both = plane_scores(distribution, _vector(study, errors, name))
+            found |= {f"{name}_{along}": part for along, part in zip("tz", both, strict=True)}
+        else:
+            found[name] = values(study, errors, name)
+    return found
+
+
+def normal_scores(study: Study, errors: Table) -> dict[str, Array]:
+    """Return the standard normal scores of the `components` of joints, (n,) each."""
+    scored = ((name, own, study.tolerances.get(name)) for name, own in components(study, errors).items())
+    return {name: own if distribution is None else score(distribution, own) for name, own, distribution in scored}
+
+
+def _vector(study: Study, errors: Table, name: str) -> Array:
+    feature, _, key = name.partition(".")
+    return study.axes[feature].vector(errors, key)
 
 
 def columns(study: Study) -> list[str]:
-    """Names of the columns of the table ERROR that scatter."""
-    return list(dict.fromkeys(column for name in study.tolerances for column in columns_of(name)))
+    """Names of the columns of the table ERROR that what is drawn follows from."""
+    return list(dict.fromkeys(column for name in study.tolerances for column in axes.columns_of(name)))
+
+
+def streams(study: Study) -> list[str]:
+    """Names of the random streams of a study: one for each dimension, named after columns of the table ERROR."""
+    return list(dict.fromkeys(stream for name in study.tolerances for stream in axes.streams_of(name)))
 
 
 def dimensions() -> dict[str, int]:
@@ -182,18 +234,18 @@ def _fill_frozen(samples: Table, study: Study, numbers: range) -> None:
     """Set the joints of each point: A, B, and for each group a copy of A with the errors of that group taken from B."""
     size = len(study.groups) + 2
     points = range(numbers.start // size, -(-numbers.stop // size))
-    a, b = np.zeros(len(points), samples.dtype), np.zeros(len(points), samples.dtype)
-    _fill_scatter(a, study, points)
-    _fill_scatter(b, study, points, " B")
     point, part = np.divmod(np.arange(numbers.start, numbers.stop), size)
+    a, b = (_uniforms(streams(study), points, study, which) for which in ("", " B"))
+    u = {}
     for number, group in enumerate(study.groups, start=2):
-        of_b = (part == 1) | (part == number)
-        for column in (column for name in group.names for column in columns_of(name)):
-            samples[column] = np.where(of_b, b[column][point - points.start], a[column][point - points.start])
+        of_b, own = (part == 1) | (part == number), point - points.start
+        for stream in (stream for name in group.names for stream in axes.streams_of(name)):
+            u[stream] = np.where(of_b, b[stream][own], a[stream][own])
+    _fill_from(samples, study, u)
 
 
-def _fill_scatter(samples: Table, study: Study, numbers: range, stream: str = "") -> None:
-    u = _uniforms(columns(study), numbers, study, stream)
+def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
+    u = _uniforms(streams(study), numbers, study)
     if study.proposals:
         scores, part = _proposed(study, list(u), numbers)
         u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
@@ -206,13 +258,23 @@ def _fill_from(samples: Table, study: Study, u: dict[str, Array]) -> None:
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))
         u |= {name: correlated[:, i] for i, name in enumerate(names)}
+    vectors: dict[str, dict[str, Array]] = {}
     for name, distribution in study.tolerances.items():
-        if name.endswith(".offset_radial"):
-            t, z = columns_of(name)
-            radius, direction = distribution.ppf(u[t]), 2 * np.pi * u[z]
-            samples[t], samples[z] = radius * np.cos(direction), radius * np.sin(direction)
-        else:
+        if not axes.is_zone(name):
             samples[name] = distribution.ppf(u[name])
+            continue
+        own = axes.streams_of(name)
+        drawn = distribution.ppf(u[own[0]])
+        feature, _, key = name.partition(".")
+        vectors.setdefault(feature, {})[key] = (
+            axes.of_component(name, drawn) if len(own) == 1 else _in_direction(drawn, 2 * np.pi * u[own[1]])
+        )
+    for feature, parts in vectors.items():
+        study.axes[feature].fill(samples, parts)
+
+
+def _in_direction(radius: Array, direction: Array) -> Array:
+    return np.array([radius * np.cos(direction), radius * np.sin(direction)])
 
 
 def _uniforms(names: Sequence[str], numbers: range, study: Study, stream: str = "") -> dict[str, Array]:

@@ -215,6 +215,22 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
     assert large.widths[0.1] == pytest.approx(2 * 1.96 * np.sqrt(0.09 / 1e6), rel=0.01)
 
 
+def test_a_plan_counts_joints_that_do_not_go_together(tmp_path: Path, small: study.Study) -> None:
+    assert plan.plan(small, pilot=2).assembly == plan.Assembly(0, 60, exceedance.clopper_pearson(0, 60))
+    head, tail = synthetic.STUDY.split("[tolerances]")[0], '[sampling]\nmethod = "random"\nn = 30000\nseed = 1\n'
+    entry = '"pin*.diameter" = { lower = "0.1 mm", upper = "0.3 mm", distribution = "uniform" }\n'
+    loaded = study.load(tmp_path / "tight.toml", text=f"{head}[tolerances]\n{entry}{tail}")
+    found = plan._assembly(loaded, iid=True)
+    assert found.of == plan.DRAWN
+    assert found.interval[0] < 1 - 0.5**4 < found.interval[1]  # one pin in two is larger than the hole, 0.2 mm wider
+    assert found.interval == exceedance.clopper_pearson(found.misfits, found.of)
+    (tmp_path / "few.toml").write_text(loaded.text.replace("30000", "12"), encoding="utf-8")
+    done = CliRunner().invoke(cli.app, ["plan", str(tmp_path / "few.toml"), "--pilot", "2"])
+    assert "of 12 joints have a pin larger than its hole and cannot be simulated; 95 % interval" in done.stdout
+    done = CliRunner().invoke(cli.app, ["plan", str(tmp_path / "few.toml"), "--pilot", "2", "--json"])
+    assert json.loads(done.stdout)["assembly"]["of"] == 12
+
+
 VARIANTS = (
     HEAD
     + """[solver]

@@ -119,7 +119,7 @@ def test_search_finds_the_optimum_of_a_problem_with_a_known_one():
 def test_mean_square_is_of_the_scaled_distribution_where_the_mean_is_not_in_the_middle(tmp_path):
     mean = '"pin*.offset_t" = { lower = "-0.1 mm", upper = "0.2 mm", mean = "0.02 mm", distribution = "normal" }\n#'
     plan = load(tmp_path, synthetic.STUDY.replace('"pin*.offset_t" =', mean))
-    ratios = DensityRatios(scaling.tolerances(plan), sampling.draw(plan))
+    ratios = DensityRatios(plan, scaling.tolerances(plan), sampling.draw(plan))
     # the band from -0.115 to 0.215 mm has its nearer end 0.135 mm from the mean in place of 0.12 mm
     ratio = 0.135 / 0.12
     found = ratios.log_mean_square(np.array([1.1]))

@@ -23,11 +23,11 @@ from tolstat.study.tolerances.distributions import (
     LogNormal,
     Measured,
     Normal,
-    Rayleigh,
     Triangular,
     TruncatedNormal,
     Uniform,
 )
+from tolstat.study.tolerances.radial import Rayleigh
 
 SEEDS = 600
 LEVEL, NARROW = 2.0, 0.8

@@ -14,11 +14,11 @@ from tolstat.study.tolerances.distributions import (
     LogNormal,
     Measured,
     Normal,
-    Rayleigh,
     Triangular,
     TruncatedNormal,
     Uniform,
 )
+from tolstat.study.tolerances.radial import Rayleigh
 
 
 class Laplace(Distribution):

@@ -21,7 +21,8 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.study import Study, load_case
 from tolstat.study import file as study_file
 from tolstat.study.model import Solver
-from tolstat.study.tolerances.distributions import Normal, Rayleigh
+from tolstat.study.tolerances.distributions import Normal
+from tolstat.study.tolerances.radial import Rayleigh
 
 STUDIES = ROOT / "studies"
 

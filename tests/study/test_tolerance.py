@@ -16,7 +16,8 @@ from tolstat.common.files import data_dir
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
-from tolstat.study.tolerances.kinds import KINDS, RADIAL_KINDS, distribution
+from tolstat.study.tolerances.kinds import KINDS, ZONE_KINDS, entry
+from tolstat.study.tolerances.radial import Disc, Rayleigh
 
 ISO = data_dir() / "iso2768.csv"
 U = np.concatenate([10.0 ** np.arange(-15, -2), np.linspace(0.01, 0.99, 99), 1 - 10.0 ** np.arange(-3.0, -16, -1)])
@@ -27,12 +28,13 @@ cpks = st.floats(0.3, 3.0)
 
 
 def build(data: dict[str, object], name: str = "pin1.offset_t", center: float = 0.0, unit: str = "m") -> Distribution:
-    return distribution(data, Site(name, unit, center, Path()), "study.toml", ("tolerances", name))
+    site = Site(name, unit, center, Path())
+    return entry(data, site, "study.toml", ("tolerances", name)).quantities(site)[name]
 
 
 def faults(data: object, name: str = "pin1.offset_t", folder: Path | None = None) -> str:
     with pytest.raises(InputError) as caught:
-        distribution(data, Site(name, "m", 0.0, folder or Path()), "study.toml", ("tolerances", name))
+        entry(data, Site(name, "m", 0.0, folder or Path()), "study.toml", ("tolerances", name))
     return str(caught.value)
 
 
@@ -46,8 +48,9 @@ def each_kind(lower: float, upper: float, share: float) -> list[Distribution]:
         distributions.Triangular(lower, upper, middle),
         distributions.LogNormal(lower, distributions.Normal(math.log(middle - lower), 0.3)),
         distributions.Beta(0.5 + 3 * share, 2.0, lower, upper),
-        distributions.Rayleigh(sigma),
-        distributions.Rayleigh(sigma, 2 * sigma),
+        Rayleigh(sigma),
+        Rayleigh(sigma, 2 * sigma),
+        Disc(upper - lower),
         distributions.Measured.of([lower, middle, upper, middle]),
     ]
 
@@ -101,7 +104,7 @@ def test_cpk_is_reproduced_on_any_band(band: tuple[float, float], share: float, 
         (distributions.Triangular(-1.0, 3.0, 3.0), stats.triang(1.0, -1.0, 4.0)),
         (distributions.LogNormal(-1.0, distributions.Normal(0.2, 0.4)), stats.lognorm(0.4, -1.0, math.exp(0.2))),
         (distributions.Beta(2.0, 5.0, -1.0, 3.0), stats.beta(2.0, 5.0, -1.0, 4.0)),
-        (distributions.Rayleigh(2.0), stats.rayleigh(scale=2.0)),
+        (Rayleigh(2.0), stats.rayleigh(scale=2.0)),
     ],
 )
 def test_ppf_inverts_scipys_distribution_function(dist: Distribution, scipy_dist: stats.rv_continuous) -> None:
@@ -119,7 +122,7 @@ def test_truncated_tails_are_as_exact_above_as_below() -> None:
 
 
 def test_truncated_rayleigh_ends_at_its_radius() -> None:
-    dist = distributions.Rayleigh(1.0, 2.0)
+    dist = Rayleigh(1.0, 2.0)
     assert dist.ppf(np.array([1 - 1e-16]))[0] == pytest.approx(2.0)
     half = dist.ppf(np.array([0.5]))[0]
     assert stats.rayleigh.cdf(half) == pytest.approx(0.5 * stats.rayleigh.cdf(2.0), rel=1e-12)
@@ -182,9 +185,9 @@ def test_other_entries() -> None:
         2, 3, pytest.approx(-1e-3), pytest.approx(1e-3)
     )
     radial = build({"plus_minus": "0.3 mm", "cpk": 2.0, "distribution": "rayleigh"}, "pin1.offset_radial")
-    assert radial == distributions.Rayleigh(pytest.approx(5e-5))
+    assert radial == Rayleigh(pytest.approx(5e-5))
     radial = build({"sigma": "0.3 mm", "distribution": "rayleigh"}, "pin1.offset_radial")
-    assert radial == distributions.Rayleigh(pytest.approx(3e-4))
+    assert radial == Rayleigh(pytest.approx(3e-4))
 
 
 def test_lognormal_entries_have_the_moments_and_limits_asked_for() -> None:
@@ -203,18 +206,18 @@ def test_lognormal_entries_have_the_moments_and_limits_asked_for() -> None:
 
 def test_measured_entry_reads_a_column(tmp_path: Path) -> None:
     (tmp_path / "parts.csv").write_text("# station 3\npart,dev\nA,-10\nB,5\nC,15\n", encoding="utf-8")
-    entry = {"distribution": "measured", "file": "parts.csv", "column": "dev", "unit": "um"}
+    parts = {"distribution": "measured", "file": "parts.csv", "column": "dev", "unit": "um"}
     site = Site("pin1.offset_t", "m", 0.0, tmp_path)
-    dist = distribution(entry, site, "study.toml", ("tolerances",))
+    dist = entry(parts, site, "study.toml", ("tolerances",)).quantities(site)[site.name]
     np.testing.assert_allclose(dist.ppf(np.array([0.1, 0.5, 0.9])), [-1e-5, 5e-6, 1.5e-5], rtol=1e-12)
-    assert "no column 'dv'" in faults(entry | {"column": "dv"}, folder=tmp_path)
-    assert "did you mean 'dev'" in faults(entry | {"column": "dv"}, folder=tmp_path)
-    assert "cannot be read" in faults(entry | {"file": "nowhere.csv"}, folder=tmp_path)
-    assert "'1 deg' cannot be a value in m" in faults(entry | {"unit": "deg"}, folder=tmp_path)
+    assert "no column 'dv'" in faults(parts | {"column": "dv"}, folder=tmp_path)
+    assert "did you mean 'dev'" in faults(parts | {"column": "dv"}, folder=tmp_path)
+    assert "cannot be read" in faults(parts | {"file": "nowhere.csv"}, folder=tmp_path)
+    assert "'1 deg' cannot be a value in m" in faults(parts | {"unit": "deg"}, folder=tmp_path)
     (tmp_path / "parts.csv").write_text("dev\n1\nnan\n", encoding="utf-8")
-    assert "row 2 of 'dev' is 'nan'" in faults(entry, folder=tmp_path)
+    assert "row 2 of 'dev' is 'nan'" in faults(parts, folder=tmp_path)
     (tmp_path / "parts.csv").write_text("dev\n1\n", encoding="utf-8")
-    assert "at least two" in faults(entry, folder=tmp_path)
+    assert "at least two" in faults(parts, folder=tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -261,11 +264,11 @@ def test_faults_of_entries(entry: object, found: str) -> None:
 
 
 def test_every_kind_is_reachable_and_describes_itself() -> None:
-    assert set(KINDS) | set(RADIAL_KINDS) == {
+    assert set(KINDS) | {kind for kinds in ZONE_KINDS.values() for kind in kinds} == {
         *("normal", "uniform", "triangular", "lognormal", "beta", "rayleigh", "measured"),
     }
     kinds = [dist.describe()["distribution"] for dist in each_kind(0.0, 1.0, 0.5)]
     assert kinds == [
         *("normal", "truncatednormal", "uniform", "triangular", "lognormal", "beta"),
-        *("rayleigh", "rayleigh", "measured"),
+        *("rayleigh", "rayleigh", "disc", "measured"),
     ]

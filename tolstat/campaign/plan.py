@@ -16,14 +16,15 @@ from tolstat.campaign.executors import available_workers
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation
+from tolstat.display import text
 from tolstat.joint import ideal, perturb
-from tolstat.sampling import dimensions, draw, origin_blocks
+from tolstat.sampling import dimensions, draw, origin_blocks, streams
 from tolstat.solver import refinement
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store.histories import attach_scales, create_dataset
 from tolstat.store.recorded import perturbed, settings, variants
 from tolstat.store.result_file import attributes, fill
-from tolstat.study.selection import columns_of
+from tolstat.study.tolerances import meaning
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -36,6 +37,8 @@ QUANTILES = (0.95, 0.99, 0.999)
 ORDINARY = 680.0
 """Work of a joint that does not rattle, from `studies/iso2768_f.toml` with the default settings, Newton iterations."""
 CONFIDENCE = 0.95
+DRAWN = 1 << 14
+"""Largest number of joints whose clearances are computed."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,23 @@ class Reversals:
 
 
 @dataclass(frozen=True)
+class Assembly:
+    """Joints that do not go together, because a pin is larger than its hole: they have no result.
+
+    Attributes
+    ----------
+    misfits, of : int
+        Number of such joints, and of joints whose clearances were computed: the first `DRAWN` of the campaign.
+    interval : tuple of float, optional
+        Clopper-Pearson interval of their share; None if samples are not independent.
+    """
+
+    misfits: int
+    of: int
+    interval: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
 class Plan:
     """Predicted cost and precision of a campaign.
 
@@ -91,7 +111,7 @@ class Plan:
     rows : int
         Number of joints, including the nominal joint.
     dimensions : int
-        Number of errors that scatter; a radial error counts as two.
+        Number of errors that scatter; a vector of a zone counts as two.
     pilot : int
         Number of joints simulated for this plan.
     failed, unsettled : int
@@ -114,6 +134,12 @@ class Plan:
         Predictions for the study's limits; empty if samples are not independent.
     reversals : Reversals
         Joints that rattle.
+    assembly : Assembly
+        Joints that do not go together.
+    fit : list of str
+        What the fit of the study means, as lines of text; empty without one.
+    tolerances : list of dict
+        What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
     wilks : dict of float to int
         Minimum number of joints for a one-sided bound, by quantile.
     """
@@ -133,6 +159,9 @@ class Plan:
     limits: list[LimitPlan]
     wilks: dict[float, int]
     reversals: Reversals
+    assembly: Assembly
+    fit: list[str]
+    tolerances: list[dict[str, Any]]
 
 
 def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
@@ -164,7 +193,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
     status = simulation.results["status"]
     return Plan(
         rows=study.rows,
-        dimensions=len({column for name in study.tolerances for column in columns_of(name)}),
+        dimensions=len(streams(study)),
         pilot=len(rows),
         failed=int(np.isin(status, FAILED).sum()),
         unsettled=int(np.isin(status, UNSETTLED).sum()),
@@ -178,7 +207,18 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
         limits=_limits(study, simulation.results[valid]) if iid else [],
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(params, simulation.results),
+        assembly=_assembly(study, iid),
+        fit=[] if study.fit is None else study.fit.meaning,
+        tolerances=text.records(meaning.table(study.entries)),
     )
+
+
+def _assembly(study: Study, iid: bool) -> Assembly:
+    rows = np.arange(study.first_sample, min(study.rows, study.first_sample + DRAWN))
+    errors = draw(study, range(rows[0], rows[-1] + 1))
+    misfits = int((perturbed(study, rows, errors, perturb)["clearance"] < 0.0).any(axis=1).sum())
+    lower, upper = exceedance.clopper_pearson(misfits, rows.size, CONFIDENCE)
+    return Assembly(misfits, rows.size, (float(lower), float(upper)) if iid else None)
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,8 +28,9 @@ def plan(
     """Predict time, memory and precision of a campaign.
 
     Simulates a few joints (pilot) and writes nothing. Prints time, memory and file size of the campaign, the width of
-    the 95 % interval of exceedances and of each limit's exceedance, and the number of joints that a 95 % bound of a
-    quantile needs.
+    the 95 % interval of exceedances and of each limit's exceedance, the number of joints that a 95 % bound of a
+    quantile needs, and what each entry of [tolerances] means: half width, radius or diameter, standard deviation of the
+    error, share of the parts outside.
 
     Example: tolstat plan studies/iso2768_f.toml
     """
@@ -51,10 +53,12 @@ def _lines(made: Plan) -> str:
         f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
         *([made.fidelity] if made.fidelity else []),
         *_rattle_warning(made),
+        *_misfit_warning(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
         f"time: {_duration(made.seconds)} on {made.workers} cores",
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",
+        *made.fit,
     ]
     lines += [f"width of the 95 % interval at P = {share:g}: {width:.2g}" for share, width in made.widths.items()]
     lines += [
@@ -62,7 +66,26 @@ def _lines(made: Plan) -> str:
         for limit in made.limits
     ]
     lines += [f"joints for a 95 % bound of the {100 * q:g} % quantile: {n}" for q, n in made.wilks.items()]
-    return "\n".join(lines)
+    return "\n".join(lines + _meanings(made))
+
+
+def _meanings(made: Plan) -> list[str]:
+    """Table of what each entry of [tolerances] means."""
+    if not made.tolerances:
+        return []
+    import pandas as pd
+
+    from tolstat.common import units
+    from tolstat.display import table, text
+
+    columns = [
+        table.Column("tolerance", lambda row: str(row["entry"])),
+        table.Column("its number", lambda row: str(row["number"])),
+        table.Column("error", lambda row: str(row["errors"])),
+        table.Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
+        table.Column("outside", lambda row: text.percent(math.nan if row["outside"] is None else row["outside"])),
+    ]
+    return ["", table.as_text(columns, pd.DataFrame(made.tolerances))]
 
 
 def _rattle_warning(made: Plan) -> list[str]:
@@ -72,6 +95,18 @@ def _rattle_warning(made: Plan) -> list[str]:
         return []
     reason = f"warning: the torque reverses in {found.joints} of {made.pilot} joints: inertia torque up to"
     return [f"{reason} {found.torque:.3g} N*m; these joints rattle and cost {found.cost:.2g} times as much as others"]
+
+
+def _misfit_warning(made: Plan) -> list[str]:
+    """Warning about joints that do not go together, if there are any."""
+    found = made.assembly
+    if not found.misfits:
+        return []
+    reason = "have a pin larger than its hole and cannot be simulated"
+    share = ""
+    if found.interval is not None:
+        share = "; 95 % interval of their share {:.2g} to {:.2g} %".format(*(100.0 * end for end in found.interval))
+    return [f"warning: {found.misfits} of {found.of} joints {reason}{share}"]
 
 
 def _duration(seconds: float) -> str:

@@ -51,6 +51,12 @@ DISPLAY_UNITS = {
 """Unit in which figures show errors of each SI unit, and the factor to it."""
 
 
+def shown(value: float, unit: str, digits: int = 3) -> str:
+    """Text of an SI value for people: ``shown(1e-4, "m")`` is ``"0.1 mm"``."""
+    name, factor = DISPLAY_UNITS.get(unit, (unit, 1.0))
+    return f"{factor * value:.{digits}g} {name}".rstrip()
+
+
 @cache
 def registry() -> pint.UnitRegistry[float]:
     """Return the only unit registry (created on first use, which takes some 0.3 s)."""

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import did_you_mean
 from tolstat.study import selection
-from tolstat.study.file import nominal_value
 from tolstat.study.study import Study
+from tolstat.study.tolerances import kinds, zones
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import Site
-from tolstat.study.tolerances.kinds import distribution
+from tolstat.study.tolerances.entry import Site, ToleranceEntry
 
 REPLACED_KEYS = {
     **dict.fromkeys(("plus_minus",), ("lower", "upper", "iso2768", "nominal")),
@@ -57,46 +56,64 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
         With every fault of the settings.
     """
     faults: list[Fault] = []
-    entries = _entries(study)
+    sites = {site.name: (site, dict(entry.keys)) for entry in study.entries for site, _ in entry.models}
+    entries = {name: keys for name, (_, keys) in sites.items()}
     touched: dict[str, str] = {}
     for text in settings:
         with gather(faults):
             setting = _parse(text)
-            names = selection.select(setting.pattern, study.tolerances)
+            names = selection.select(setting.pattern, entries)
             if not names:
-                remedy = did_you_mean(setting.pattern, list(study.tolerances))
+                remedy = did_you_mean(setting.pattern, list(entries))
                 raise InputError([Fault(f"--set {text!r}", "selects no error that has a tolerance", remedy)])
             for name in names:
                 kept = {k: v for k, v in entries[name].items() if k not in REPLACED_KEYS.get(setting.key, ())}
                 entries[name] = kept | {setting.key: setting.value}
                 touched[name] = text
     found = dict(study.tolerances)
-    units = selection.UNITS | selection.RADIAL_UNITS
     reported: set[tuple[str, ...]] = set()
+    read: dict[str, tuple[Site, ToleranceEntry]] = {}
     for name, text in touched.items():
-        center = nominal_value(name, study.operation)
-        assert center is not None
-        site = Site(name, units[name], center, study.path.parent)
+        site, place = sites[name][0], f"--set {text!r}"
         try:
-            found[name] = distribution(entries[name], site, f"--set {text!r}", ("tolerances", name))
+            _check_bonus(study, name, place)
+            read[name] = site, kinds.entry(entries[name], site, place, ("tolerances", name))
+            _check_zone(study, site, read[name][1], place)
+            found |= read[name][1].quantities(site)
         except InputError as error:
             key = (text, *(fault.found for fault in error.faults))
             if key not in reported:  # report a fault once for all errors of a pattern
                 faults.extend(error.faults)
             reported.add(key)
+    if not faults:
+        new = [e._replace(models=tuple(read.get(m[0].name, m) for m in e.models)) for e in study.entries]
+        zones.axes_of(new, study.joint.cross.R, "--set")
     if faults:
         raise InputError(faults)
     return found
 
 
-def _entries(study: Study) -> dict[str, dict[str, Any]]:
-    """Entry of each error that scatters, from the study's text."""
-    table = tomllib.loads(study.text).get("tolerances", {})
-    found: dict[str, dict[str, Any]] = {}
-    for entry in selection.entries(table, "tolerances"):
-        if isinstance(entry.value, Mapping):
-            found |= {name: dict(entry.value) for name in selection.select(entry.pattern, study.tolerances)}
-    return found
+def _check_bonus(study: Study, name: str, place: str) -> None:
+    """Refuse changes of a position with a bonus and of its diameter: they move what a part's zone is."""
+    if study.has_bonus(name):
+        found = "a position with a bonus by maximum material cannot be changed, nor its diameter"
+        raise InputError([Fault(place, found, "run a study of its own")])
+
+
+def _check_zone(study: Study, site: Site, new: ToleranceEntry, place: str) -> None:
+    """Refuse changes of a zone for which the density of the errors is no function of radius and direction alone."""
+    if not isinstance(new, zones.ZoneEntry):
+        return
+    old: Any = next(model for entry in study.entries for one, model in entry.models if one.name == site.name)
+    changed_length = site.name.endswith(".position") and new.over != old.over
+    if changed_length or new.quantities(site).keys() != old.quantities(site).keys():
+        found = f"{site.name} gets another shape, not another size"
+        raise InputError(
+            [Fault(place, found, "change zone, cp, truncate or distribution only, or run a study of its own")]
+        )
+    if site.shared and isinstance(new, zones.PositionEntry) and new.build() != old.build():
+        found = f"{site.name} cannot be changed: the axis has a zone of direction, too, which shares its room"
+        raise InputError([Fault(place, found, "run a study of its own")])
 
 
 def _parse(text: str) -> _Setting:

@@ -14,15 +14,18 @@ from tolstat.common.loads import LOADS, UNIT_OF_LOAD
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
+from tolstat.joint.model import merged
 from tolstat.study import fatigue, listing, proposal, selection
+from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
+from tolstat.study.tolerances import fits, reading
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
-from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
-from tolstat.study.tolerances.kinds import distribution
+from tolstat.study.tolerances.fits import Fit
+from tolstat.study.tolerances.reading import Nominal, Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
 
@@ -67,6 +70,7 @@ class StudyFile:
         self._faults: list[Fault] = []
         self._claims = Assignments(self.place)
         self._toleranced: dict[str, str] = {}
+        self._accepted: set[str] = set()
         allowed = list(sections)
         for key in self.data:
             if key not in allowed:
@@ -102,8 +106,14 @@ class StudyFile:
             return strict.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
         return None
 
-    def joint(self) -> Joint | None:
-        """``[joint]``: a joint file by name or path, and keys that replace some of its own."""
+    def fit(self) -> Fit | None:
+        """``tolerances.fit``: the fit of all pins in their holes."""
+        with gather(self._faults):
+            return fits.read(self.data.get("tolerances"), self.place)
+        return None
+
+    def joint(self, fit: Fit | None = None) -> Joint | None:
+        """``[joint]``: a joint file by name or path, and keys that replace some of its own; diameters by the fit."""
         table = self._table("joint")
         base = table.get("base")
         if base is None:
@@ -112,9 +122,19 @@ class StudyFile:
             self._fault(("joint", "base"), f"{base!r} is not a text", "give a name in data/joints or a path")
         else:
             overrides = {key: value for key, value in table.items() if key != "base"}
+            if fit is not None:
+                overrides = merged(overrides, {"contact": self._diameters(fit, overrides)})
             with gather(self._faults):
                 return joint.load(base, overrides, self.place, self.path.parent)
         return None
+
+    def _diameters(self, fit: Fit, overrides: Mapping[str, Any]) -> dict[str, str]:
+        """Nominal diameters of the fit; note diameters that the study sets beside it."""
+        own = overrides.get("contact")
+        for key in fit.diameters:
+            if isinstance(own, Mapping) and key in own:
+                self._fault(("joint", "contact", key), "is set by tolerances.fit already", "remove one of the two")
+        return fit.diameters
 
     def errors(self) -> dict[str, float]:
         """``[errors]``: the errors that every joint has."""
@@ -122,21 +142,23 @@ class StudyFile:
             return selection.fixed_errors(self._table("errors"), ("errors",), self.place, self._claims)
         return {}
 
-    def tolerances(self, operation: Operation | None) -> dict[str, Distribution]:
-        """``[tolerances]``: how each error scatters."""
-        scatter: dict[str, Distribution] = {}
-        for entry in self._entries("tolerances"):
+    def tolerances(self, joint: Joint | None, operation: Operation | None, fit: Fit | None) -> Tolerances:
+        """``[tolerances]``: how errors scatter."""
+        written = []
+        for entry in fits.entries(self._table("tolerances"), fit):
             with gather(self._faults):
                 selected = selection.resolve(entry, TOLERANCED, self.place)
                 with gather(self._faults):
                     self._claims.claim(entry, selected)
                 self._toleranced |= {name: TOLERANCED[name] for name in selected}
-                for name in selected:
-                    center = nominal_value(name, operation)
-                    if center is not None:
-                        site = Site(name, self._toleranced[name], center, self.path.parent)
-                        scatter[name] = distribution(entry.value, site, self.place, entry.path)
-        return scatter
+                written.append((entry, selected))
+        found = reading.read(written, Nominal(joint, operation, self.path.parent), self.place, self._faults)
+        self._accepted = {bonus.diameter for bonus in found.rejecting}
+        drawn: dict[str, list[str]] = {}
+        for quantity in found.distributions:
+            drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)
+        self._toleranced = {q: unit for name, unit in self._toleranced.items() for q in drawn.get(name, [name])}
+        return found
 
     def correlation(self) -> Copula:
         """``[[correlation]]``: correlation of errors with a tolerance; call `tolerances` first."""
@@ -144,7 +166,12 @@ class StudyFile:
         entries = self._list("correlation", Correlation)
         if len(self._faults) == before:
             with gather(self._faults):
-                return assemble(entries, self._toleranced, self.place)
+                copula = assemble(entries, self._toleranced, self.place)
+                for name in sorted(self._accepted & set(copula.names)):
+                    remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
+                    found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
+                    self._fault(("correlation",), found, remedy)
+                return copula
         return Copula()
 
     def proposals(self) -> tuple[Proposal, ...]:
@@ -282,10 +309,3 @@ class StudyFile:
 
     def _fault(self, path: tuple[int | str, ...], found: str, remedy: str) -> None:
         self._faults.append(Fault(f"{self.place}: {strict.dotted(path)}", found, remedy))
-
-
-def nominal_value(name: str, operation: Operation | None) -> float | None:
-    """Value of an error in the nominal joint (SI); None for an operating point that could not be read."""
-    if name.startswith("operation."):
-        return None if operation is None else float(getattr(operation, name.removeprefix("operation.")))
-    return 1.0 if name == "material.E_factor" else 0.0

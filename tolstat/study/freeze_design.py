@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.study import selection
 from tolstat.study.tolerances.correlation import Copula
+from tolstat.study.tolerances.entry import Toleranced
 
 
 class Group(NamedTuple):
@@ -27,31 +27,27 @@ class Group(NamedTuple):
     names: tuple[str, ...]
 
 
-def groups(table: Mapping[str, Any], names: Iterable[str], copula: Copula, by: str) -> tuple[Group, ...]:
+def groups(entries: Sequence[Toleranced], copula: Copula, by: str) -> tuple[Group, ...]:
     """Groups of the errors of a study.
 
     Parameters
     ----------
-    table : mapping
+    entries : sequence of Toleranced
         ``[tolerances]`` of the study.
-    names : iterable of str
-        Errors that scatter.
     copula : Copula
         Their correlation: groups that it links become one.
     by : str
-        ``error``: every error by itself; ``tolerance``: those of an entry together.
+        ``error``: every error by itself, of a zone every vector; ``tolerance``: those of an entry together.
 
     Returns
     -------
     tuple of Group
         In the order of the table.
     """
-    every = list(names)
     if by == "error":
-        parts = [Group(name, (name,)) for name in every]
+        parts = [Group(name, (name,)) for entry in entries for name in entry.quantities]
     else:
-        entries = selection.entries(table)
-        parts = [Group(entry.pattern, tuple(selection.select(entry.pattern, every))) for entry in entries]
+        parts = [Group(entry.pattern, tuple(entry.quantities)) for entry in entries]
     for i, j in np.argwhere(np.triu(copula.matrix, 1)):
         one, other = (next(p for p in parts if copula.names[k] in p.names) for k in (i, j))
         if one is not other:

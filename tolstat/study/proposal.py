@@ -24,7 +24,8 @@ from pydantic import Field
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import Strict, did_you_mean, dotted
 from tolstat.common.units import Number
-from tolstat.study.selection import columns_of, entries, select
+from tolstat.study.axes import streams_of
+from tolstat.study.selection import entries, select
 
 Array = NDArray[np.float64]
 
@@ -114,7 +115,7 @@ def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: t
     entry : ProposalEntry
         Entry as read from the file.
     toleranced : sequence of str
-        Errors that scatter; for ``pin1.offset_radial`` the entry applies to the score of the radius.
+        Quantities that are drawn; of a zone the entry applies to the scores of the radii.
     place, path
         File name and key path shown in faults.
 
@@ -140,7 +141,7 @@ def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: t
                     raise InputError([Fault(where, "has no tolerance", did_you_mean(item.pattern, list(toleranced)))])
                 found |= dict.fromkeys(names, value)
     scores = {
-        columns_of(name)[0]: (means[name], widths[name])
+        streams_of(name)[0]: (means[name], widths[name])
         for name in toleranced
         if (means[name], widths[name]) != (0.0, 1.0)
     }

@@ -8,17 +8,18 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.notation import PLUS_MINUS
-from tolstat.study import rewriting, selection
+from tolstat.common.notation import DIAMETER, PLUS_MINUS
+from tolstat.study import rewriting
 from tolstat.study.study import Study
+from tolstat.study.tolerances import fits, kinds
 from tolstat.study.tolerances.density_ratio import unbounded
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
-from tolstat.study.tolerances.kinds import KINDS, RADIAL_KINDS, distribution
+from tolstat.study.tolerances.zones import ZoneEntry
 
 SCALED = ("normal", "uniform", "triangular", "beta", "rayleigh")
 """Distributions that can be scaled; those of measured parts and lognormal ones cannot."""
-_WIDTHS = ("plus_minus", "std", "sigma")
+_WIDTHS = ("plus_minus", "std", "sigma", "zone")
 
 
 class Tolerance(NamedTuple):
@@ -29,13 +30,13 @@ class Tolerance(NamedTuple):
     pattern : str
         Pattern as written in the study.
     names : tuple of str
-        Errors that it selects.
+        Quantities that it draws, all with the same distribution.
     entry : dict
         Keys of the entry.
     site : Site
         Unit and middle of the errors.
     width : float
-        The tolerance t, SI: half the band, or 3 standard deviations for an entry without a band.
+        The tolerance t, SI: half the band, or 3 standard deviations for an entry without a band; of a zone its size.
     """
 
     pattern: str
@@ -66,7 +67,7 @@ class Tolerance(NamedTuple):
             del entry["iso2768"], entry["nominal"]
         for key in _WIDTHS:
             if key in entry:
-                value = factor * units.to_si(entry[key], self.site.unit, PLUS_MINUS)
+                value = factor * units.to_si(entry[key], self.site.unit, DIAMETER if key == "zone" else PLUS_MINUS)
                 entry[key] = units.written(value, self.site.unit, entry[key], digits)
         ends = [key for key in ("lower", "upper") if key in entry]
         if ends:
@@ -78,36 +79,40 @@ class Tolerance(NamedTuple):
         return entry
 
     def distribution(self, entry: Mapping[str, Any]) -> Distribution:
-        """Distribution that `entry` gives each of the errors."""
-        return distribution(dict(entry), self.site, "scaled", ("tolerances", self.pattern))
+        """Distribution that `entry` gives each of the quantities."""
+        read = kinds.entry(dict(entry), self.site, "scaled", ("tolerances", self.pattern))
+        return next(iter(read.quantities(self.site).values()))
 
     @property
     def widens(self) -> bool:
-        """Whether joints drawn with this tolerance can be reweighted to a wider one: not if it is bounded."""
-        return unbounded(self.distribution(self.entry))
+        """Whether the tolerance may become wider: not if it is bounded, nor if it refines a position."""
+        return unbounded(self.distribution(self.entry)) and not self.site.shared
 
 
 def tolerances(study: Study) -> list[Tolerance]:
     """Entries of a study that can be scaled, in its order; not those of operating point and material.
 
-    Entries with correlated errors are left out: they cannot be scaled independently.
+    Left out are entries with correlated errors, which cannot be scaled independently; the position of an axis whose
+    direction has a zone, too: that zone must stay the smaller one, and bounds where the middle is; and positions with a
+    bonus with their diameters.
     """
     found = []
-    table = tomllib.loads(study.text).get("tolerances", {})
-    known = selection.UNITS | selection.RADIAL_UNITS
-    for entry in selection.entries(table, "tolerances"):
-        names = tuple(selection.select(entry.pattern, study.tolerances))
-        own = names and not names[0].startswith(("operation.", "material."))
-        if own and entry.value["distribution"] in SCALED and not set(names) & set(study.copula.names):
-            site = Site(names[0], known[names[0]], 0.0, study.path.parent)
-            found.append(Tolerance(entry.pattern, names, dict(entry.value), site, width(entry.value, site)))
+    for entry in study.entries:
+        site, _ = entry.models[0]
+        names = tuple(entry.quantities)
+        own = not site.name.startswith(("operation.", "material."))
+        refined = any(one.shared and one.name.endswith(".position") for one, _ in entry.models)
+        refined |= any(study.has_bonus(one.name) for one, _ in entry.models)
+        if own and not refined and entry.keys["distribution"] in SCALED and not set(names) & set(study.copula.names):
+            found.append(Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site)))
     return found
 
 
 def width(entry: Mapping[str, Any], site: Site) -> float:
     """Tolerance t of an entry, SI; see `Tolerance.width`."""
-    kinds = RADIAL_KINDS if site.name.endswith(".offset_radial") else KINDS
-    model: Any = kinds[entry["distribution"]].model_validate(dict(entry), context={"site": site})
+    model: Any = kinds.entry(dict(entry), site, "scaled", ("tolerances", site.name))
+    if isinstance(model, ZoneEntry):
+        return model.zone.size
     half: float | None = model.half_width(site)
     if half is None and getattr(model, "lower", None) is not None:
         half = 0.5 * (model.upper - model.lower)
@@ -141,10 +146,19 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     InputError
         See `rewriting.with_keys`.
     """
-    table = tomllib.loads(study.text)["tolerances"]
-    changes = {
-        entry.path: dict.fromkeys(entry.value) | dict(entries[entry.pattern])
-        for entry in selection.entries(table, "tolerances")
-        if entry.pattern in entries
-    }
-    return rewriting.with_keys(study.text, {("sampling",): {"seed": seed}, **changes}, f"{study.name}.toml")
+    data = tomllib.loads(study.text)
+    every = list(fits.entries(data["tolerances"], study.fit))
+    changes: dict[tuple[int | str, ...], dict[str, Any]] = {("sampling",): {"seed": seed}}
+    for entry in every:
+        if entry.pattern in entries and entry.path != fits.PATH:
+            changes[entry.path] = dict.fromkeys(entry.value) | dict(entries[entry.pattern])
+    diameters = {entry.pattern: entry.value for entry in every if entry.path == fits.PATH}
+    if (
+        study.fit is not None and diameters.keys() & entries.keys()
+    ):  # its zones have changed: state what a fit stands for
+        changes["tolerances",] = {fits.KEY: None} | {key: entries.get(key, own) for key, own in diameters.items()}
+        if "contact" in data["joint"]:
+            changes["joint", "contact"] = dict(study.fit.diameters)
+        else:
+            changes["joint",] = {"contact": study.fit.diameters}
+    return rewriting.with_keys(study.text, changes, f"{study.name}.toml")

@@ -15,17 +15,15 @@ from pydantic_core import PydanticCustomError
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean, dotted
-from tolstat.common.tables import ERROR_FIELDS, HOLES, PINS
+from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import to_si
+from tolstat.study.axes import PAIRS, ZONE_UNITS, columns_of, compatible, is_zone, zone_of
 
 UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 """SI unit of every error, in the order of the table."""
 
-RADIAL_UNITS = {f"{feature}.offset_radial": "m" for feature in PINS + HOLES}
-"""SI unit of each radial offset, which stands for two columns of the table, offset_t and offset_z, drawn together."""
-
-TOLERANCED = UNITS | RADIAL_UNITS
-"""SI unit of all that ``[tolerances]`` can select."""
+TOLERANCED = UNITS | ZONE_UNITS
+"""SI unit of all that ``[tolerances]`` can select: errors, and zones that stand for several of them."""
 
 
 class Entry(NamedTuple):
@@ -131,16 +129,21 @@ def fixed_errors(
 def select(pattern: str, names: Iterable[str]) -> list[str]:
     """Return those of `names` that a pattern selects; ``*`` does not match across the dot.
 
-    A radial offset is selected by its full key only: ``"pin1.offset_*"`` means the offsets along e, t, z.
+    A zone, and each quantity that it draws, is selected by its full key only: ``"pin1.offset_*"`` means the offsets
+    along e, t, z. A pair is selected by a pattern with an underscore before the dot, such as ``"*_holes.position"``.
     """
     feature, _, key = pattern.partition(".")
-    return [
-        name
-        for name in names
-        if fnmatchcase(name.partition(".")[0], feature)
-        and fnmatchcase(name.partition(".")[2], key)
-        and (not name.endswith(".offset_radial") or key == "offset_radial")
-    ]
+    return [name for name in names if _matches(feature, name.partition(".")[0]) and _is_key(key, name)]
+
+
+def _matches(pattern: str, feature: str) -> bool:
+    return fnmatchcase(feature, pattern) and (feature not in PAIRS or "_" in pattern)
+
+
+def _is_key(pattern: str, name: str) -> bool:
+    if not is_zone(name):
+        return fnmatchcase(name.partition(".")[2], pattern)
+    return pattern in (name.partition(".")[2], zone_of(name).partition(".")[2])
 
 
 def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
@@ -180,7 +183,7 @@ def suggestion(pattern: str, names: Sequence[str]) -> str:
     """Remedy for a pattern that selects nothing: a suggestion for the half of it that is wrong."""
     feature, _, key = pattern.partition(".")
     features = list(dict.fromkeys(name.partition(".")[0] for name in names))
-    known = [f for f in features if fnmatchcase(f, feature)]
+    known = [f for f in features if _matches(feature, f)]
     if not known:
         return did_you_mean(feature, features)
     return did_you_mean(key, [n.partition(".")[2] for n in names if n.partition(".")[0] == known[0]])
@@ -191,19 +194,22 @@ class Assignments:
 
     def __init__(self, place: str) -> None:
         self._place = place
-        self._owner: dict[str, Entry] = {}
+        self._owner: dict[str, list[tuple[Entry, str]]] = {}
 
     def claim(self, entry: Entry, names: Iterable[str]) -> None:
-        """Record that `entry` sets `names`; a radial offset sets offset_t and offset_z.
+        """Record that `entry` sets `names`; a zone sets several columns, and several zones of an axis share them.
 
         Raises
         ------
         InputError
             When an earlier entry sets one of them.
         """
-        claimed = [column for name in names for column in columns_of(name)]
-        clashes = {self._owner[c].path: c for c in claimed if c in self._owner}
-        self._owner.update((c, entry) for c in claimed if c not in self._owner)
+        clashes: dict[tuple[int | str, ...], str] = {}
+        for name in names:
+            for column in self._columns(entry, name):
+                owners = self._owner.setdefault(column, [])
+                clashes |= {one.path: column for one, other in owners if not compatible(name, other)}
+                owners.append((entry, name))
         if clashes:
             where = f"{self._place}: {dotted(entry.path)}"
             remedy = "remove one of the two, or narrow the pattern"
@@ -211,10 +217,10 @@ class Assignments:
                 [Fault(where, f"{column} is set by {dotted(path)} already", remedy) for path, column in clashes.items()]
             )
 
-
-def columns_of(name: str) -> tuple[str, ...]:
-    """Columns of the table that an error's distribution fills."""
-    if name.endswith(".offset_radial"):
-        feature = name.partition(".")[0]
-        return f"{feature}.offset_t", f"{feature}.offset_z"
-    return (name,)
+    @staticmethod
+    def _columns(entry: Entry, name: str) -> tuple[str, ...]:
+        """Columns that an entry sets: a zone between two planes bounds one tilt of a feature."""
+        about = entry.value.get("about") if isinstance(entry.value, Mapping) and is_zone(name) else None
+        if about not in ("t", "z") or name.partition(".")[0] in PAIRS:
+            return columns_of(name)
+        return tuple(column for column in columns_of(name) if column.endswith(f"tilt_{about}"))

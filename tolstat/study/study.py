@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
+from tolstat.study.axes import Axis
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
@@ -24,6 +26,8 @@ from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.proposal import Proposal
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.fits import Fit
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,12 @@ class Study(Case):
     errors : dict
         Fixed errors of every joint except the nominal one (SI).
     tolerances : dict
-        Error name to distribution; ``pin1.offset_radial`` stands for offset_t and offset_z of a feature.
+        Name to distribution of each quantity that is drawn: an error; or a vector of a zone, such as
+        ``pin1.position_inner``, with the distribution of its radius.
+    entries : tuple of Toleranced
+        Entries of ``[tolerances]`` with what they select.
+    axes : dict of str to Axis
+        Features and pairs with zones: how the errors follow from what is drawn.
     copula : Copula
         Correlation of the errors.
     proposals : tuple of Proposal
@@ -92,11 +101,15 @@ class Study(Case):
         What is stored of each joint.
     groups : tuple of Group
         Errors that ``sampling.method`` ``pick_freeze`` exchanges together; empty for other methods.
+    fit : Fit, optional
+        Fit by ISO 286 that gives the diameters.
     """
 
     sampling: Sampling
     output: Output
     tolerances: dict[str, Distribution] = field(default_factory=dict)
+    entries: tuple[Toleranced, ...] = ()
+    axes: Mapping[str, Axis] = field(default_factory=dict)
     copula: Copula = field(default_factory=Copula)
     proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
@@ -104,6 +117,7 @@ class Study(Case):
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
     groups: tuple[Group, ...] = ()
+    fit: Fit | None = None
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -129,6 +143,12 @@ class Study(Case):
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where joints are not listed."""
         return self.listed.table if self.listed else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
+
+    def has_bonus(self, name: str) -> bool:
+        """Whether `name` is a position with a bonus by maximum material, or the diameter of such a feature."""
+        feature, _, key = name.partition(".")
+        axis = self.axes.get(feature)
+        return axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
 
     @property
     def samples(self) -> int:
@@ -173,6 +193,8 @@ class Study(Case):
             "sweep": [[list(axis.names), axis.start, axis.stop, axis.points] for axis in self.sweep],
             "output": self.output.identity(),
         }
+        if self.axes:
+            parts["axes"] = {name: axis.describe() for name, axis in self.axes.items()}
         if self.proposals:
             parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
         if self.groups:
@@ -237,11 +259,12 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     file = StudyFile(Path(path), SECTIONS, text)
     if n is not None:
         file.override("sampling", "n", n)
-    joint = file.joint()
+    fit = file.fit()
+    joint = file.joint(fit)
     operation = file.model("operation", Operation, required=True)
     solver = file.model("solver", Solver)
     errors = file.errors()
-    tolerances = file.tolerances(operation)
+    read = file.tolerances(joint, operation, fit)
     copula = file.correlation()
     proposals = file.proposals()
     sampling = file.model("sampling", Sampling, required=True)
@@ -252,7 +275,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     listed = None
     moved: tuple[Group, ...] = ()
     if sampling is not None and sampling.method == "pick_freeze":
-        moved = groups(file.data.get("tolerances", {}), tolerances, copula, sampling.groups)
+        moved = groups(read.entries, copula, sampling.groups)
     if sampling is not None and sampling.method == "cases":
         listed = file.listed(joint, operation, solver)
     if sampling is not None:
@@ -277,7 +300,10 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         errors=errors,
         sampling=sampling,
         output=output,
-        tolerances=tolerances,
+        tolerances=read.distributions,
+        entries=read.entries,
+        axes=read.axes,
+        fit=fit,
         copula=copula,
         proposals=proposals,
         sweep=sweep,

@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.tables import Status
 from tolstat.questions.allocate.ratios import DensityRatios, Entries
 from tolstat.store.view import View
-from tolstat.study import Study, costs, rule, scaling, selection
+from tolstat.study import Study, axes, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
@@ -105,7 +105,7 @@ class _Request(NamedTuple):
     @property
     def columns(self) -> list[str]:
         """Columns of the errors that the tolerances are for."""
-        return [column for t in self.tolerances for name in t.names for column in selection.columns_of(name)]
+        return [column for t in self.tolerances for name in t.names for column in axes.columns_of(name)]
 
     def cost(self, factors: NDArray[np.float64]) -> float:
         return sum(cost.at(float(f)) for cost, f in zip(self.costs, factors, strict=True))
@@ -169,7 +169,9 @@ def allocated(
         if abs(f - 1) > MIN_CHANGE
     }
     blocks = view.error_blocks(request.columns)
-    logs = np.concatenate([DensityRatios(request.tolerances, errors).of_entries(entries) for errors in blocks])
+    logs = np.concatenate(
+        [DensityRatios(view.study, request.tolerances, errors).of_entries(entries) for errors in blocks]
+    )
     weights = reweight.smooth(logs[done[checked]])
     table = _limits(request.statements, above, above[checked], weights, view.iid, confidence)
     growth = [
@@ -234,7 +236,7 @@ def _above(view: View, statement: Statement) -> NDArray[np.bool_]:
 
 def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: NDArray[np.intp]) -> allocation.Choice:
     """Choose the factors by some of the samples; `above` tells which of these are above each limit."""
-    ratios = DensityRatios(request.tolerances, view.errors(samples, request.columns))
+    ratios = DensityRatios(view.study, request.tolerances, view.errors(samples, request.columns))
     reach = np.array([cost.reach for cost in request.costs])
     problem = allocation.Problem(
         log_ratios=ratios.log_ratios,

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.study import Study
 from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.density_ratio import log_mean_square, unbounded
-from tolstat.study.tolerances.distributions import Distribution, Normal, Rayleigh
+from tolstat.study.tolerances.distributions import Distribution, Normal
+from tolstat.study.tolerances.radial import Rayleigh
 
 Entries = dict[str, dict[str, Any]]
 """Keys of entries of ``[tolerances]`` by pattern."""
@@ -25,15 +27,17 @@ class DensityRatios:
 
     Parameters
     ----------
+    study : Study
+        Study that the joints were drawn for.
     tolerances : sequence of Tolerance
         Tolerances that the factors scale.
     errors : ndarray, shape (n,)
         Errors of the joints, a table with the columns that the tolerances are for.
     """
 
-    def __init__(self, tolerances: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
+    def __init__(self, study: Study, tolerances: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
         self._tolerances = tolerances
-        self._values = [[sampling.values(errors, name) for name in t.names] for t in tolerances]
+        self._values = [[sampling.values(study, errors, name) for name in t.names] for t in tolerances]
         self._old = [t.distribution(t.entry) for t in tolerances]
         self._old_density = [self._log_density(i, old) for i, old in enumerate(self._old)]
         keep = lru_cache(maxsize=4 * len(tolerances))

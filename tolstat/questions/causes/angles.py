@@ -127,7 +127,7 @@ def against_angle(
     nominal = view.nominal_slots[view.nominal["status"] == Status.OK]
     found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]))
     errors = view.errors(samples, sampling.columns(view.study))
-    x = {name: sampling.values(errors, name) for name in scattering(view.study, errors)}
+    x = scattering(sampling.components(view.study, errors))
     return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +15,8 @@ from tolstat.analysis import overrepresentation, pick_freeze, regression, sensit
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
-from tolstat.study import Study
-from tolstat.study.tolerances.distributions import score
+
+Array = NDArray[np.float64]
 
 TAIL_STARTS_AT = 0.9
 """Share of the joints below the tail, for a load without a limit."""
@@ -50,10 +51,10 @@ class Causes(NamedTuple):
     additive, r2 : float
         Sum of the first-order indices; R^2 of the rank regression, NaN for a pick-freeze design.
     table : DataFrame
-        One row per error that scatters, the largest first-order index first: ``error``; with ``_lower`` and ``_upper``:
-        ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and ``size``; the last two also with
-        ``_p``, and NaN if too few joints are on either side of the level. For a pick-freeze design, one row per group
-        of errors, with ``first`` and ``total`` only.
+        One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
+        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and
+        ``size``; the last two also with ``_p``, and NaN if too few joints are on either side of the level. For a
+        pick-freeze design, one row per group of errors, with ``first`` and ``total`` only.
     """
 
     load: str
@@ -124,7 +125,7 @@ def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> C
     study = view.study
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
-    needed = max(MIN_JOINTS, len(study.tolerances) + 2 * regression.GROUPS)
+    needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * regression.GROUPS)
     if samples.size < needed:
         found = f"has {samples.size} joints with a valid {load.name}"
         raise StoreError(str(Fault(str(view.path), found, f"run {needed} joints or more")))
@@ -135,8 +136,8 @@ def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> C
     if log:
         _check_positive(load.name, values)
     errors = view.errors(samples[:MAX_JOINTS], sampling.columns(study))
-    names = scattering(study, errors)
-    x = np.column_stack([sampling.values(errors, name) for name in names])
+    own = scattering(sampling.components(study, errors))
+    names, x = list(own), np.column_stack(list(own.values()))
     y = values[:MAX_JOINTS]
     response = np.log(y) if log else y
     first = sensitivity.first_order(x, response, confidence, view.iid)
@@ -170,7 +171,8 @@ def _over_represented(
     study = view.study
     chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
     errors = view.errors(samples[chosen], sampling.columns(study))
-    z = np.column_stack([score(study.tolerances[name], sampling.values(errors, name)) for name in names])
+    scores = sampling.normal_scores(study, errors)
+    z = np.column_stack([scores[name] for name in names])
     return overrepresentation.tail(z, above[chosen], confidence, view.iid)._asdict()
 
 
@@ -204,9 +206,9 @@ def _of_design(view: View, load: SampleLoad, confidence: float, log: bool) -> Ca
     )
 
 
-def scattering(study: Study, errors: NDArray[np.void]) -> list[str]:
-    """Names of the tolerances of a study whose errors vary over the joints of a table ERROR."""
-    return [name for name in study.tolerances if np.ptp(sampling.values(errors, name)) > 0]
+def scattering(components: Mapping[str, Array]) -> dict[str, Array]:
+    """Those of the components (`sampling.components`) that vary over the joints."""
+    return {name: own for name, own in components.items() if np.ptp(own) > 0}
 
 
 def _check_positive(name: str, values: NDArray[np.float64]) -> None:

@@ -14,7 +14,6 @@ from tolstat.common.loads import LOADS
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.store.view import View
-from tolstat.study.tolerances.distributions import score
 
 
 class TailJoint(NamedTuple):
@@ -29,7 +28,7 @@ class TailJoint(NamedTuple):
     status : Status
         Its status; the load of a joint that is not settled is that of the recorded revolution.
     scores : dict of str to float
-        Each error with a tolerance, in sigma (`distributions.score`), in descending order of the modulus.
+        Each error that scatters, in sigma (`sampling.normal_scores`), in descending order of the modulus.
     """
 
     row: int
@@ -92,7 +91,7 @@ def _with_errors(view: View, samples: NDArray[np.intp], values: NDArray[np.float
     """Combine the values of joints with their errors."""
     ascending, place = np.unique(samples, return_inverse=True)
     errors = view.errors(ascending, sampling.columns(view.study))[place]
-    scores = {name: score(own, sampling.values(errors, name)) for name, own in view.study.tolerances.items()}
+    scores = sampling.normal_scores(view.study, errors)
     joints = []
     for i, row in enumerate(view.rows(samples).tolist()):
         own = {name: float(z[i]) for name, z in scores.items()}

@@ -12,7 +12,6 @@ from tolstat.analysis import overrepresentation
 from tolstat.campaign.remedy import remedy
 from tolstat.common.tables import FAILED, UNSETTLED, Status
 from tolstat.store.view import View
-from tolstat.study.tolerances.distributions import score
 
 MAX_JOINTS = 20_000
 """Number of joints (the first ones) whose errors are compared."""
@@ -57,11 +56,7 @@ def their_errors(view: View) -> pd.DataFrame | None:
     if min(int(bad.sum()), int((~bad).sum())) < overrepresentation.FEWEST:
         return None
     errors = view.errors(samples)
-    scores = {
-        name: score(distribution, values)
-        for name, distribution in view.study.tolerances.items()
-        if np.ptp(values := sampling.values(errors, name)) > 0
-    }
+    scores = {name: own for name, own in sampling.normal_scores(view.study, errors).items() if np.ptp(own) > 0}
     found = overrepresentation.tail(np.column_stack(list(scores.values())), bad, iid=view.iid)
     columns: dict[str, Any] = {"error": list(scores)}
     for key, part in found._asdict().items():

@@ -18,8 +18,8 @@ from tolstat.common.tables import Status
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 from tolstat.study import Study
+from tolstat.study.axes import columns_of
 from tolstat.study.change import changed
-from tolstat.study.selection import columns_of
 from tolstat.study.tolerances.distributions import Distribution, score
 
 SHARES = (0.5, 0.9, 0.99)
@@ -148,14 +148,14 @@ def _block_log_ratios(
     """Logarithm of new over old density of the errors of some joints, (m,)."""
     logs = np.zeros(len(errors))
     for name in names:
-        values = sampling.values(errors, name)
+        values = sampling.values(study, errors, name)
         logs += new[name].logpdf(values) - study.tolerances[name].logpdf(values)
     correlated = study.copula.names
     if set(correlated) & set(names):
         # density of the Gaussian copula: correlated over independent normal density
         form = np.linalg.inv(study.copula.matrix) - np.eye(len(correlated))
         for sign, tolerances in ((-0.5, new), (0.5, study.tolerances)):
-            z = np.column_stack([score(tolerances[n], sampling.values(errors, n)) for n in correlated])
+            z = np.column_stack([score(tolerances[n], sampling.values(study, errors, n)) for n in correlated])
             logs += sign * np.einsum("ni,ij,nj->n", z, form, z)
     return logs
 

@@ -19,8 +19,9 @@ from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
 from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
-from tolstat.study.tolerances.kinds import kinds_of
+from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
 
 DEFAULT_JOINT = "cirelli2021"
 """Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
@@ -77,8 +78,9 @@ def errors() -> Schema:
 
 def tolerances() -> Schema:
     """JSON schema of the errors that scatter: the entry of each error is one of its kinds."""
-    made = {name: {"x-table": _tolerance(name, unit)} for name, unit in TOLERANCED.items()}
-    return table(made) | {"description": "How errors scatter, by name or pattern."}
+    made = table({name: {"x-table": _tolerance(name, unit)} for name, unit in TOLERANCED.items()})
+    properties = {fits.KEY: {"x-table": fits.KEY}} | made["properties"]
+    return made | {"description": "How errors scatter, by name or pattern.", "properties": properties}
 
 
 def _of_unit(name: str, unit: str) -> str:
@@ -92,7 +94,8 @@ def _quantity(unit: str) -> Schema:
 
 def _tolerance(name: str, unit: str) -> str:
     """Name of the definition of the tolerance of an error."""
-    return _of_unit("_".join(kinds_of(name)), unit)
+    key = name.partition(".")[2]
+    return key if key in ZONE_KINDS else _of_unit("tolerance", unit)
 
 
 def sweep() -> Schema:
@@ -160,10 +163,11 @@ def tables() -> dict[str, Schema]:
         "widen": {"anyOf": [{"type": "number", "minimum": 1 / MAX_WIDEN, "maximum": MAX_WIDEN}, widen]},
         "shift": numbers(-MAX_SHIFT, MAX_SHIFT),
         "quantity": {"type": ["string", "number"]},
+        fits.KEY: of_model(fits.FitEntry),
         "lines": table({name: {"x-table": _of_unit(LineEntry.__name__, unit)} for name, unit in CHANNELS.items()}),
     }
     for name, unit in TOLERANCED.items():
-        kinds = [for_unit(of_model(model), unit) for model in kinds_of(name).values()]
+        kinds = [for_unit(of_model(model), unit) for model in dict.fromkeys(kinds_of(name).values())]
         found.setdefault(_tolerance(name, unit), {"anyOf": kinds})
     for unit in dict.fromkeys(UNITS.values()):
         found[_of_unit(SweepEntry.__name__, unit)] = for_unit(of_model(SweepEntry), unit)

@@ -13,6 +13,7 @@ from pydantic import Field
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import Strict
 from tolstat.common.units import Number
+from tolstat.study.axes import is_zone
 from tolstat.study.selection import select
 
 Array = NDArray[np.float64]
@@ -132,10 +133,10 @@ def assemble(entries: Sequence[Correlation], toleranced: dict[str, str], place: 
 
 def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
     """Errors of one name or pattern in `between`."""
-    if pattern.endswith(".offset_radial"):
-        remedy = "give offset_t and offset_z tolerances of their own, and correlate those"
-        raise InputError([Fault(where, f"{pattern} cannot be correlated", remedy)])
     names = select(pattern, toleranced)
+    if any(is_zone(name) for name in names or [pattern]):
+        remedy = "give offset_t, offset_z, tilt_t and tilt_z tolerances of their own, and correlate those"
+        raise InputError([Fault(where, f"{pattern} is a zone: it cannot be correlated", remedy)])
     if not names:
         raise InputError(
             [Fault(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or remove it here")]

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from tolstat.study.tolerances.distributions import Distribution, Normal, Rayleigh
+from tolstat.study.tolerances.distributions import Distribution, Normal
+from tolstat.study.tolerances.radial import Rayleigh
 
 MIDPOINTS = 1000
 """Number of midpoints in probability, for distributions on a band."""

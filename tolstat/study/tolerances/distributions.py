@@ -68,7 +68,7 @@ class Distribution(ABC):
 
 
 @dataclass(frozen=True)
-class _Described(Distribution):
+class Described(Distribution):
     """Distribution that its dataclass fields describe completely."""
 
     def describe(self) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def _within(band: _Banded, x: Array, density: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Normal(_Described):
+class Normal(Described):
     """Normal distribution with `mean` and standard deviation `sigma`."""
 
     mean: float
@@ -107,7 +107,7 @@ class Normal(_Described):
 
 
 @dataclass(frozen=True)
-class TruncatedNormal(_Described):
+class TruncatedNormal(Described):
     """Normal distribution truncated to the band, as if parts outside were rejected.
 
     `mean` and `sigma` are those before the truncation.
@@ -139,7 +139,7 @@ class TruncatedNormal(_Described):
 
 
 @dataclass(frozen=True)
-class Uniform(_Described):
+class Uniform(Described):
     """Uniform distribution on the band."""
 
     lower: float
@@ -155,7 +155,7 @@ class Uniform(_Described):
 
 
 @dataclass(frozen=True)
-class Triangular(_Described):
+class Triangular(Described):
     """Triangular distribution on the band, most likely at `peak`."""
 
     lower: float
@@ -178,7 +178,7 @@ class Triangular(_Described):
 
 
 @dataclass(frozen=True)
-class LogNormal(_Described):
+class LogNormal(Described):
     """Lognormal distribution: ``threshold + exp(y)``, where y is (truncated) normal."""
 
     threshold: float
@@ -196,7 +196,7 @@ class LogNormal(_Described):
 
 
 @dataclass(frozen=True)
-class Beta(_Described):
+class Beta(Described):
     """Beta distribution with shapes `a` and `b`, stretched over the band."""
 
     a: float
@@ -218,31 +218,6 @@ class Beta(_Described):
         t = np.clip((x - self.lower) / width, 0.0, 1.0)
         density = xlogy(self.a - 1, t) + xlog1py(self.b - 1, -t) - betaln(self.a, self.b) - math.log(width)
         return _within(self, x, np.asarray(density, dtype=float))
-
-
-@dataclass(frozen=True)
-class Rayleigh(_Described):
-    """Radius of a point whose two coordinates are normal with standard deviation `sigma` each.
-
-    With `upper`, parts beyond that radius are rejected.
-    """
-
-    sigma: float
-    upper: float | None = None
-
-    def ppf(self, u: Array) -> Array:
-        """See `Distribution.ppf`."""
-        share = 1.0 if self.upper is None else -math.expm1(-0.5 * (self.upper / self.sigma) ** 2)
-        radius: Array = self.sigma * np.sqrt(-2 * np.log1p(-u * share))
-        return radius if self.upper is None else np.minimum(radius, self.upper)
-
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        share = 1.0 if self.upper is None else -math.expm1(-0.5 * (self.upper / self.sigma) ** 2)
-        inside = (x >= 0) & (x <= (math.inf if self.upper is None else self.upper))
-        with np.errstate(divide="ignore"):
-            radius = np.log(np.where(inside, x, 0.0))
-        return radius - 0.5 * (x / self.sigma) ** 2 - 2 * math.log(self.sigma) - math.log(share)
 
 
 @dataclass(frozen=True)

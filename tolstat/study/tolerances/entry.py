@@ -6,9 +6,11 @@ Limits and means are deviations for geometry, the values themselves for ``operat
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
@@ -18,27 +20,79 @@ from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.moments import outside, standard_deviation
+
+
+class Diameter(NamedTuple):
+    """Tolerance of the diameter of a pin or hole.
+
+    Attributes
+    ----------
+    band : tuple of float, optional
+        Lower and upper limit, m.
+    distribution : Distribution
+        Distribution of the error.
+    """
+
+    band: tuple[float, float] | None
+    distribution: Distribution
 
 
 class Site(NamedTuple):
-    """The error that an entry is for.
+    """What an entry is for.
 
     Attributes
     ----------
     name : str
-        Name of the error, ``"pin1.offset_t"``.
+        Name of the error, ``"pin1.offset_t"``, or of the zone, ``"pin1.position"``.
     unit : str
         Its SI unit.
     center : float
         Its nominal value.
     folder : Path
         Folder that the path of a CSV file is relative to.
+    reach : float
+        Distance of the middle of pins and holes from the joint's centre, m; for pairs only.
+    shared : bool
+        For a zone: whether the axis has a position and a zone of direction.
+    direction : ToleranceEntry, optional
+        For the position of such an axis: the entry for its direction.
+    diameter : Diameter, optional
+        For the position of a pin or hole: the tolerance of its diameter.
     """
 
     name: str
     unit: str
     center: float
     folder: Path
+    reach: float = math.nan
+    shared: bool = False
+    direction: ToleranceEntry | None = None
+    diameter: Diameter | None = None
+
+
+class Meaning(NamedTuple):
+    """What an entry says of some of the errors that it sets.
+
+    Attributes
+    ----------
+    number : str
+        What the number of the entry is, with its value: a half width, a radius, a diameter.
+    errors : tuple of str
+        Names of errors, columns of the table ERROR, all with the same deviation.
+    unit : str
+        Their SI unit.
+    sigma : float
+        Standard deviation of each of them, SI.
+    outside : float
+        Share of the parts outside the band or zone of the entry; NaN if the entry has none.
+    """
+
+    number: str
+    errors: tuple[str, ...]
+    unit: str
+    sigma: float
+    outside: float
 
 
 def _read(value: object, info: ValidationInfo) -> float:
@@ -62,23 +116,80 @@ HalfWidth = Annotated[
     float, BeforeValidator(_read_half_width), AfterValidator(units.positive), WithJsonSchema({"x-unit": "error"})
 ]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
+Truncate = Annotated[
+    bool, Field(strict=True, description="whether parts outside the band are sorted out", examples=[True])
+]
 PositiveLength = Annotated[units.Length, AfterValidator(units.positive)]
 
 
 class ToleranceEntry(strict.Strict):
-    """Base of the entries: one model for each distribution."""
+    """Base of the entries: what an entry draws, and what it means."""
 
     @abstractmethod
-    def build(self, site: Site) -> Distribution:
-        """Return the distribution of the entry; refuse keys that contradict each other."""
+    def quantities(self, site: Site) -> dict[str, Distribution]:
+        """Return the quantities that the entry draws, by name; refuse keys that contradict each other."""
+
+    @abstractmethod
+    def meaning(self, site: Site) -> list[Meaning]:
+        """Return what the entry says of the errors that it sets."""
 
     @model_validator(mode="after")
     def _can_be_built(self, info: ValidationInfo) -> Self:
-        self.build((info.context or {})["site"])
+        self.quantities((info.context or {})["site"])
         return self
 
 
-class HalfBand(ToleranceEntry):
+class SingleEntry(ToleranceEntry):
+    """Entry for one error: one model for each distribution."""
+
+    @abstractmethod
+    def build(self, site: Site) -> Distribution:
+        """Return the distribution of the error; refuse keys that contradict each other."""
+
+    @abstractmethod
+    def number(self, site: Site) -> str:
+        """Return what the number of the entry is, with its value."""
+
+    @abstractmethod
+    def band(self, site: Site) -> tuple[float, float] | None:
+        """Lower and upper limit; None where none is given."""
+
+    def quantities(self, site: Site) -> dict[str, Distribution]:
+        """See `ToleranceEntry.quantities`."""
+        return {site.name: self.build(site)}
+
+    def meaning(self, site: Site) -> list[Meaning]:
+        """See `ToleranceEntry.meaning`."""
+        found = self.build(site)
+        band = self.band(site)
+        share = math.nan if band is None else outside(found, *band)
+        return [Meaning(self.number(site), (site.name,), site.unit, standard_deviation(found), share)]
+
+
+class Toleranced(NamedTuple):
+    """An entry of ``[tolerances]`` with what it selects.
+
+    Attributes
+    ----------
+    pattern : str
+        Pattern as written in the study.
+    keys : dict
+        Keys of the entry, as written.
+    models : tuple of (Site, ToleranceEntry)
+        The errors or zones that the pattern selects, and the entry as read for each.
+    """
+
+    pattern: str
+    keys: Mapping[str, Any]
+    models: tuple[tuple[Site, ToleranceEntry], ...]
+
+    @property
+    def quantities(self) -> dict[str, Distribution]:
+        """Distribution of each quantity that the entry draws."""
+        return {name: d for site, model in self.models for name, d in model.quantities(site).items()}
+
+
+class HalfBand(SingleEntry):
     """Entry with a band that may be given by its half width."""
 
     plus_minus: Annotated[
@@ -109,6 +220,13 @@ class HalfBand(ToleranceEntry):
             return distributions.iso2768(data_dir() / "iso2768.csv", kind, self.iso2768, self.nominal)
         except ValueError as error:
             raise refuse(f"nominal = {{nominal}}: {error}", "give plus_minus", "nominal") from error
+
+    def number(self, site: Site) -> str:
+        """See `SingleEntry.number`."""
+        half = self.half_width(site)
+        if half is None:
+            return "no band"
+        return f"half width {units.shown(half, site.unit)}"
 
 
 class Banded(HalfBand):
@@ -143,3 +261,9 @@ class Banded(HalfBand):
         if band is None:
             raise refuse("no band", "add plus_minus, or lower and upper, or iso2768 and nominal")
         return band
+
+    def number(self, site: Site) -> str:
+        """See `SingleEntry.number`."""
+        if self.lower is None or self.upper is None:
+            return super().number(site)
+        return f"limits {units.shown(self.lower, site.unit)} to {units.shown(self.upper, site.unit)}"

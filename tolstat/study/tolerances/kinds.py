@@ -16,14 +16,25 @@ from pydantic import Field
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import refuse
+from tolstat.study.axes import ORIENTATIONS, columns_of
 from tolstat.study.tolerances import distributions as tolerance
-from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import Banded, HalfBand, Positive, PositiveNumber, Site, ToleranceEntry, Value
+from tolstat.study.tolerances.entry import (
+    Banded,
+    HalfBand,
+    Meaning,
+    Positive,
+    PositiveNumber,
+    SingleEntry,
+    Site,
+    ToleranceEntry,
+    Truncate,
+    Value,
+)
+from tolstat.study.tolerances.moments import mean_square, outside
+from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
 
 CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
-Truncate = Annotated[
-    bool, Field(strict=True, description="whether parts outside the band are sorted out", examples=[True])
-]
 Cpk = Annotated[PositiveNumber | None, Field(description=f"{CPK}; 1 unless given", examples=[1.33])]
 
 
@@ -167,7 +178,7 @@ class RayleighEntry(HalfBand):
     ] = None
     truncate: Truncate = False
 
-    def build(self, site: Site) -> tolerance.Rayleigh:
+    def build(self, site: Site) -> Rayleigh:
         """See `ToleranceEntry.build`."""
         radius = self.half_width(site)
         if self.sigma is None and radius is None:
@@ -177,14 +188,30 @@ class RayleighEntry(HalfBand):
         if radius is None:
             if self.truncate:
                 raise refuse("truncate needs a band", "add plus_minus")
-            return tolerance.Rayleigh(self.sigma or 0.0)
+            return Rayleigh(self.sigma or 0.0)
         if self.sigma is not None and not self.truncate:
             raise refuse("the band has no effect beside sigma", "remove it, or add truncate = true")
         sigma = self.sigma or tolerance.sigma_of(-radius, radius, 0.0, self.cpk or 1.0)
-        return tolerance.Rayleigh(sigma, radius if self.truncate else None)
+        return Rayleigh(sigma, radius if self.truncate else None)
+
+    def number(self, site: Site) -> str:
+        """See `SingleEntry.number`."""
+        return super().number(site).replace("half width", "radius")
+
+    def band(self, site: Site) -> tuple[float, float] | None:
+        """See `SingleEntry.band`."""
+        radius = self.half_width(site)
+        return None if radius is None else (-1.0, radius)
+
+    def meaning(self, site: Site) -> list[Meaning]:
+        """See `ToleranceEntry.meaning`."""
+        found, band = self.build(site), self.band(site)
+        share = math.nan if band is None else outside(found, *band)
+        sigma = math.sqrt(0.5 * mean_square(found))
+        return [Meaning(self.number(site), columns_of(site.name), site.unit, sigma, share)]
 
 
-class MeasuredEntry(ToleranceEntry):
+class MeasuredEntry(SingleEntry):
     """Measured parts of a CSV file with a header row, drawn with equal probability."""
 
     distribution: Literal["measured"]
@@ -201,6 +228,13 @@ class MeasuredEntry(ToleranceEntry):
             raise refuse("missing key unit", 'add the unit of the column, for example unit = "mm"')
         factor = units.to_si(1.0 if self.unit is None else f"1 {self.unit}", site.unit)
         return tolerance.Measured.of(factor * value for value in values)
+
+    def number(self, site: Site) -> str:
+        """See `SingleEntry.number`."""
+        return f"{self.build(site).values.size} measured parts"
+
+    def band(self, site: Site) -> None:
+        """See `SingleEntry.band`."""
 
     def _column(self, path: Path) -> list[float]:
         try:
@@ -241,42 +275,50 @@ KINDS: dict[str, type[ToleranceEntry]] = {
     "beta": BetaEntry,
     "measured": MeasuredEntry,
 }
-RADIAL_KINDS: dict[str, type[ToleranceEntry]] = {"rayleigh": RayleighEntry}
+ZONE_KINDS: dict[str, dict[str, type[ToleranceEntry]]] = {
+    "offset_radial": {"rayleigh": RayleighEntry},
+    "position": dict.fromkeys(("normal", "uniform"), PositionEntry),
+    **{key: dict.fromkeys(("normal", "uniform"), OrientationEntry) for key in ORIENTATIONS},
+    "coaxiality": dict.fromkeys(("normal", "uniform"), CoaxialityEntry),
+}
+"""Entries for zones, by the key after the feature's name."""
+ZONE_EXAMPLE = 'write { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", cp = 1.0 }'
 
 
 def kinds_of(name: str) -> dict[str, type[ToleranceEntry]]:
-    """Entries that an error can have, by the word for ``distribution``."""
-    return RADIAL_KINDS if name.endswith(".offset_radial") else KINDS
+    """Entries that an error or a zone can have, by the word for ``distribution``."""
+    return ZONE_KINDS.get(name.partition(".")[2], KINDS)
 
 
-def distribution(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> Distribution:
-    """Distribution that an entry defines.
+def entry(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> ToleranceEntry:
+    """Read an entry for one of the errors or zones that it selects.
 
     Parameters
     ----------
     data : object
         The entry as parsed from TOML.
     site : Site
-        The error that it is for.
+        What it is for.
     place, path : str, tuple of str
         File name, and key path in the file, shown in faults.
 
     Returns
     -------
-    Distribution
-        In the error's SI unit.
+    ToleranceEntry
+        What it draws and means.
 
     Raises
     ------
     InputError
         With the faults of the entry.
     """
-    where = f"{place}: {strict.dotted(path)}"
+    where, kinds = f"{place}: {strict.dotted(path)}", kinds_of(site.name)
     if not isinstance(data, dict):
         half = json.dumps(data, ensure_ascii=False) if isinstance(data, str) else "..."
         remedy = f'write {{ plus_minus = {half}, distribution = "normal", cpk = 1.0 }}'
+        if "normal" in kinds and kinds is not KINDS:
+            remedy = ZONE_EXAMPLE
         raise InputError([Fault(where, f"{data!r} is not a tolerance", remedy)])
-    kinds = kinds_of(site.name)
     kind = data.get("distribution")
     if kind is None:
         remedy = f"add distribution, one of {', '.join(kinds)}"
@@ -285,5 +327,4 @@ def distribution(data: object, site: Site, place: str, path: tuple[int | str, ..
         also = " (rayleigh is for offset_radial)" if kind == "rayleigh" else ""
         remedy = strict.did_you_mean(str(kind), list(kinds))
         raise InputError([Fault(f"{where}.distribution", f"{kind!r} is not allowed here{also}", remedy)])
-    entry = strict.validate(kinds[kind], data, place, prefix=path, context={"site": site})
-    return entry.build(site)
+    return strict.validate(kinds[kind], data, place, prefix=path, context={"site": site})

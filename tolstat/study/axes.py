@@ -1,0 +1,251 @@
+"""Axes of single features and of pairs: the quantities that tolerance zones draw, and the errors that follow from them.
+
+A zone quantity is a vector across the ideal axis, with components along t and z. It is drawn as radius and uniform
+direction, so that two random streams belong to it: those of two columns of the table ERROR. A position is drawn as the
+two ends of the axis over the toleranced length, or as its middle where the direction has a zone of its own. A direction
+is drawn as a slope: how far the axis departs from the ideal one, per unit length.
+
+The common axis of a pair is the line through the middles of its two features. Its components are along the first
+feature's t and z. Coaxiality is the slope of each feature relative to that line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.tables import HOLES, PINS
+from tolstat.study.bonus import Bonus
+
+Array = NDArray[np.float64]
+Table = NDArray[np.void]
+
+PAIRS = {
+    "input_pins": ("pin3", "pin4"),
+    "output_pins": ("pin1", "pin2"),
+    "input_holes": ("hole1", "hole2"),
+    "output_holes": ("hole4", "hole3"),
+}
+"""Features on one ideal axis, pins of the cross or holes of a fork; e of the first one is x or y of its frame."""
+
+ORIENTATIONS = ("perpendicularity", "angularity")
+ZONE_UNITS = (
+    {f"{name}.offset_radial": "m" for name in PINS + HOLES}
+    | {f"{name}.{key}": "m" for name in (*PINS, *HOLES, *PAIRS) for key in ("position", *ORIENTATIONS)}
+    | {f"{name}.coaxiality": "m" for name in PAIRS}
+)
+"""SI unit of what stands for several columns of the table ERROR: radial offsets, zones of features and of pairs."""
+
+
+def is_zone(name: str) -> bool:
+    """Whether a name is that of a zone, or of a quantity that a zone draws."""
+    return zone_of(name) in ZONE_UNITS
+
+
+def zone_of(name: str) -> str:
+    """Name of the zone that draws a quantity: ``pin1.position`` of ``pin1.position_inner``."""
+    if name in ZONE_UNITS:
+        return name
+    feature, _, key = name.partition(".")
+    return f"{feature}.{key.partition('_')[0]}"
+
+
+def compatible(one: str, other: str) -> bool:
+    """Whether two zones are tolerances of one axis that complement each other, such as position and coaxiality."""
+    (a, _, key), (b, _, other_key) = one.partition("."), other.partition(".")
+    roles = [next((r for r in ORIENTATIONS if k in ORIENTATIONS), k) for k in (key, other_key)]
+    known = is_zone(one) and is_zone(other) and "offset_radial" not in roles
+    return known and a == b and roles[0] != roles[1]
+
+
+def ends(name: str) -> tuple[str, str]:
+    """Keys of the ends of an axis at -over/2 and +over/2 along e."""
+    if name in PAIRS:
+        first, second = PAIRS[name]
+        return f"position_{second}", f"position_{first}"
+    return "position_inner", "position_outer"
+
+
+def columns_of(name: str) -> tuple[str, ...]:
+    """Columns of the table ERROR that hold a quantity or zone."""
+    if not is_zone(name):
+        return (name,)
+    feature, _, key = name.partition(".")
+    parts = ["offset_t", "offset_z"] if key == "offset_radial" else ["tilt_t", "tilt_z"]
+    if feature in PAIRS or key.startswith("position"):
+        parts = ["offset_t", "offset_z", "tilt_t", "tilt_z"]
+    return tuple(f"{own}.{part}" for own in PAIRS.get(feature, (feature,)) for part in parts)
+
+
+def streams_of(name: str) -> tuple[str, ...]:
+    """Columns of the table ERROR whose random streams a quantity uses: of a vector for radius and direction."""
+    if not is_zone(name):
+        return (name,)
+    feature, _, key = name.partition(".")
+    first, second = PAIRS.get(feature, (feature, feature))
+    if key.startswith("coaxiality"):
+        own, part = key.rpartition("_")[2], "tilt"
+    elif key in ("offset_radial", "position") or key == ends(feature)[0]:
+        own, part = first, "offset"
+    else:
+        own, part = second, "offset" if feature in PAIRS else "tilt"
+    return tuple(f"{own}.{part}_{c}" for c in (key[-1] if is_component(name) else "tz"))
+
+
+def is_component(name: str) -> bool:
+    """Whether a zone quantity is one component of a slope, in one plane: ``pin1.perpendicularity_z``."""
+    return name.endswith(tuple(f".{key}_{about}" for key in ORIENTATIONS for about in "tz"))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis with tolerance zones.
+
+    Attributes
+    ----------
+    name : str
+        Feature or pair.
+    over : float
+        Length that the position holds over, m.
+    room : float
+        Radius of the position's zone, m, where direction has a zone, too, and no part is outside: the middle then stays
+        in the circle that keeps both ends of the tilted axis in the zone. Infinite otherwise.
+    reach : float
+        Distance of the features' middles from the joint's centre, m; for pairs only.
+    bonus : Bonus, optional
+        Maximum material requirement of the position of a pin or hole.
+    """
+
+    name: str
+    over: float = math.nan
+    room: float = math.inf
+    reach: float = math.nan
+    bonus: Bonus | None = None
+
+    def describe(self) -> dict[str, Any]:
+        """What determines the errors, besides what is drawn, as JSON values: what matters for the axis."""
+        bonus = {} if self.bonus is None else asdict(self.bonus)
+        return _finite(asdict(self) | bonus)
+
+    def fill(self, table: Table, drawn: Mapping[str, Array]) -> None:
+        """Set the errors.
+
+        Parameters
+        ----------
+        table : ndarray, shape (n,), dtype ERROR
+            Errors of joints; the columns of the axis are overwritten.
+        drawn : mapping of str to ndarray, (2, n)
+            Vectors by key: along t and z in m, or slopes.
+        """
+        if self.bonus is not None:
+            deviation = table[self.bonus.diameter]
+            drawn = {key: self.bonus.shift(vector, deviation) for key, vector in drawn.items()}
+        middle, slope = self._line(drawn)
+        if self.name not in PAIRS:
+            _set(table, self.name, middle, slope)
+            return
+        own = [drawn.get(f"coaxiality_{feature}") for feature in PAIRS[self.name]]
+        zero = np.zeros((2, len(table)))
+        common, tilt = zero if middle is None else middle, zero if slope is None else slope
+        for feature, relative, side in zip(PAIRS[self.name], own, (1.0, -1.0), strict=True):
+            shift, turned = _as_seen(common + side * self.reach * tilt, tilt, side)
+            _set(table, feature, shift, turned if relative is None else turned + relative)
+
+    def vector(self, errors: Table, key: str) -> Array:
+        """Vector of one key from the errors of joints, the inverse of `fill`; (2, n), m or slope."""
+        if self.name not in PAIRS:
+            if key == "offset_radial":
+                return _offset(errors, self.name)
+            slope = _slope(errors, self.name)
+            found = self._of_line(key, slope, lambda: _offset(errors, self.name))
+            return found if self.bonus is None else self.bonus.unshift(found, errors[self.bonus.diameter])
+        first, second = PAIRS[self.name]
+        near = _offset(errors, first)
+        far, _ = _as_seen(_offset(errors, second), np.zeros((2, 1)), -1.0)
+        slope = (near - far) / (2.0 * self.reach)
+        if key.startswith("coaxiality"):
+            own = key.rpartition("_")[2]
+            return _slope(errors, own) - _as_seen(near, slope, 1.0 if own == first else -1.0)[1]
+        return self._of_line(key, slope, lambda: 0.5 * (near + far))
+
+    def _line(self, drawn: Mapping[str, Array]) -> tuple[Array | None, Array | None]:
+        """Middle and slope of the axis; None for what no zone tolerances."""
+        low, high = ends(self.name)
+        if low in drawn:
+            return 0.5 * (drawn[low] + drawn[high]), (drawn[high] - drawn[low]) / self.over
+        slope = None
+        for key, vector in drawn.items():
+            if key.startswith(ORIENTATIONS):
+                slope = vector if slope is None else slope + vector
+        middle = drawn.get("offset_radial", drawn.get("position"))
+        if middle is not None and slope is not None and "position" in drawn:
+            middle = middle * self._share_left(slope)
+        return middle, slope
+
+    def _of_line(self, key: str, slope: Array, middle: Callable[[], Array]) -> Array:
+        if not key.startswith("position"):
+            return slope
+        if key == "position":
+            return middle() / self._share_left(slope)
+        side = 0.5 if key == ends(self.name)[1] else -0.5
+        return middle() + side * self.over * slope
+
+    def _share_left(self, slope: Array) -> Array:
+        """Share of the zone's radius that an axis of this slope leaves to its middle."""
+        if math.isinf(self.room):
+            return np.ones(slope.shape[1])
+        taken: Array = np.hypot(*slope) * self.over / (2.0 * self.room)
+        left: Array = np.maximum(1.0 - taken, 1e-9)  # zero would lose where in the zone the middle is
+        return left
+
+
+def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that are texts or finite numbers; not the axis' name."""
+    kept = {key: value for key, value in values.items() if key != "name" and isinstance(value, (str, float))}
+    return {key: value for key, value in kept.items() if isinstance(value, str) or math.isfinite(value)}
+
+
+def component(name: str, vector: Array) -> Array:
+    """Slope in one plane, (n,): its component that a rotation about t or about z changes."""
+    return np.asarray(-vector[1] if name.endswith("_t") else vector[0])
+
+
+def of_component(name: str, slope: Array) -> Array:
+    """Slope vector, (2, n), of the axis with a slope in one plane: the inverse of `component`."""
+    zero = np.zeros_like(slope)
+    return np.array([zero, -slope] if name.endswith("_t") else [slope, zero])
+
+
+def _as_seen(shift: Array, slope: Array, side: float) -> tuple[Array, Array]:
+    """Shift and slope of a pair's axis along t and z of the first feature (side 1) or of the second (side -1).
+
+    The second feature's t and e are opposite to the first's, its z is the same. A slope is per length along e.
+    """
+    turn = np.array([[side], [1.0]])
+    return turn * shift, side * turn * slope
+
+
+def _set(table: Table, feature: str, offset: Array | None, slope: Array | None) -> None:
+    if offset is not None:
+        table[f"{feature}.offset_t"], table[f"{feature}.offset_z"] = offset
+    if slope is not None:
+        # a tilt epsilon is a finite rotation: the axis departs by tan|epsilon| per unit length
+        size = np.hypot(*slope)
+        ratio = np.divide(np.arctan(size), size, out=np.ones_like(size), where=size > 0)
+        table[f"{feature}.tilt_t"], table[f"{feature}.tilt_z"] = -ratio * slope[1], ratio * slope[0]
+
+
+def _offset(errors: Table, feature: str) -> Array:
+    return np.array([errors[f"{feature}.offset_t"], errors[f"{feature}.offset_z"]])
+
+
+def _slope(errors: Table, feature: str) -> Array:
+    about_t, about_z = errors[f"{feature}.tilt_t"], errors[f"{feature}.tilt_z"]
+    angle = np.hypot(about_t, about_z)
+    ratio: Any = np.divide(np.tan(angle), angle, out=np.ones_like(angle), where=angle > 0)
+    return np.array([ratio * about_z, -ratio * about_t])

@@ -15,7 +15,7 @@ from tolstat.common.loads import BUSHING_LOADS
 from tolstat.questions.capability import query as capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import summary
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 
 
 def export(*arguments):
@@ -27,7 +27,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
     done = export(path, "--json", out, "--by", "cross1.F")
     assert done.exit_code == 0
     found = json.loads(out.read_text(encoding="utf-8"))
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         view = store.view()
         tables = (("limits", exceedance.limits(view)), ("capability", capability.limits(view)))
         assert found["provenance"]["versions"] == store.versions
@@ -43,7 +43,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
 
 def test_statistics_are_of_a_sample(tmp_path):
     path = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
-    with ResultStore.open(path) as store, pytest.raises(StoreError, match="no sample of a production"):
+    with Reader.open(path) as store, pytest.raises(StoreError, match="no sample of a production"):
         summary.statistics(store.view())
     done = export(synthetic.store(tmp_path), "--csv", "x.csv", "--by", "cross1.F")
     assert done.exit_code == 2
@@ -58,7 +58,7 @@ def test_what_is_not_installed_is_said_before_anything_is_written(tmp_path, monk
     assert done.exit_code == 2
     assert "pip install pyarrow" in done.stderr
     assert not out.exists()
-    with ResultStore.open(path) as store, pytest.raises(InputError, match="pip install xarray"):
+    with Reader.open(path) as store, pytest.raises(InputError, match="pip install xarray"):
         store.to_xarray()
 
 
@@ -67,14 +67,14 @@ def test_parquet_has_columns_units_and_rows(tmp_path):
     path, out = synthetic.store(tmp_path, failed=2), tmp_path / "x.parquet"
     assert export(path, "--parquet", out).exit_code == 0
     frame = pd.read_parquet(out)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         pd.testing.assert_frame_equal(frame, store.to_pandas(), check_like=False, check_index_type=False)
     assert frame.attrs["units"]["cross1.T_max"] == "N*m"
 
 
 def test_xarray_has_units_and_descriptions(tmp_path):
     pytest.importorskip("xarray")
-    with ResultStore.open(synthetic.store(tmp_path, failed=2)) as store:
+    with Reader.open(synthetic.store(tmp_path, failed=2)) as store:
         data, frame = store.to_xarray(), store.to_pandas()
     assert data.sizes == {"row": 61}
     assert data["cross1.F_max"].attrs["units"] == "N"

@@ -22,7 +22,7 @@ from tests.support import fakes
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import SCHEMA_VERSION
-from tolstat.store import ResultStore, integrity, result_file
+from tolstat.store import Reader, integrity, result_file
 
 GOLDEN = make_golden.FOLDER / f"schema{SCHEMA_VERSION}.h5"
 OLDER = sorted(set(make_golden.FOLDER.glob("schema*.h5")) - {GOLDEN})
@@ -30,7 +30,7 @@ OLDER = sorted(set(make_golden.FOLDER.glob("schema*.h5")) - {GOLDEN})
 
 def read_all(path: Path) -> int:
     """Read everything that a result file holds; number of its joints."""
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         store.counts()
         store.errors()
         store.results()
@@ -43,7 +43,7 @@ def read_all(path: Path) -> int:
 
 def test_a_released_file_is_read() -> None:
     expected = pd.read_csv(GOLDEN.with_suffix(".csv"), index_col="row")
-    with ResultStore.open(GOLDEN) as store:
+    with Reader.open(GOLDEN) as store:
         frame = store.to_pandas()
         assert (store.n, store.rows, store.campaign_rows, store.whole) == (3, range(3), 3, True)
         assert store.limits == {"cross1.F": 700.0}
@@ -78,7 +78,7 @@ def whole(tmp_path: Path) -> Path:
 def test_xarray_opens_each_group(whole: Path) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
-    with ResultStore.open(whole) as store:
+    with Reader.open(whole) as store:
         results, loads = store.results(), store.histories("loads")
     with xarray.open_dataset(whole, engine="h5netcdf", group="results") as opened:
         assert opened.sizes == {"row": 6}
@@ -282,14 +282,14 @@ def test_no_pickle_anywhere() -> None:
 
 
 def test_a_released_file_lacks_nothing_that_is_asked_for() -> None:
-    with ResultStore.open(GOLDEN) as store:
+    with Reader.open(GOLDEN) as store:
         assert set(store.to_pandas().columns) >= {c.name for c in ERROR_COLUMNS + RESULT_COLUMNS}
 
 
 def test_files_of_older_schemas_are_refused() -> None:
     for path in OLDER:
         with pytest.raises(StoreError, match=rf"this tolstat reads {SCHEMA_VERSION}\n.*run its study again"):
-            ResultStore.open(path)
+            Reader.open(path)
 
 
 @pytest.mark.parametrize(("further", "remedy"), [(-1, "run its study again"), (1, "use a newer tolstat")])
@@ -301,7 +301,7 @@ def test_another_schema_is_refused_in_one_sentence(tmp_path: Path, further: int,
         file.attrs["schema_version"] = version
         integrity.seal(file)
     with pytest.raises(StoreError, match=rf"schema version {version}, this tolstat reads {SCHEMA_VERSION}\n.*{remedy}"):
-        ResultStore.open(path)
+        Reader.open(path)
 
 
 def test_a_copy_of_a_file_is_not_changed_by_reading(tmp_path: Path) -> None:

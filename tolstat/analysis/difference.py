@@ -146,7 +146,7 @@ def quantiles(
         As `shares`.
     """
     x, y = _valid(*_sides(a, b, paired), paired)
-    of_a, of_b = (quantile.at(side, np.ones(side.size, int), share, confidence) for side in (x, y))
+    of_a, of_b = (quantile.quantile(side, np.ones(side.size, int), share, confidence) for side in (x, y))
     estimate = of_b.estimate - of_a.estimate
     lower, upper = np.nan, np.nan
     if iid and paired and min(share, 1.0 - share) * x.size >= BEYOND:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
     from tolstat.store.view import View
 
 
@@ -60,7 +60,7 @@ def export(
     Example: tolstat export iso2768_f.h5 --csv joints.csv
     """
     from tolstat.common.files import check_target
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
     given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--json": statistics}
     targets = [target for target in given.values() if target is not None]
@@ -77,7 +77,7 @@ def export(
     for target in targets:
         if target != "-":
             check_target(Path(target), file)
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         if cycles is not None:
             _write(cycles, *_collectives(store.view()))
         if statistics is not None:
@@ -111,7 +111,7 @@ def _collectives(view: View) -> tuple[Callable[[TextIO], None], str]:
     return lambda stream: table.to_csv(stream, index=False, lineterminator="\n"), what
 
 
-def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
+def _statistics(store: Reader, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
     from tolstat.report import summary

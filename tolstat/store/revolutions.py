@@ -73,7 +73,7 @@ def read(store: Reader, slots: NDArray[np.intp], max_angles: int = ANGLES) -> Re
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         A campaign whose joints are drawn from tolerances.
     slots : ndarray of int, shape (m,)
         File slots, ascending; none pending.
@@ -114,7 +114,7 @@ def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         The campaign.
     slots : ndarray of int, shape (m,)
         File slots.

@@ -93,7 +93,7 @@ class SampleLoad:
         return Exceedance(*self.curve([level], confidence)[0].tolist())
 
     def quantile(self, share: float, confidence: float = CONFIDENCE) -> Quantile:
-        """Load that a share of the joints stays at or below; see `quantile.at`."""
+        """Load that a share of the joints stays at or below; see `quantile.quantile`."""
         if self.weights is None:
             return quantile.of_sample(self.sample, share, confidence, self.iid)
         return weighted.quantile_of(self._weighted, share, confidence)

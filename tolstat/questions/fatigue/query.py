@@ -187,8 +187,8 @@ def damages(loading: Loading, confidence: float = 0.95) -> pd.DataFrame:
             for part in (loading.cycles, loading.nominal)
         )
         head = {"channel": channel, **line._asdict(), "nominal": _only(nominal)}
-        head["median"] = quantile.at(sums, loading.status, 0.5).estimate
-        above = exceedance.at(sums, loading.status, 1.0, confidence, loading.iid)
+        head["median"] = quantile.quantile(sums, loading.status, 0.5).estimate
+        above = exceedance.exceedance(sums, loading.status, 1.0, confidence, loading.iid)
         rows.append({**head, **asdict(above), "confidence": confidence})
     return pd.DataFrame(rows)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 
 import tolstat
@@ -21,7 +22,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
-from tolstat.common.tables import Simulation, Status
+from tolstat.common.tables import Motion, Simulation, Status
 from tolstat.store import Counts, Reader, ResultStore, provenance
 from tolstat.store.result_file import text
 

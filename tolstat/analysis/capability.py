@@ -15,11 +15,13 @@ from numpy.typing import ArrayLike
 
 from tolstat.analysis import exceedance, quantile
 from tolstat.analysis.exceedance import Ends, Exceedance, FloatArray, Sample
+from tolstat.common.shown import shown
 
 REFERENCE = 0.9986501019683699
 """Share of a normal distribution below mean + 3 sigma."""
 
 
+@shown
 @dataclass(frozen=True)
 class Capability:
     """Capability of a load against its upper limit.

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.common.shown import shown
 from tolstat.common.tables import UNSETTLED, VALID, Status
 
 FloatArray = NDArray[np.float64]
@@ -21,6 +22,7 @@ Table = NDArray[np.void]
 Mask = NDArray[np.bool_]
 
 
+@shown
 @dataclass(frozen=True)
 class Exceedance:
     """Share of the joints whose load is above a level.

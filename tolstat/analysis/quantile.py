@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis.exceedance import FloatArray, Sample, sort_out
+from tolstat.common.shown import shown
 
 
+@shown
 class Quantile(NamedTuple):
     """Load that a share of the joints stays at or below.
 

@@ -18,11 +18,13 @@ from scipy.special import betaincinv
 from tolstat.analysis.exceedance import CURVE, Ends, Exceedance, FloatArray, Table, clopper_pearson, split
 from tolstat.analysis.quantile import Quantile
 from tolstat.analysis.reweight import smooth
+from tolstat.common.shown import shown
 
 LEAST_EFFECTIVE = 20.0
 """Minimum effective number of joints above a level for a trusted share."""
 
 
+@shown
 class Trust(NamedTuple):
     """Diagnostics of the weights above a level.
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tolstat.campaign.trace import CaseResult
 from tolstat.common.columns import Column
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.shown import shown
 from tolstat.common.tables import Options, Status
 from tolstat.solver.simulation import simulate_rows, warm_up
 from tolstat.store import Reader
@@ -18,6 +19,7 @@ from tolstat.store.provenance import versions
 from tolstat.store.recorded import options_of, parameters
 
 
+@shown
 class Difference(NamedTuple):
     """A value that differs from the stored one.
 
@@ -41,6 +43,7 @@ class Difference(NamedTuple):
         return abs(self.now - self.stored) / max(abs(self.now), abs(self.stored))
 
 
+@shown
 class Replay(NamedTuple):
     """A joint simulated again.
 

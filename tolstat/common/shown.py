@@ -56,6 +56,8 @@ def short(value: object) -> str:
         items = [f"{key!r}: {short(item)}" for key, item in value.items()]
         return f"{{{', '.join(items)}}}" if len(items) <= MAX_ITEMS else f"<{len(items)} entries>"
     if isinstance(value, list | tuple) and not hasattr(value, "_fields"):
+        if value and all(_is_shown(item) for item in value):
+            return f"<{len(value)} {type(value[0]).__name__}>"
         return f"[{', '.join(map(short, value))}]" if len(value) <= MAX_ITEMS else f"<{len(value)} items>"
     text = repr(value)
     return text if len(text) <= MAX_TEXT else f"<{type(value).__name__}>"

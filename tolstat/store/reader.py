@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results
 from tolstat.common.errors import StoreError
+from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.shown import table
 from tolstat.common.tables import Status, Variant
 from tolstat.store import checks, integrity
 from tolstat.store.checked_tables import CheckedTables
@@ -141,6 +143,25 @@ class Reader(CheckedTables):
             raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
         checks.check_histories(file, self.history_specs, self.n)
         self._parts = HistoryParts(parts_folder(path), self.n, self.history_specs, campaign_digest(file))
+
+    def __repr__(self) -> str:
+        if not self._file:
+            return f"<result file {self.path.name!r}, closed>"
+        return f"<result file {self.path.name!r}: {self.n - self.first_sample} joints, {self._progress()}>"
+
+    def _repr_html_(self) -> str:
+        entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
+        entries += [("sampling", self.sampling["method"]), ("created", self.created)]
+        entries += [(f"limit of {name}", f"{limit:g} {UNIT_OF_LOAD[name]}") for name, limit in self.limits.items()]
+        if self._file:
+            entries.append(("loads", ", ".join(self.loads)))
+        return table(repr(self)[1:-1], entries)
+
+    def _progress(self) -> str:
+        """Numbers of joints by status, the nominal joint not counted; states as the file has them, unchecked."""
+        codes, numbers = np.unique(self.column("results", "status", slice(self.first_sample, None)), return_counts=True)
+        labels = {status.value: status.label for status in Status}
+        return ", ".join(f"{n} {labels.get(code, 'damaged')}" for code, n in zip(codes.tolist(), numbers, strict=True))
 
     def __enter__(self) -> Self:
         return self

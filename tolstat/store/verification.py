@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results, tables
 from tolstat.common.columns import Column
+from tolstat.common.shown import shown
 from tolstat.store.new_file import create_table
 from tolstat.store.result_file import put_attributes, text
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 GROUP = "verify"
 
 
+@shown
 class Check(NamedTuple):
     """Results of the joints with other settings or another solver.
 
@@ -39,6 +41,7 @@ class Check(NamedTuple):
     results: NDArray[np.void]
 
 
+@shown
 class Verification(NamedTuple):
     """Some joints of a campaign: their results in the campaign and in each check.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results
+from tolstat.common import selected_results, shown
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import DESIGN, Variant
@@ -25,7 +25,7 @@ from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Case:
     """One joint to be simulated.
 
@@ -57,8 +57,20 @@ class Case:
         """Name of the file without folder and ending."""
         return self.path.stem
 
+    def __repr__(self) -> str:
+        errors = f"{len(self.errors)} errors" if self.errors else "no errors"
+        return f"<case {self.name!r}: one joint, {errors}, {self.solver.fidelity}>"
 
-@dataclass(frozen=True)
+    def _repr_html_(self) -> str:
+        return shown.table(repr(self)[1:-1], self._entries())
+
+    def _entries(self) -> list[tuple[str, object]]:
+        """Named values that a notebook shows."""
+        turned = [*self.operation.model_dump(mode="json").items(), *self.solver.model_dump(mode="json").items()]
+        return [("file", str(self.path)), *turned, *self.errors.items()]
+
+
+@dataclass(frozen=True, repr=False)
 class Study(Case):
     """A campaign: its joints, the distribution of their errors, limits, and what is stored.
 
@@ -149,6 +161,16 @@ class Study(Case):
         if self.limits or self.output.results is None:
             return list(self.limits)
         return [load for load in UNIT_OF_LOAD if selected_results.holds(self.output.columns, load)]
+
+    def __repr__(self) -> str:
+        parts = [f"{self.samples} joints ({self.sampling.method})", f"{len(self.tolerances)} toleranced errors"]
+        parts.append(f"{len(self.limits)} limit{'s' * (len(self.limits) != 1)}")
+        return f"<study {self.name!r}: {', '.join(parts)}>"
+
+    def _entries(self) -> list[tuple[str, object]]:
+        limits = [(f"limit of {name}", f"{limit:g} {UNIT_OF_LOAD[name]}") for name, limit in self.limits.items()]
+        sampling = [("sampling", self.sampling.method), ("joints", self.samples), ("seed", self.sampling.seed)]
+        return [*super()._entries(), *sampling, ("toleranced", ", ".join(self.tolerances)), *limits]
 
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.

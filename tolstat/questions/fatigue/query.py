@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import cycles, damage, exceedance, quantile
 from tolstat.analysis.cycles import Cycles, FloatArray
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.shown import shown
 from tolstat.common.tables import CHANNELS, ERROR_FIELDS, Status
 from tolstat.questions.fatigue.counting import cycles_of
 from tolstat.store.view import View
@@ -23,6 +24,7 @@ MAX_NUMBERS = 40
 """Maximum number of points of a spectrum."""
 
 
+@shown
 @dataclass(frozen=True)
 class Loading:
     """Load cycles of the joints of one campaign or of a duty cycle, and the settings of their evaluation.

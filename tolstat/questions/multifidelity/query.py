@@ -19,6 +19,7 @@ from tolstat.campaign.plan import simulate_timed
 from tolstat.campaign.progress import note
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
+from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean, validate
 from tolstat.joint import perturb
 from tolstat.sampling import draw, draw_blocks
@@ -33,6 +34,7 @@ MAX_TIMED = 64
 """Maximum number of joints simulated to measure the cost of a fidelity."""
 
 
+@shown
 class TwoFidelities(NamedTuple):
     """Result of a campaign at two fidelities.
 

@@ -26,6 +26,7 @@ from tolstat.campaign.progress import note
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS
+from tolstat.common.shown import shown
 from tolstat.store import Reader, ResultStore
 from tolstat.study import Study, subset_of
 from tolstat.study.model import Subset
@@ -36,6 +37,7 @@ MIN_PARALLEL = 2000
 _LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
 
 
+@shown
 class RareEvent(NamedTuple):
     """Result of a subset simulation.
 

@@ -76,7 +76,7 @@ def test_xarray_has_units_and_descriptions(tmp_path):
     pytest.importorskip("xarray")
     with Reader.open(synthetic.store(tmp_path, failed=2)) as store:
         data, frame = store.to_xarray(), store.to_pandas()
-    assert data.sizes == {"row": 61}
+    assert data.sizes == {"row": 60}
     assert data["cross1.F_max"].attrs["units"] == "N"
     assert data[ERROR_COLUMNS[0].name].attrs["description"] == ERROR_COLUMNS[0].description
     assert (data["status"].to_numpy() == frame["status"].to_numpy()).all()

@@ -28,7 +28,7 @@ from tolstat.questions.accuracy import rendering
 from tolstat.questions.causes.tail import worst_joints
 from tolstat.questions.exceedance import query, sweep
 from tolstat.questions.exceedance import rendering as exceedance
-from tolstat.store import Reader, integrity, result_file, verification
+from tolstat.store import Reader, integrity, new_file, result_file, verification
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
 COURSE = [c.name for c in RESULT_COLUMNS if c.field not in kept.OPTIONAL_FIELDS]
@@ -101,8 +101,8 @@ def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
     campaign.run(fakes.Study(), everything, 1, stages=fakes.stages())
     campaign.run(fake(), path, 1, 7, stages=fakes.stages())
     with h5py.File(path) as file:
-        assert set(file["results"]) == {*COURSE, *CROSS_F}
-        assert set(file["verify/half_step"]) == {*COURSE, *CROSS_F}
+        assert set(file["results"]) == {*COURSE, *CROSS_F, "row", "nominal"}
+        assert set(file["verify/half_step"]) == {*COURSE, *CROSS_F, "rows"}
     with Reader.open(path) as store, Reader.open(everything) as whole:
         found, expected = store.results(), whole.results()
         for c in RESULT_COLUMNS:
@@ -117,7 +117,7 @@ def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
         assert checked is not None
         assert np.isnan(checked.checks["newton"].results["T_max"]).all()
         assert np.isfinite(checked.checks["newton"].results["F_max"][:, :4]).all()
-    assert path.stat().st_size < everything.stat().st_size - 60 * (result_file.COLUMN_OVERHEAD // 2)
+    assert path.stat().st_size < everything.stat().st_size - 60 * (new_file.COLUMN_OVERHEAD // 2)
 
 
 def test_the_checksum_covers_what_is_stored(tmp_path: Path) -> None:

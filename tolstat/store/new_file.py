@@ -163,7 +163,7 @@ def _create_session(file: h5py.File) -> None:
     group = file.create_group("session")
     for name, (dtype, unit, description) in SESSION.items():
         blank = np.nan if dtype == "f8" else 0
-        dataset = group.create_dataset(name, (), dtype, dcpl=_allocated(dtype, blank))
+        dataset = group.create_dataset(name, data=np.array(blank, dtype))  # written now, so that its place is fixed
         put_attributes(dataset, {"units": unit, "description": description})
 
 

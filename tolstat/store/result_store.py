@@ -171,7 +171,9 @@ class ResultStore(Reader):
 
     def end_session(self) -> None:
         """Record that the run is over; after a killed run, readers infer this from the missing lock (`session`)."""
-        self._file["session/started"][()] = np.nan
+        session = self._file["session"]
+        session["started"][()] = np.nan
+        session["done"][()] = 0
         self._sync()
 
     def finish(self) -> None:

@@ -1,7 +1,7 @@
 """The tables of docs/result_format.md and docs/model.md, and the page of the present schema in docs/schemas/.
 
-They are made from `tolstat.common.tables`, `tolstat.joint.contact` and the layout in `tolstat.store`. ``python -m tests.format_tables`` brings the
-documents up to date; a test compares.
+They are made from `tolstat.common.tables`, `tolstat.joint.contact` and the layout in `tolstat.store`.
+``python -m tests.format_tables`` brings the documents up to date; a test compares.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def axis_table() -> str:
         told = held if len(held) <= 8 else [*held[:2], "...", held[-1]]
         lines.append(f"| `{name}` | {', '.join(told)} | 1 | {text} |")
     for name, values in {"theta": "2 pi k / steps_per_rev", "harmonic": "0, 1, 2, ..."}.items():
-        _, unit, text = axes.scale(name, 4)
+        _, unit, text = axes.scale_of(name, 4)
         lines.append(f"| `{name}` | {values} | {unit} | {text} |")
     return "\n".join(lines)
 

@@ -25,20 +25,20 @@ NAMES: dict[str, tuple[tuple[str, ...], str]] = {
 
 def attach_scales(dataset: h5py.Dataset, row: h5py.Dataset, spec: HistorySpec) -> None:
     """Attach dimension scales to a history: `row` to the first axis, those named in `spec` to the others."""
-    dataset.dims[0].attachscale(row)
+    dataset.dims[0].attach_scale(row)
     name = dataset.name.rpartition("/")[2]
     given = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
     for k, (axis, size) in enumerate(zip(given, spec.shape, strict=True), 1):
         if axis not in dataset.parent:
-            values, unit, description = scale(axis, size)
+            values, unit, description = scale_of(axis, size)
             text = h5py.string_dtype() if values.dtype.kind == "O" else None
             scale = dataset.parent.create_dataset(axis, data=values, dtype=text)
-            scale.makescale(axis)
+            scale.make_scale(axis)
             put_attributes(scale, {"units": unit, "description": description})
-        dataset.dims[k].attachscale(dataset.parent[axis])
+        dataset.dims[k].attach_scale(dataset.parent[axis])
 
 
-def scale(axis: str, size: int) -> tuple[NDArray[Any], str, str]:
+def scale_of(axis: str, size: int) -> tuple[NDArray[Any], str, str]:
     """Values along an axis, their unit and their description."""
     if axis in NAMES and len(NAMES[axis][0]) == size:
         return np.array(NAMES[axis][0], dtype=object), "1", NAMES[axis][1]

@@ -147,7 +147,7 @@ class Reader(CheckedTables):
     def __repr__(self) -> str:
         if not self._file:
             return f"<result file {self.path.name!r}, closed>"
-        return f"<result file {self.path.name!r}: {self.n - self.first_sample} joints, {self._progress()}>"
+        return f"<result file {self.path.name!r}: {self.n - self.first_sample} joints ({self._progress()})>"
 
     def _repr_html_(self) -> str:
         entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]

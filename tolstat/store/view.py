@@ -97,7 +97,7 @@ class View:
         self._loads: dict[str, SampleLoad] = {}
 
     def __repr__(self) -> str:
-        loads = f"{len(self.kept_loads)} loads, limits: {', '.join(self.limits) or 'none'}"
+        loads = f"{len(self.kept_loads)} loads, {len(self.limits)} with a limit"
         return f"<view of {self.path.name!r}: {self.n} joints ({METHODS.get(self.method, self.method)}), {loads}>"
 
     def _repr_html_(self) -> str:

@@ -28,11 +28,11 @@ def shown(cls: type[T]) -> type[T]:
 def table(title: str, entries: Iterable[tuple[str, object]]) -> str:
     """HTML table of named values, for a notebook; tables among the values are tables inside it."""
     rows = "".join(
-        f'<tr><th style="text-align:left;vertical-align:top">{escape(name)}</th>'
+        f'<tr><th style="text-align:left;vertical-align:top;white-space:nowrap">{escape(name)}</th>'
         f'<td style="text-align:left">{_html(value)}</td></tr>'
         for name, value in entries
     )
-    return f"<table><caption>{escape(title)}</caption>{rows}</table>"
+    return f'<table><caption style="text-align:left;white-space:nowrap">{escape(title)}</caption>{rows}</table>'
 
 
 def short(value: object) -> str:
@@ -92,5 +92,6 @@ def _html(value: Any) -> str:
     if _is_shown(value):
         return _repr_html(value)
     if isinstance(value, str):
-        return f'<pre style="margin:0;white-space:pre-wrap">{escape(value)}</pre>'
+        text = escape(value)
+        return f'<pre style="margin:0;white-space:pre-wrap">{text}</pre>' if "\n" in value else text
     return escape(short(value))

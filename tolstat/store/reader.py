@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results
 from tolstat.common.errors import StoreError
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import limits_in_words
 from tolstat.common.shown import table
 from tolstat.common.tables import Status, Variant
 from tolstat.store import checks, integrity
@@ -152,7 +152,7 @@ class Reader(CheckedTables):
     def _repr_html_(self) -> str:
         entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
         entries += [("sampling", self.sampling["method"]), ("created", self.created)]
-        entries += [(f"limit of {name}", f"{limit:g} {UNIT_OF_LOAD[name]}") for name, limit in self.limits.items()]
+        entries.append(("limits", limits_in_words(self.limits)))
         if self._file:
             entries.append(("loads", ", ".join(self.loads)))
         return table(repr(self)[1:-1], entries)

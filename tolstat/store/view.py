@@ -15,7 +15,7 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS
+from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS, limits_in_words
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, FAILED, RESULT, UNSETTLED, VALID, Status
@@ -101,8 +101,8 @@ class View:
         return f"<view of {self.path.name!r}: {self.n} joints ({METHODS.get(self.method, self.method)}), {loads}>"
 
     def _repr_html_(self) -> str:
-        limits = [(f"limit of {name}", f"{limit:g} {LOADS[name].unit}") for name, limit in self.limits.items()]
-        return table(repr(self)[1:-1], [("study", self.name), ("loads", ", ".join(self.kept_loads)), *limits])
+        loads = [("loads", ", ".join(self.kept_loads)), ("limits", limits_in_words(self.limits))]
+        return table(repr(self)[1:-1], [("study", self.name), *loads])
 
     @cached_property
     def study(self) -> Study:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results, shown
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.study.design import Design, flat
@@ -66,8 +66,11 @@ class Case:
 
     def _entries(self) -> list[tuple[str, object]]:
         """Named values that a notebook shows."""
-        turned = [*self.operation.model_dump(mode="json").items(), *self.solver.model_dump(mode="json").items()]
-        return [("file", str(self.path)), *turned, *self.errors.items()]
+        point, solver = self.operation, self.solver
+        turned = f"{math.degrees(point.alpha):.4g} deg, {point.speed * 30 / math.pi:.4g} rpm, {point.torque:.4g} N m"
+        words = f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution"
+        errors = ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none"
+        return [("file", str(self.path)), ("operation", turned), ("solver", words), ("fixed errors, SI", errors)]
 
 
 @dataclass(frozen=True, repr=False)
@@ -168,9 +171,9 @@ class Study(Case):
         return f"<study {self.name!r}: {', '.join(parts)}>"
 
     def _entries(self) -> list[tuple[str, object]]:
-        limits = [(f"limit of {name}", f"{limit:g} {UNIT_OF_LOAD[name]}") for name, limit in self.limits.items()]
-        sampling = [("sampling", self.sampling.method), ("joints", self.samples), ("seed", self.sampling.seed)]
-        return [*super()._entries(), *sampling, ("toleranced", ", ".join(self.tolerances)), *limits]
+        sampling = f"{self.sampling.method}, {self.samples} joints, seed {self.sampling.seed}"
+        toleranced = ("toleranced", ", ".join(self.tolerances) or "none")
+        return [*super()._entries(), ("sampling", sampling), toleranced, ("limits", limits_in_words(self.limits))]
 
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.

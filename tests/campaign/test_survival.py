@@ -183,7 +183,7 @@ def test_a_torn_block_is_simulated_again(tmp_path: Path, expected: dict[str, byt
     with Reader.open(path) as store:
         assert store.damaged().tolist() == [5, 6, 7, 8, 20]
         assert store.pending().tolist() == [5, 6, 7, 8, 20]
-        assert store.to_pandas()["status"].iloc[[4, 5, 20]].tolist() == ["ok", "pending", "pending"]
+        assert store.to_pandas()["status"].loc[[4, 5, 20]].tolist() == ["ok", "pending", "pending"]
         assert np.isnan(store.results()["F_max"][5:9]).all()
     campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
     assert datasets(path) == expected

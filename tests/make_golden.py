@@ -31,7 +31,7 @@ def make(folder: Path) -> Path:
         file.attrs["git_commit"] = ""
         integrity.seal(file)
     with Reader.open(path) as store:
-        store.to_pandas().to_csv(path.with_suffix(".csv"), lineterminator="\n")
+        store.to_pandas(nominal=True).to_csv(path.with_suffix(".csv"), lineterminator="\n")
     return path
 
 

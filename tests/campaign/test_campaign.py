@@ -37,7 +37,8 @@ def datasets(path: Path) -> dict[str, bytes]:
 
     def take(name: str, item: object) -> None:
         if isinstance(item, h5py.Dataset):
-            found[name] = item[...].tobytes()
+            held = item[...]  # names along an axis are Python objects, whose bytes are addresses
+            found[name] = b" ".join(held.tolist()) if held.dtype.kind == "O" else held.tobytes()
 
     with h5py.File(path, "r") as file:
         file.visititems(take)

@@ -45,7 +45,7 @@ def read_all(path: Path) -> int:
 def test_a_released_file_is_read() -> None:
     expected = pd.read_csv(GOLDEN.with_suffix(".csv"), index_col="row")
     with Reader.open(GOLDEN) as store:
-        frame = store.to_pandas()
+        frame = store.to_pandas(nominal=True)
         assert (store.n, store.rows, store.campaign_rows, store.whole) == (3, range(3), 3, True)
         assert store.limits == {"cross1.F": 700.0}
         assert (store.study_name, store.sampling["seed"], store.options["steps_per_rev"]) == ("fake", 7, 30)

@@ -177,7 +177,7 @@ def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path)
     assert (done.exit_code, done.stdout) == (0, "")
     table = pd.read_csv(out, header=[0, 1], index_col=0)
     assert list(table.columns) == [(c.name, c.unit) for c in ERROR_COLUMNS + RESULT_COLUMNS]
-    assert list(table.index) == list(range(61))
+    assert list(table.index) == list(range(1, 61))
     with Reader.open(path) as store:
         errors, results = store.errors(), store.results()
     assert np.array_equal(table["pin1.offset_t", "m"], errors["pin1.offset_t"])

@@ -187,13 +187,15 @@ def test_every_fault_of_the_section_is_told():
 
 def test_pylife_series_holds_every_cycle_and_survives_a_file(campaign, tmp_path):
     with Reader.open(campaign()) as store:
-        series = tolstat.pylife_series(store.view(), revolutions=10.0)
+        series = tolstat.pylife_series(store.view(), revolutions=10.0, nominal=True)
+        samples = tolstat.pylife_series(store.view())
         counted = cycles_of(store, np.arange(store.n))
     assert series.index.names == ["range", "mean", "joint", "channel"]
     assert isinstance(series.index.levels[0], pd.IntervalIndex)
     assert series.groupby("joint").sum().to_dict() == {
         i: n for i, n in enumerate(10.0 * counted.number.sum(axis=1)) if n > 0
     }
+    assert set(samples.index.get_level_values("joint")) == set(series.index.get_level_values("joint")) - {0}
     one = series.xs((3, "fork1.F_z"), level=["joint", "channel"])
     here = counted.of("fork1.F_z")
     for size, mean in zip(here.ranges[3, 0], here.means[3, 0], strict=True):
@@ -224,7 +226,7 @@ def test_pylifes_own_damage(campaign):
     import pylife.stress.collective  # noqa: F401
 
     with Reader.open(campaign()) as store:
-        series = tolstat.pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7)
+        series = tolstat.pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7, nominal=True)
         sums = damage.damage(cycles_of(store, np.arange(store.n), ["cross1.F_t"]), LINE, 1e7)[:, 0]
     curve = pd.Series({"k_1": LINE.m, "ND": LINE.N0, "SD": LINE.S0 / 2})  # amplitudes
     theirs = curve.fatigue.miner_elementary().damage(series.load_collective).groupby("joint").sum()

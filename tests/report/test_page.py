@@ -20,7 +20,7 @@ from tolstat.questions.exceedance import query
 from tolstat.questions.joints import query as joints
 from tolstat.report import html as writer
 from tolstat.report import page, verdict
-from tolstat.store import Reader, ResultStore, revolutions
+from tolstat.store import Reader, revolutions
 from tolstat.store.recall import recall
 from tolstat.store.view import MAX_LISTED
 
@@ -110,8 +110,8 @@ def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypa
 
     monkeypatch.setattr(Reader, "column", counting)
     monkeypatch.setattr(revolutions, "read", drawn)
-    opened = mock.Mock(side_effect=ResultStore.open)
-    monkeypatch.setattr(ResultStore, "open", opened)
+    opened = mock.Mock(side_effect=Reader.open)
+    monkeypatch.setattr(Reader, "open", opened)
     recalled = mock.Mock(side_effect=recall)
     monkeypatch.setattr("tolstat.store.view.recall", recalled)
     page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=replay)
@@ -248,7 +248,7 @@ def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
 def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     calls = []
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(page, "write", lambda *given: calls.append(given) or tmp_path / "written")
+    monkeypatch.setattr(page, "write_page", lambda *given: calls.append(given) or tmp_path / "written")
     monkeypatch.setattr("tolstat.cli.report.announce_compilation", lambda: None)
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")

@@ -3,6 +3,7 @@
     study = tolstat.load("studies/iso2768_f.toml")
     tolstat.run(study, "iso2768_f.h5")
     with tolstat.open("iso2768_f.h5") as store:
+        force = store.loads["cross1.F"]
         frame = store.to_pandas()
         found = tolstat.causes_of(store.view(), "cross1.F")
 

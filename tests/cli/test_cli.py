@@ -22,7 +22,7 @@ from tolstat.campaign.executors import WorkerDied
 from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 
 COMMANDS = (*(command.replace("_", "-") for command in cli.COMMANDS), *bench.INSTRUMENTS)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
@@ -177,13 +177,13 @@ def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path)
     assert (done.exit_code, done.stdout) == (0, "")
     table = pd.read_csv(out, header=[0, 1], index_col=0)
     assert list(table.columns) == [(c.name, c.unit) for c in ERROR_COLUMNS + RESULT_COLUMNS]
-    assert list(table.index) == list(range(61))
-    with ResultStore.open(path) as store:
-        errors, results = store.errors(), store.results()
+    assert list(table.index) == list(range(1, 61))
+    with Reader.open(path) as store:
+        errors, results = store.errors()[1:], store.results()[1:]
     assert np.array_equal(table["pin1.offset_t", "m"], errors["pin1.offset_t"])
-    assert np.array_equal(table["cross1.F_max", "N"][:50], results["F_max"][:50, 0], equal_nan=True)
-    assert (table["status", "1"][50:] == "pending").all()
-    assert table["cross1.F_max", "N"][50:].isna().all()
+    assert np.array_equal(table["cross1.F_max", "N"][:49], results["F_max"][:49, 0], equal_nan=True)
+    assert (table["status", "1"][49:] == "pending").all()
+    assert table["cross1.F_max", "N"][49:].isna().all()
     assert call("export", path, "--csv", "-").stdout == out.read_text(encoding="utf-8")
 
 
@@ -212,7 +212,7 @@ def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
     names = ["case", "variant", "family", "group"]
     assert list(table.columns[:5]) == [*((name, "1") for name in names), (ERROR_COLUMNS[0].name, "m")]
     assert table.columns[-1] == (RESULT_COLUMNS[-1].name, "1")
-    with ResultStore.open(tmp_path / "small.h5") as store:
+    with Reader.open(tmp_path / "small.h5") as store:
         assert list(store.to_pandas().columns[:4]) == names
         assert table[names].to_numpy().tolist() == [
             [store.case_names[joint["case"]], joint["variant"], store.variants[joint["variant"]].family, joint["group"]]
@@ -268,7 +268,7 @@ def test_run_ends_with_the_report_and_resumes(study):
     assert done.exit_code == 0, done.stderr
     assert done.stdout.startswith("load")
     assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
-    with ResultStore.open("small.h5") as store:
+    with Reader.open("small.h5") as store:
         assert store.complete
     again = call("run", study, "--executor", "serial")
     assert (again.exit_code, again.stdout) == (0, done.stdout)
@@ -297,7 +297,7 @@ def test_run_refuses_the_file_of_another_study(study):
 
 def test_interrupted_run_says_how_to_resume(study, monkeypatch):
     path = synthetic.store(study.parent, simulated=20)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         counts = store.counts()
 
     def stopped(*_, **__):

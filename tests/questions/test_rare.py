@@ -23,7 +23,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
 from tolstat.questions.rare import query as rare
-from tolstat.store import ResultStore
+from tolstat.store import Reader, ResultStore
 from tolstat.store.recall import recall
 
 SEEDS = 500
@@ -161,7 +161,7 @@ def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
     assert found.estimate.lower < norm.sf(2.5) < found.estimate.upper
     assert found.reached
     assert found.joints == sum(level.joints for level in found.levels)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         errors, origin, loads = store.errors(), store.origin(), store.results()["F_max"][:, 0]
         assert recall(store).identity() == rare._sized(plan, store.n).identity()
     assert origin["level"][:101].tolist() == [-1, *[0] * 100]
@@ -183,7 +183,7 @@ def test_the_example_of_the_function_is_right(tmp_path):
 def test_level_0_is_the_random_campaign(whole):
     plan, _, path = whole
     drawn = load(plan.path.parent, PLAN.replace("n = 60", "n = 100"), "random")
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         np.testing.assert_array_equal(store.errors(slice(0, 101)), sampling.draw(drawn))
 
 
@@ -233,7 +233,7 @@ def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
     plan, _, path = whole
     with pytest.raises(StoreError, match=r"sampling.above: 950.0 in the file, 960.0 in the study"):
         rare.run(asked(load(tmp_path), 2.6), path)
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         results = store.results()
         results["F_max"][:, 0] *= -1.0
         store.write(np.arange(store.n), Simulation(results, {}))

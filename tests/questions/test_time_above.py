@@ -16,7 +16,7 @@ from tolstat.common.tables import CHANNELS, Options, Simulation
 from tolstat.questions.time_above import rendering
 from tolstat.questions.time_above.query import time_above
 from tolstat.solver.simulation import history_specs
-from tolstat.store import ResultStore, revolutions
+from tolstat.store import Reader, ResultStore, revolutions
 
 SEEDS = 500
 SAMPLES = 720
@@ -58,7 +58,7 @@ def run(*arguments):
 
 
 def test_times_of_known_waves_and_joints_told_apart_from_them(path):
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         found = time_above(store.view(), ["cross1.F", "cross1.F_t"], ["0.75 kN"])
     own = tops(201)[1:-2]  # row 0 is the nominal joint, the last two have failed
     expected = time_of(750.0, own)
@@ -125,7 +125,7 @@ def test_shares_have_their_unit_with_intervals_and_without(path):
 
 
 def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_path):
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         with pytest.raises(InputError) as found:
             time_above(store.view(), ["psi", "fork1.F"], ["700 mm"])
         for words in ("'psi' is no load of a bushing", "'700 mm' cannot be a value in N"):
@@ -138,7 +138,7 @@ def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_
             ("cross1.F", 1.0),
             ("cross1.T", 1.0),
         ]
-    with ResultStore.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
+    with Reader.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
         time_above(store.view())
     done = run(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"))
     assert done.exit_code == 2

@@ -228,7 +228,7 @@ def test_report_without_limits_prints_quantiles(tmp_path):
 def test_report_of_a_sweep_into_another_folder(tmp_path):
     elsewhere = tmp_path / "pictures"
     elsewhere.mkdir()
-    files = report.write(synthetic.store(tmp_path, synthetic.SWEEP, "clearance"), elsewhere)
+    files = report.write_report(synthetic.store(tmp_path, synthetic.SWEEP, "clearance"), elsewhere)
     assert [f.name for f in files] == [f"clearance_sweep.{kind}" for kind in ("png", "svg", "csv")]
     table = pd.read_csv(elsewhere / "clearance_sweep.csv")
     assert table["pin*.diameter [mm]"].iloc[[0, -1]].tolist() == pytest.approx([-0.1, 0.1])
@@ -236,8 +236,8 @@ def test_report_of_a_sweep_into_another_folder(tmp_path):
 
 def test_same_file_same_bytes(tmp_path):
     path = synthetic.store(tmp_path)
-    first = [file.read_bytes() for file in report.write(path)]
-    assert [file.read_bytes() for file in report.write(path)] == first
+    first = [file.read_bytes() for file in report.write_report(path)]
+    assert [file.read_bytes() for file in report.write_report(path)] == first
 
 
 def test_folder_that_is_not_there_and_file_that_is_not_ours(tmp_path):

@@ -21,9 +21,10 @@ from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, origin_blocks, streams
 from tolstat.solver import refinement
 from tolstat.solver.simulation import history_specs, simulate_rows
-from tolstat.store.histories import attach_scales, create_dataset
+from tolstat.store.axes import attach_scales
+from tolstat.store.histories import create_dataset, create_group
+from tolstat.store.new_file import attributes, fill
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.store.result_file import attributes, fill
 from tolstat.study.tolerances import meaning
 
 if TYPE_CHECKING:
@@ -263,7 +264,7 @@ def _width(share: float, n: int) -> float:
 def _limits(study: Study, results: NDArray[np.void]) -> list[LimitPlan]:
     plans = []
     for name, level in study.limits.items():
-        found = exceedance.at(
+        found = exceedance.exceedance(
             LOADS[name].of(results), results["status"], level, CONFIDENCE, ends=LOADS[name].ends(results)
         )
         valid = found.n - found.n_failed - found.n_unsettled
@@ -282,15 +283,20 @@ def _file_bytes(
     origin = origin_blocks(study, range(n))
     with h5py.File("pilot", "w", driver="core", backing_store=False, block_size=512) as file:
         fill(file, attributes(study, specs, dimensions(), options, choice), range(n), [errors], design, origin)
-        groups = [group for group in file.values() if isinstance(group, h5py.Group)]
-        datasets = [file["row"], *(dataset for group in groups for dataset in group.values())]
-        group = file.create_group("histories") if specs else file
+        group = create_group(file) if specs else file
         for name, spec in specs.items():
-            datasets.append(create_dataset(group, name, n, spec))
-            datasets[-1][...] = simulation.histories[name]
-            attach_scales(datasets[-1], file["row"], spec)
+            dataset = create_dataset(group, name, n, spec)
+            dataset[...] = simulation.histories[name]
+            attach_scales(dataset, file["row"], spec)
         file.flush()
-        by_row = sum(dataset.id.get_storage_size() for dataset in datasets) / n
+        sizes: list[int] = []
+
+        def add(_: str, item: h5py.HLObject) -> None:  # called once for each dataset, also where groups share it
+            if isinstance(item, h5py.Dataset) and item.shape[:1] == (n,):
+                sizes.append(item.id.get_storage_size())
+
+        file.visititems(add)
+        by_row = sum(sizes) / n
         return int(file.id.get_filesize() + by_row * (study.rows - n))
 
 

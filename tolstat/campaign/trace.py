@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
+from tolstat.common.shown import shown
 from tolstat.common.tables import BUSHINGS, CONTACTS, PINS, Motion, Options, Simulation, Status
 from tolstat.solver.simulation import simulate_rows, warm_up
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 LOADS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 
+@shown
 class CaseResult(NamedTuple):
     """A simulated case.
 

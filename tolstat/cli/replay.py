@@ -33,12 +33,12 @@ def replay(
     """
     from tolstat.campaign import replay as replays
     from tolstat.common.files import check_target
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
     if out is not None:
         check_target(out, file)
     announce_compilation()
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         again = replays.replay(store, row)
     summary = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     summary |= again.result.summary()

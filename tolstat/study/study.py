@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results
+from tolstat.common import selected_results, shown
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words
 from tolstat.common.strict import with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
@@ -30,7 +30,7 @@ from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.fits import Fit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Case:
     """One joint to be simulated.
 
@@ -67,8 +67,23 @@ class Case:
         (lined,) = with_lines([Fault(f"{self.path}: {key}", found, remedy)], str(self.path), self.text)
         return lined
 
+    def __repr__(self) -> str:
+        errors = f"{len(self.errors)} errors" if self.errors else "no errors"
+        return f"<case {self.name!r}: one joint, {errors}, {self.solver.fidelity}>"
 
-@dataclass(frozen=True)
+    def _repr_html_(self) -> str:
+        return shown.table(repr(self)[1:-1], self._entries())
+
+    def _entries(self) -> list[tuple[str, object]]:
+        """Named values that a notebook shows."""
+        point, solver = self.operation, self.solver
+        turned = f"{math.degrees(point.alpha):.4g} deg, {point.speed * 30 / math.pi:.4g} rpm, {point.torque:.4g} N m"
+        words = f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution"
+        errors = ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none"
+        return [("file", str(self.path)), ("operation", turned), ("solver", words), ("fixed errors, SI", errors)]
+
+
+@dataclass(frozen=True, repr=False)
 class Study(Case):
     """A campaign: its joints, the distribution of their errors, limits, and what is stored.
 
@@ -175,6 +190,16 @@ class Study(Case):
         if self.limits or self.output.results is None:
             return list(self.limits)
         return [load for load in UNIT_OF_LOAD if selected_results.holds(self.output.columns, load)]
+
+    def __repr__(self) -> str:
+        parts = [f"{self.samples} joints ({self.sampling.method})", f"{len(self.tolerances)} toleranced errors"]
+        parts.append(f"{len(self.limits)} limit{'s' * (len(self.limits) != 1)}")
+        return f"<study {self.name!r}: {', '.join(parts)}>"
+
+    def _entries(self) -> list[tuple[str, object]]:
+        sampling = f"{self.sampling.method}, {self.samples} joints, seed {self.sampling.seed}"
+        toleranced = ("toleranced", ", ".join(self.tolerances) or "none")
+        return [*super()._entries(), ("sampling", sampling), toleranced, ("limits", limits_in_words(self.limits))]
 
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.

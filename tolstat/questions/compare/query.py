@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import difference
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.store.counts import Counts
@@ -96,6 +97,7 @@ class Sides(NamedTuple):
         return a.valid_or_nan, b.valid_or_nan, a.unit
 
 
+@shown
 class Comparison(NamedTuple):
     """Differences between two campaigns.
 

@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,8 @@ from tolstat.campaign.progress import note
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS
-from tolstat.store import ResultStore
+from tolstat.common.shown import shown
+from tolstat.store import Reader, ResultStore
 from tolstat.store.recall import differing_keys
 from tolstat.study import Study, subset_of
 from tolstat.study.model import Subset
@@ -38,6 +39,7 @@ MIN_PARALLEL = 2000
 _LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
 
 
+@shown
 class RareEvent(NamedTuple):
     """Result of a subset simulation.
 
@@ -134,7 +136,16 @@ def subset_study(
     return subset_of(study, fields | own)
 
 
-def rare_event(study: Study, limit: str, out: str | Path, workers: int | None = None, **settings: Any) -> RareEvent:
+def rare_event(
+    study: Study,
+    limit: str,
+    out: str | Path,
+    workers: int | None = None,
+    n: int = 1000,
+    p0: float = 0.1,
+    seed: int | None = None,
+    unresolved: Literal["above", "below"] = "below",
+) -> RareEvent:
     """Estimate the probability of a rare load by subset simulation.
 
     Parameters
@@ -147,8 +158,8 @@ def rare_event(study: Study, limit: str, out: str | Path, workers: int | None = 
         Result file; an existing one of the same study, limit and settings is resumed.
     workers : int, optional
         As in `run`.
-    **settings
-        ``n``, ``p0``, ``seed`` and ``unresolved`` of `subset_study`.
+    n, p0, seed, unresolved
+        As in `subset_study`.
 
     Returns
     -------
@@ -167,7 +178,7 @@ def rare_event(study: Study, limit: str, out: str | Path, workers: int | None = 
     >>> found.estimate.lower < 0.0668 < found.estimate.upper  # the load is normal: 700 N, standard deviation 100 N
     True
     """
-    return run(subset_study(study, limit, **settings), Path(out), workers)
+    return run(subset_study(study, limit, n, p0, seed, unresolved), Path(out), workers)
 
 
 def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> RareEvent:
@@ -236,7 +247,7 @@ def _rows(out: Path) -> int:
     """Number of rows of the file, 0 if there is none."""
     if not out.exists():
         return 0
-    with ResultStore.open(out) as store:
+    with Reader.open(out) as store:
         return store.n
 
 
@@ -266,7 +277,7 @@ def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
     """Append the joints of a stage to the file, as pending rows."""
     origin = np.empty(len(stage), SUBSET)
     origin["level"], origin["parent"] = joints.level, joints.parent + plan.first_sample
-    with ResultStore.open(out, "r+") as store:
+    with ResultStore.open_to_write(out) as store:
         grow(store, _sized(plan, stage.stop), [sampling.from_scores(plan, joints.scores)], [origin])
 
 
@@ -277,7 +288,7 @@ def _loads(plan: Study, settings: Subset, out: Path, stage: range, joints: Candi
     stage are its file slots.
     """
     slots = slice(stage.start, stage.stop)
-    with ResultStore.open(out) as store:
+    with Reader.open(out) as store:
         results, origin = store.results(slots), store.origin(slots)
     parent = np.where(joints.parent < 0, -1, joints.parent + plan.first_sample)
     if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():

@@ -14,6 +14,7 @@ from tolstat.analysis import reweight
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -29,6 +30,7 @@ MAX_OUTSIDE = 1e-4
 _ENDS = np.array([1e-12, 1 - 1e-12])
 
 
+@shown
 class Reweighted(NamedTuple):
     """Statistics of a campaign reweighted to other tolerances.
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, output_file, say
+from tolstat.cli._app import ResultFile, as_text, output_file
+from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -37,11 +38,11 @@ def export(
     ] = None,
     statistics: Annotated[
         str | None,
-        typer.Option("--json", metavar="OUT", help="Write all statistics as JSON; - for standard output."),
+        typer.Option("--statistics", metavar="OUT", help="Write all statistics as JSON; - for standard output."),
     ] = None,
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="LOAD", help="With --json: load whose causes are included; repeatable."),
+        typer.Option("--by", metavar="LOAD", help="With --statistics: load whose causes are included, such as cross1.F; repeatable."),
     ] = None,
 ) -> None:
     """Export joints, load cycles or statistics to files.
@@ -52,7 +53,7 @@ def export(
 
     --parquet writes the same columns; pandas has their units in frame.attrs["units"].
 
-    --json writes the share above each limit, quantiles, capability, the numerical error and the software versions.
+    --statistics writes the share above each limit, quantiles, capability, the numerical error and the software versions.
 
     --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
     keeps cycles or load histories. docs/questions/fatigue.md shows how to read it as a pandas Series.
@@ -62,14 +63,14 @@ def export(
     from tolstat.common.files import check_target
     from tolstat.store import ResultStore
 
-    given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--json": statistics}
+    given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--statistics": statistics}
     targets = [target for target in given.values() if target is not None]
     if not targets or len(set(targets)) < len(targets):
         raise typer.BadParameter(
-            "give one or more of --csv OUT, --parquet OUT, --json OUT and --pylife OUT, each with its own file"
+            "give one or more of --csv OUT, --parquet OUT, --statistics OUT and --pylife OUT, each with its own file"
         )
     if by and statistics is None:
-        raise typer.BadParameter("--by is used with --json only: add --json OUT")
+        raise typer.BadParameter("--by is used with --statistics only: add --statistics OUT")
     if parquet is not None and find_spec("pyarrow") is None:
         raise InputError(
             [Fault("--parquet", "pyarrow is not installed", "install it with: pip install pyarrow, or use --csv OUT")]
@@ -77,7 +78,7 @@ def export(
     for target in targets:
         if target != "-":
             check_target(Path(target), file)
-    with ResultStore.open(file) as store:
+    with progress("reading the file"), ResultStore.open(file) as store:
         if cycles is not None:
             _write(cycles, *_collectives(store.view()))
         if statistics is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import say
+from tolstat.cli._talk import progress, say
 
 
 def merge(
@@ -27,7 +27,8 @@ def merge(
     """
     from tolstat.campaign import extend
 
-    merged = extend.merge(files, out)
+    with progress("merging"):
+        merged = extend.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
     lines = [f"{out}: {counts.done} joints, {counts.shortfall}"]

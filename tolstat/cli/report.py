@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, announce_compilation, make_folder, say, tell
+from tolstat.cli._app import ResultFile, Wide, announce_compilation, make_folder, tell, width_of
+from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
 PAGES = (".html", ".htm")
@@ -42,6 +43,7 @@ def report(
             "load histories.",
         ),
     ] = 1000,
+    wide: Wide = False,
 ) -> None:
     """Report the share of joints above each load.
 
@@ -64,7 +66,9 @@ def report(
     if out is not None:
         ResultStore.open(file).close()  # check the file before the folder is created
         make_folder(out)
-    tell(build(file, out))
+    with progress("report") as shown:
+        made = build(file, out, width_of(wide), shown.stage)
+    tell(made)
 
 
 def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
@@ -88,7 +92,9 @@ def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
     with ResultStore.open(file) as store:
         if again and store.sampling["method"] in DRAWN and not revolutions.held(store):
             announce_compilation()
-    say(f"wrote {page.write(file, out, accepted, again)}")
+    with progress("page") as shown:
+        page.write(file, out, accepted, again, shown.stage)
+    say(f"wrote {out}")
 
 
 def parse_share(text: str) -> float:

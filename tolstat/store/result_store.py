@@ -141,12 +141,11 @@ class ResultStore(Reader):
         parts = parts_folder(path)
         if parts.exists():
             raise store_error(
-                parts, "holds histories of another campaign", "delete it, or give another file: --out OTHER.h5"
+                parts, "holds histories of another campaign", "give another file: --out OTHER.h5"
             )
-        if not path.parent.is_dir():
-            raise store_error(path, "cannot be written: no such folder", f"create the folder: mkdir -p {path.parent}")
         held = range(study.rows) if rows is None else rows
         try:
+            path.parent.mkdir(parents=True, exist_ok=True)
             check_disk_space(path, size_of_new(len(held), selected_results.columns(study.identity())))
             with atomic_write(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
                 blocks = [errors] if isinstance(errors, np.ndarray) else errors
@@ -155,7 +154,7 @@ class ResultStore(Reader):
                 fill(file, attrs, held, blocks, design, origin)
         except FileExistsError as error:
             raise store_error(
-                path, "exists already", "resume or delete it, or give another file: --out OTHER.h5"
+                path, "exists already", "resume it with its own study, or give another file: --out OTHER.h5"
             ) from error
         except OSError as error:
             reason = error.strerror or str(error)

@@ -20,9 +20,9 @@ def capability(
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print ppm and Cpk against each limit of the study.
+    """Print yield and Cpk against each limit of the study.
 
-    Prints for each limit, and for all limits together, the share of joints above it (ppm) and the process capability
+    Prints for each limit, and for all limits together, the share of joints below it (yield) and the process capability
     index Cpk, each with its 95 % interval.
 
     With --one-in N, prints also the load that one in N joints exceeds, and the median of the largest load of N joints,

@@ -41,9 +41,9 @@ def plan(
     loaded = study.load(study_file, n=n)
     print_warnings(study_file, loaded.joints, loaded.variants)
     announce_compilation()
-    with progress("pilot") as shown:
+    with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)
-    typer.echo(as_text(asdict(made)) if as_json else _lines(made))
+    typer.echo(as_text(asdict(made) | {"seconds": made.seconds}) if as_json else _lines(made))
     say(f"next: tolstat run {study_file}" + ("" if n is None else f" --n {n}"))
 
 
@@ -55,8 +55,8 @@ def _lines(made: Plan) -> str:
         *([made.fidelity] if made.fidelity else []),
         *_rattle_warning(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
-        f"time: {_duration(sum(made.seconds.values()))} on {made.workers} cores, of which",
-        *(f"  {stage}: {_duration(seconds)}" for stage, seconds in made.seconds.items()),
+        f"time: {_duration(made.seconds)} on {made.workers} cores, of which",
+        *(f"  {stage}: {_duration(seconds)}" for stage, seconds in made.stages.items()),
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",
     ]

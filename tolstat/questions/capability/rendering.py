@@ -24,8 +24,8 @@ LIMITS = (
     Column("limit", lambda row: text.value(row["limit"], row["unit"])),
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("yield", lambda row: text.percent(row["good"])),
-    Column("interval of yield", lambda row: text.span(row["good_lower"], row["good_upper"]), rank=3),
-    Column("ppm", lambda row: text.number(row["ppm"])),
+    Column("interval of yield", lambda row: text.span(row["good_lower"], row["good_upper"])),
+    Column("ppm", lambda row: text.number(row["ppm"]), rank=1),
     Column("interval of ppm", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1"), rank=2),
     Column("Cpk", lambda row: _number(row["cpk"], ".2f")),
     Column("interval of Cpk", lambda row: _with_ends(row, "cpk", ".2f")),
@@ -65,7 +65,7 @@ def note(table: pd.DataFrame) -> str:
     if (table["cpk_lower"] == 0).any():
         lines.append(f"lower ends of Cpk need {table['needed'].iloc[0]} valid joints")
     if (table["normal_p"] < 0.01).any():
-        lines.append("loads are not normal: do not use the last column (p < 0.01)")
+        lines.append("loads are not normal: do not use the column 'Cpk if normal' (p < 0.01)")
     if table["ppm_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only; run replicates of other seeds")
     return "\n".join(lines)

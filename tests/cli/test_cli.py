@@ -22,9 +22,13 @@ from tolstat.campaign.executors import WorkerDied
 from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
+from tolstat.display import text
 from tolstat.store import ResultStore
 
-COMMANDS = (*(command.replace("_", "-") for command in cli.COMMANDS), *bench.INSTRUMENTS)
+COMMANDS = (
+    *(name.replace("_", "-") for names in cli.COMMANDS.values() for name in names),
+    *bench.INSTRUMENTS,
+)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
 
 
@@ -77,10 +81,14 @@ def test_every_command_has_help_with_every_option_explained(command):
 
 
 def test_help_lists_the_commands_in_order_each_with_its_whole_summary():
-    commands = call("--help").stdout.split("Commands:")[1]
-    listed = re.findall(r"^  ([\w-]+(?: [\w-]+)?)  +(.*)$", commands, flags=re.MULTILINE)
+    shown = call("--help").stdout
+    groups = shown[shown.index("Plan:") :]
+    listed = re.findall(r"^  ([a-z-]+(?: [a-z-]+)?)  +([A-Z].*[.])$", groups, flags=re.MULTILINE)
     assert tuple(name for name, _ in listed) == COMMANDS
-    assert [name for name, summary in listed if summary.endswith("...")] == []
+    headings = re.findall(r"^(\w[\w ]*):$", groups, flags=re.MULTILINE)
+    assert headings == [*cli.COMMANDS, "Measure tolstat itself"]
+    assert max(map(len, shown.splitlines())) <= 80
+    assert "..." not in groups
 
 
 def test_a_file_may_be_named_like_an_instrument(tmp_path, monkeypatch):
@@ -159,14 +167,22 @@ def test_status_of_a_file_in_any_state(tmp_path, simulated, pending):
     assert sum(found[state.label] for state in Status) == 61
     if simulated is None:
         assert (found["newton_failed"], found["not_settled"]) == (2, 1)
-    lines = call("status", path).stdout.splitlines()
+    head, _, table = call("status", path).stdout.partition("\n\n")
     shares = found.pop("exceedance")
-    assert lines[: len(found)] == [f"{name}: {value}" for name, value in found.items()]
+    lines = head.splitlines()
+    counts = [f"{state.label}: {found[state.label]}" for state in Status if found[state.label]]
+    assert lines[: 2 + len(counts)] == ["study: small", "joints: 61", *counts]
+    assert lines[2 + len(counts)] == "running: no"
     assert found["running"] is False
     assert "damaged" not in found
-    assert len(lines) == len(found) + len(shares)
-    for share, line in zip(shares, lines[len(found) :], strict=True):
-        assert line.startswith(f"P({share['load']} > {share['limit']:g} {share['unit']}): {share['estimate']} (")
+    if simulated is None:
+        assert set(found["causes"]) == {"newton_failed", "not_settled"}
+        assert "2 joints newton_failed: a step failed" in head
+        assert f"  hint, for row 58: {found['causes']['newton_failed']['remedy']}" in lines
+    for share, line in zip(shares, table.splitlines()[1:], strict=True):
+        assert line.split("  ")[0] == text.limit(share | {"level": share["limit"]})
+        assert f" {share['above']} of {share['of']} " in line
+        assert share["above"] / share["of"] == pytest.approx(share["estimate"], rel=1e-2)
         assert share["lower"] <= share["estimate"] <= share["upper"]
     assert bool(shares) == (simulated != 0)
 
@@ -222,9 +238,13 @@ def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
     assert (table["case", "1"] == "a").equals(table["hole4.offset_t", "m"] == 1e-4)
 
 
-def test_export_to_a_folder_that_is_not_there(tmp_path):
-    done = call("export", synthetic.store(tmp_path), "--csv", tmp_path / "no" / "all.csv")
+def test_missing_folders_are_made_for_files_and_not_inside_a_file(tmp_path):
+    path, new = synthetic.store(tmp_path), tmp_path / "new" / "folder"
+    assert call("export", path, "--csv", new / "all.csv").exit_code == 0
+    assert (new / "all.csv").is_file()
+    done = call("export", path, "--csv", path / "all.csv")
     assert done.exit_code == 2
+    assert f"cannot be written: {path} is no folder" in done.stderr
     assert "hint: " in done.stderr
 
 
@@ -242,9 +262,11 @@ def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
     assert lines[0].startswith("load")
-    assert [line.split()[0] for line in lines[1:]] == [
+    assert [line.split()[0] for line in lines[1:8]] == [
         "cross1.F", "fork1.T", "fork2.T", "fork3.T", "fork4.T", "pin1.contact", "psi"
     ]  # fmt: skip
+    assert lines[8] == ""
+    assert re.fullmatch(r"yield, all limits: [\d.]+ % \(95 %: .* %\), \d+ of 60 joints", lines[9])
     assert f"wrote {tmp_path / 'small_exceedance.png'}" in done.stderr
 
 
@@ -288,9 +310,29 @@ def test_run_checks_the_numerical_error_by_default(study, monkeypatch, option, c
 
 def test_run_refuses_the_file_of_another_study(study):
     call("run", study, "--n", 5, "--executor", "serial", "--no-report")
-    done = call("run", study, "--executor", "serial")
+    study.write_text(synthetic.STUDY.replace("seed = 2021", "seed = 1"), encoding="utf-8")
+    done = call("run", study, "--n", 5, "--executor", "serial")
     assert done.exit_code == 2
-    assert "sampling.n: 5 in the file, 60 in the study" in done.stderr
+    assert "sampling.seed: 2021 in the file, 1 in the study" in done.stderr
+    assert "hint: give another file: --out OTHER.h5" in done.stderr
+
+
+def test_another_number_of_joints_is_an_extension_of_the_file(study):
+    call("run", study, "--n", 5, "--executor", "serial", "--no-report")
+    before = Path("small.h5").read_bytes()
+    more = call("run", study, "--executor", "serial")
+    assert more.exit_code == 2
+    assert more.stderr == (
+        "error: small.h5: is the result file of this study with 5 joints, not 60\n"
+        "  hint: simulate more of its joints: tolstat extend small.h5 --n 60\n"
+    )
+    fewer = call("run", study, "--n", 3, "--executor", "serial")
+    assert "hint: read it as it is: tolstat report small.h5, or give another file: --out OTHER.h5" in fewer.stderr
+    assert Path("small.h5").read_bytes() == before
+    study.write_text(synthetic.STUDY.replace("seed = 2021", 'method = "lhs"'), encoding="utf-8")
+    call("run", study, "--n", 5, "--executor", "serial", "--no-report", "--out", "lhs.h5")
+    strata = call("run", study, "--executor", "serial", "--out", "lhs.h5")
+    assert "hint: give another file: --out OTHER.h5; a Latin hypercube has as many strata" in strata.stderr
 
 
 def test_interrupted_run_says_how_to_resume(study, monkeypatch):
@@ -396,7 +438,8 @@ def test_no_output_replaces_its_input(tmp_path, arguments):
 
 
 def test_a_folder_as_output_is_refused_before_the_work(tmp_path):
-    for target, word in ((tmp_path, "is a folder"), (tmp_path / "none" / "t.csv", "no such folder")):
+    (tmp_path / "file").touch()
+    for target, word in ((tmp_path, "is a folder"), (tmp_path / "file" / "t.csv", "is no folder")):
         ended = call("simulate", tmp_path / "case.toml", "--out", target)
         assert ended.exit_code == 2
         assert word in ended.stderr

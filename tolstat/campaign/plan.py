@@ -21,7 +21,7 @@ from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation
 from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, origin_blocks
 from tolstat.solver import refinement
-from tolstat.solver.simulation import history_specs, is_compiled, simulate_rows, warm_up
+from tolstat.solver.simulation import history_specs, simulate_rows, warm_up
 from tolstat.store.histories import attach_scales, create_dataset
 from tolstat.store.recorded import perturbed, settings, variants
 from tolstat.store.result_file import attributes, fill
@@ -39,9 +39,9 @@ ORDINARY = 680.0
 """Work of a joint that does not rattle, from `studies/iso2768_f.toml` with the default settings, Newton iterations."""
 CONFIDENCE = 0.95
 START_S = 4.0
-"""Time from the command to the first joint if it cannot be measured because the kernels were compiled, s."""
+"""Time from the command to the first joint: imports, loading the kernels, start of the workers; on one core, s."""
 REPORT_S, REPORT_S_PER_JOINT = 2.0, 2.5e-5
-"""Time of a report: imports and figures, and per joint; on a core that simulates some 50 joints a second, s."""
+"""Time of a report with 16 limits: imports and figures, and per joint; on the same core, s."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     """
     workers = workers or available_workers()
     stage(kernels())
-    start = _start(workers)
+    warm_up()
     stage("pilot")
     rows = np.unique(np.linspace(0, study.rows - 1, min(pilot, study.rows)).astype(np.intp))
     errors = _errors(study, rows)
@@ -178,7 +178,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     each = seconds / len(rows)
     stage("check of the numerical error")
     check = _check(study, params, simulation, [own[number] for number in variants(study, rows)])
-    stages = {"start": start, "joints": each * study.rows / workers, "check": check}
+    stages = {"start": START_S, "joints": each * study.rows / workers, "check": check}
     stages["report"] = REPORT_S + REPORT_S_PER_JOINT * study.rows
     iid = study.sampling.method == "random"
     valid = slice(study.first_sample, None)
@@ -200,13 +200,6 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(params, simulation.results),
     )
-
-
-def _start(workers: int) -> float:
-    """Time from the command to the first joint: that of this process, and as much again if there are workers."""
-    compiled = is_compiled()
-    warm_up()
-    return (2.0 if workers > 1 else 1.0) * time.process_time() if compiled else START_S
 
 
 def _check(study: Study, params: NDArray[np.void], simulation: Simulation, options: list[Options]) -> float:

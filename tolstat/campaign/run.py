@@ -251,7 +251,7 @@ def _check_same(store: ResultStore, study: Study, rows: range) -> None:
         if held != now[name]:
             differing.append(f"{name}: {noun} {held} in the file, {now[name]} now")
     if held_n := _other_number(store, study, differing):
-        raise StoreError(str(_of_number(store, held_n, study.sampling.n)))
+        raise StoreError(str(_of_number(store, held_n, study.samples)))
     if not differing and store.rows != rows:
         held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
         raise StoreError(str(Fault(str(store.path), f"holds rows {held}, not {asked}", f"give --rows {held}")))

@@ -83,7 +83,9 @@ def _log_file(path: Path) -> logging.Handler:
         handler = logging.FileHandler(path, encoding="utf-8")
     except OSError as error:
         found = f"cannot be written: {error.strerror or error}"
-        raise InputError([Fault(f"--log {path}", found, "give the path of a file, for example: --log run.log")]) from error
+        raise InputError(
+            [Fault(f"--log {path}", found, "give the path of a file, for example: --log run.log")]
+        ) from error
     form = logging.Formatter("%(asctime)s %(levelname)s %(message)s", "%Y-%m-%dT%H:%M:%SZ")
     form.converter = time.gmtime
     handler.setFormatter(form)
@@ -104,5 +106,3 @@ def progress(first: str = "") -> Iterator[Display]:
 
 def _detail(text: str) -> None:
     LOG.debug("%s", text)
-
-

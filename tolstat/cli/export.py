@@ -42,7 +42,11 @@ def export(
     ] = None,
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="LOAD", help="With --statistics: load whose causes are included, such as cross1.F; repeatable."),
+        typer.Option(
+            "--by",
+            metavar="LOAD",
+            help="With --statistics: load whose causes are included, such as cross1.F; repeatable.",
+        ),
     ] = None,
 ) -> None:
     """Export joints, load cycles or statistics to files.

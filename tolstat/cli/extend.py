@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
+from tolstat.cli import run
 from tolstat.cli._app import ResultFile, StudyOption, Wide, Workers
 from tolstat.cli._talk import progress, say
-from tolstat.cli import run
 
 
 def extend(

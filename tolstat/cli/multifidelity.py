@@ -59,7 +59,7 @@ def multifidelity(
     Prints each estimate with its 95 % interval, from both fidelities and from the high fidelity alone. Writes two
     ordinary result files. To resume after an interruption, run the same command again.
 
-    Example: tolstat multifidelity studies/iso2768_f.toml --low dynamic:90
+    Example: tolstat multifidelity studies/iso2768_f.toml --low dynamic:90 --budget "10 s"
     """
     from tolstat import study
     from tolstat.campaign import run as campaign

@@ -67,7 +67,7 @@ def rare(
     Prints threshold and share of each level, and the probability with its 95 % interval. Writes all joints to a result
     file. To resume after an interruption, run the same command again.
 
-    Example: tolstat rare studies/iso2768_f.toml --limit "cross1.F > 15 kN"
+    Example: tolstat rare studies/iso2768_f.toml --limit "cross1.F > 5 kN"
     """
     from tolstat.campaign import run as campaign
     from tolstat.campaign.executors import WorkerDied

@@ -36,7 +36,7 @@ def verify(
 
     Of a result file, checks settled joints and stores the checks in the file for the report.
 
-    Example: tolstat verify iso2768_f.h5 --joints 4 --out errors.csv
+    Example: tolstat verify iso2768_f.h5 --joints 2 --out errors.csv
     """
     from tolstat.campaign import verify as verification
     from tolstat.campaign.executors import available_workers

@@ -1,6 +1,7 @@
 """Registry of the questions: a folder each, whose query takes a `store.view.View`, or a study that it simulates.
 
-Public names, sections of the page and the JSON summary come from here, in this order. Modules are imported on first use.
+Public names, sections of the page and the JSON summary come from here, in this order. Modules are imported on first
+use.
 
 A folder has `query.py` (computes), `rendering.py` (text, tables, figures) and, where
 the page shows the question, `section.py` with ``sections(view, asked)``.
@@ -53,9 +54,7 @@ class Question(NamedTuple):
 QUESTIONS = (
     Question("exceedance", has_section=True, has_summary=True),
     Question("capability", has_section=True, has_summary=True),
-    Question(
-        "causes", ("query.causes_of", "angles.against_angle", "tail.worst_joints"), has_section=True
-    ),
+    Question("causes", ("query.causes_of", "angles.against_angle", "tail.worst_joints"), has_section=True),
     Question("fatigue", ("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"), has_section=True),
     Question("accuracy", has_section=True, has_summary=True),
     Question("joints", has_section=True),

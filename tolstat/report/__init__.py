@@ -104,7 +104,7 @@ def build(
             return report
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
-        raise InputError([Fault(str(stem.parent), found, "name an existing folder with --out")]) from error
+        raise InputError([Fault(str(stem.parent), found, "give another folder with --out")]) from error
 
 
 def _noted(report: Report, note: str) -> Report:
@@ -142,7 +142,9 @@ def _sweep(view: View, stem: Path, width: int | None) -> Report:
     files = style.save(sweep.figure(view), stem.with_name(f"{stem.name}_sweep")) if view.bushing_loads else []
     files.append(text.csv(sweep.table(view), stem, "sweep"))
     short = sweep.worst(view)
-    shown, more = _fitted(table.plain(short, [str(name) for name in short.columns if "." in str(name)][1:]), short, width)
+    shown, more = _fitted(
+        table.plain(short, [str(name) for name in short.columns if "." in str(name)][1:]), short, width
+    )
     return Report(shown, "\n".join(note for note in (more, view.head(), _accuracy(view)) if note), files)
 
 
@@ -159,7 +161,9 @@ def _cases(store: ResultStore, stem: Path, width: int | None) -> Report:
     files = [text.csv(full, stem, "cases")]
     counts, worst = store.counts(), cases.worst(full)
     shown, more = _fitted(table.plain(worst, ["revolutions", "motion", "status"]), worst, width)
-    notes = "\n".join([*([more] if more else []), f"{counts.done} of {counts.total} joints, {counts.shortfall}", *cases.advice(full)])
+    notes = "\n".join(
+        [*([more] if more else []), f"{counts.done} of {counts.total} joints, {counts.shortfall}", *cases.advice(full)]
+    )
     if full["note"].any():
         files.append(_text(cases.markdown(full), stem, "cases.md"))
     return Report(shown, notes, files)

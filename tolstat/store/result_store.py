@@ -140,9 +140,7 @@ class ResultStore(Reader):
         specs = {name: HistorySpec(*spec) for name, spec in (histories or {}).items()}
         parts = parts_folder(path)
         if parts.exists():
-            raise store_error(
-                parts, "holds histories of another campaign", "give another file: --out OTHER.h5"
-            )
+            raise store_error(parts, "holds histories of another campaign", "give another file: --out OTHER.h5")
         held = range(study.rows) if rows is None else rows
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -39,9 +39,7 @@ RETURNS = (
     Column("exceeds", lambda row: text.value(row["estimate"], row["unit"])),
     Column("95 % interval", lambda row: text.span_of(row["lower"], row["upper"], row["unit"])),
     Column("largest of so many", lambda row: text.value(row["fleet"], row["unit"])),
-    Column(
-        "interval of it", lambda row: text.span_of(row["fleet_lower"], row["fleet_upper"], row["unit"]), rank=2
-    ),
+    Column("interval of it", lambda row: text.span_of(row["fleet_lower"], row["fleet_upper"], row["unit"]), rank=2),
     Column("fit, p", lambda row: f"{row['p']:.2g}", rank=1),
 )
 """Columns of the table `query.returns`; the largest of N joints is the median of it over fleets of N."""
@@ -51,9 +49,9 @@ def together(table: pd.DataFrame) -> str:
     """Sentence on the joints that keep all limits, from the last row of `query.limits`."""
     row = table.iloc[-1]
     valid = int(row["n"] - row["n_failed"] - row["n_unsettled"])
-    count, what = valid - int(row["count"]), "all limits together" if len(table) > 2 else "the limit"
+    count, what = valid - int(row["count"]), "all limits" if len(table) > 2 else "the limit"
     interval = text.span(row["good_lower"], row["good_upper"])
-    return f"yield, {what}: {text.percent(row['good'])}, 95 % interval {interval}, {count} of {valid} joints"
+    return f"yield, {what}: {text.percent(row['good'])} (95 %: {interval}), {count} of {valid} joints"
 
 
 def note(table: pd.DataFrame) -> str:

@@ -108,7 +108,9 @@ def worst_rows(tail: Tail) -> pd.DataFrame:
             "row": [joint.row for joint in tail.joints],
             "value": [joint.value for joint in tail.joints],
             "status": [joint.status.label for joint in tail.joints],
-            "errors": [[f"{name} {z:+.2f}" for name, z in list(joint.scores.items())[:ERRORS]] for joint in tail.joints],
+            "errors": [
+                [f"{name} {z:+.2f}" for name, z in list(joint.scores.items())[:ERRORS]] for joint in tail.joints
+            ],
         }
     )
 

@@ -21,9 +21,7 @@ def _short(x: float) -> str:
 
 LEVELS = (
     Column("level", lambda row: str(row["level"])),
-    Column(
-        "threshold", lambda row: "-" if math.isinf(row["threshold"]) else text.value(row["threshold"], row["unit"])
-    ),
+    Column("threshold", lambda row: "-" if math.isinf(row["threshold"]) else text.value(row["threshold"], row["unit"])),
     Column("P(above it)", lambda row: _short(row["probability"])),
     Column("share that goes on", lambda row: text.percent(row["share"])),
     Column("its deviation", lambda row: text.percent(row["deviation"])),

@@ -282,16 +282,99 @@ def test_report_creates_its_output_folder(tmp_path):
     assert not (tmp_path / "other").exists()
 
 
+@pytest.mark.parametrize("simulated", [0, 40])
+def test_page_of_an_interrupted_campaign_simulates_nothing(tmp_path, monkeypatch, simulated):
+    def refuse(*_, **__):
+        raise AssertionError("simulated")
+
+    monkeypatch.setattr("tolstat.store.revolutions.simulate_rows", refuse)
+    out = tmp_path / "new" / "page.html"
+    done = call("report", synthetic.store(tmp_path, simulated=simulated), "--out", out)
+    assert done.exit_code == 0, done.stderr
+    assert "has pending joints" in done.stderr
+    assert f"{max(simulated - 1, 0)} joints (random sampling)" in out.read_text(encoding="utf-8")
+
+
+def test_what_a_command_tells(tmp_path):
+    path, log = synthetic.store(tmp_path, simulated=40), tmp_path / "logs" / "tolstat.log"
+    quiet = call("export", path, "--csv", tmp_path / "a.csv", "--quiet", "--log", log)
+    assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (0, "", "")
+    lines = log.read_text(encoding="utf-8").splitlines()
+    assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ (INFO|DEBUG) ", line) for line in lines)
+    assert lines[-1].endswith(f" INFO wrote {tmp_path / 'a.csv'}: 61 joints")
+    assert re.search(r" DEBUG reading the file: \d+\.\d\d s$", lines[-2])
+    loud = call("export", path, "--csv", tmp_path / "a.csv", "--verbose", "--log", log)
+    assert re.search(r"^reading the file: \d+\.\d\d s$", loud.stderr, flags=re.MULTILINE)
+    assert len(log.read_text(encoding="utf-8").splitlines()) == 2 * len(lines)
+    failed = call("status", tmp_path / "none.h5", "--quiet", "--log", log)
+    assert failed.exit_code == 2
+    assert failed.stderr.startswith(f"error: {tmp_path / 'none.h5'}")
+    assert " ERROR error: " in log.read_text(encoding="utf-8")
+
+
+def test_options_of_every_command_are_refused_with_a_remedy(tmp_path):
+    path = synthetic.store(tmp_path)
+    for options in (["--quiet", "--verbose"], ["--log", path / "a.log"]):
+        done = call("status", path, *options)
+        assert (done.exit_code, done.stdout) == (2, "")
+        assert "hint: " in done.stderr
+
+
+def test_an_option_means_the_same_in_all_commands():
+    meaning = {}
+    for command in COMMANDS:
+        options = call(*command.split(), "--help").stdout.split("Options:")[1]
+        for name, metavar in re.findall(r"^  (--[\w-]+)(?: ([A-Z|a-z.:=]+))?  ", options + "  ", flags=re.MULTILINE):
+            meaning.setdefault(name, set()).add(metavar)
+    for name in ("--by", "--workers", "--seed", "--study", "--json", "--wide", "--quiet", "--verbose", "--log"):
+        assert len(meaning[name]) == 1, (name, meaning[name])
+    assert meaning["--by"] == {"LOAD"}
+    assert meaning["--json"] == {""}
+    assert meaning["--out"] <= {"CSV", "FILE", "DIR", "STUDY", "OUT", "DIR|PAGE.html", ""}
+
+
+def test_completion_knows_the_commands_and_loads_nothing_heavy():
+    code = (
+        "import sys\nfrom tolstat.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        f"print(sorted({HEAVY!r} & set(sys.modules)), file=sys.stderr)"
+    )
+    asked = {"_TOLSTAT_COMPLETE": "complete_bash", "COMP_WORDS": "tolstat re", "COMP_CWORD": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ | asked
+    )
+    assert done.stdout.split() == ["replay", "report", "reweight"]
+    assert done.stderr.strip() == "[]"
+
+
 @pytest.mark.slow
 def test_run_ends_with_the_report_and_resumes(study):
     done = call("run", study, "--executor", "serial")
     assert done.exit_code == 0, done.stderr
     assert done.stdout.startswith("load")
     assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
+    assert done.stderr.endswith("next: tolstat report small.h5 --out small.html\n")
     with ResultStore.open("small.h5") as store:
         assert store.complete
     again = call("run", study, "--executor", "serial")
     assert (again.exit_code, again.stdout) == (0, done.stdout)
+
+
+def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatch):
+    """As `run` sees a finished campaign with two kinds of joints without a load."""
+    path = synthetic.store(study.parent, failed=3, unsettled=1)
+    with ResultStore.open(path) as store:
+        counts = store.counts()
+    monkeypatch.setattr(campaign, "run", lambda *_, **__: counts)
+    told = call("run", "small.toml", "--no-report").stderr.splitlines()
+    assert told[0] == "small.h5: 61 joints, 3 failed, 1 not settled"
+    assert told[1].startswith("3 joints newton_failed: ")
+    assert told[2].startswith("  hint, for row 57: failed at step 0 (")
+    assert told[3].startswith("1 joint not_settled: ")
+    again = "again: tolstat run small.toml --out small.h5 --retry"
+    assert told[5] == f"{again} newton_failed --set solver.steps_per_rev=720"
+    assert told[6].startswith(f"{again} not_settled --set solver.max_revs=")
+    assert told[7] == "next: tolstat report small.h5 --out small.html"
 
 
 def test_run_with_fewer_joints_into_another_file_without_report(study, tmp_path):

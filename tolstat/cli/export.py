@@ -57,7 +57,7 @@ def export(
 
     --parquet writes the same columns; pandas has their units in frame.attrs["units"].
 
-    --statistics writes the share above each limit, quantiles, capability, the numerical error and the software versions.
+    --statistics writes the share above each limit, quantiles, capability, the numerical error and the versions.
 
     --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
     keeps cycles or load histories. docs/questions/fatigue.md shows how to read it as a pandas Series.

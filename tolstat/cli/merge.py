@@ -34,4 +34,5 @@ def merge(
     lines = [f"{out}: {counts.done} joints, {counts.shortfall}"]
     lines += [f"{merged.twice} surplus copies of rows, with identical results"] * bool(merged.twice)
     lines += [f"{pending} joints are pending; to simulate them: tolstat run STUDY --out {out}"] * bool(pending)
+    lines += [f"next: tolstat report {out} --out {out.with_suffix('.html')}"] * (not pending)
     say("\n".join(lines))

@@ -39,7 +39,7 @@ def report(
             "--replay",
             metavar="N",
             min=0,
-            help="With an HTML page: number of joints evaluated over the input angle, which are simulated again if FILE "
+            help="With an HTML page: number of joints evaluated over the input angle, simulated again if FILE "
             "has no load histories; default: 1000, but none is simulated again if FILE has pending joints.",
         ),
     ] = None,

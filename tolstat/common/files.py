@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -37,6 +38,20 @@ def check_target(path: Path, *inputs: Path) -> None:
         raise InputError([Fault(place, "cannot be written: it is the input", "give the output another name")])
 
 
+def make_parent(path: Path) -> None:
+    """Make the folder of `path` if it is missing.
+
+    Raises
+    ------
+    NotADirectoryError
+        When a file is in the way.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise NotADirectoryError(errno.ENOTDIR, "not a folder", str(path.parent)) from error
+
+
 @contextmanager
 def atomic_write(path: Path, overwrite: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `path`, and rename the file written there to `path` if no exception occurs.
@@ -55,7 +70,7 @@ def atomic_write(path: Path, overwrite: bool = True) -> Iterator[Path]:
     FileExistsError
         When `overwrite` is false and `path` exists, even if it was created in the meantime.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_parent(path)
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         yield temporary

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results
 from tolstat.common.errors import StoreError
-from tolstat.common.files import atomic_write, check_disk_space
+from tolstat.common.files import atomic_write, check_disk_space, make_parent
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store.checks import DAMAGE_ERRORS
 from tolstat.store.histories import HISTORY_BYTES
@@ -143,7 +143,7 @@ class ResultStore(Reader):
             raise store_error(parts, "holds histories of another campaign", "give another file: --out OTHER.h5")
         held = range(study.rows) if rows is None else rows
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            make_parent(path)
             check_disk_space(path, size_of_new(len(held), selected_results.columns(study.identity())))
             with atomic_write(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
                 blocks = [errors] if isinstance(errors, np.ndarray) else errors

@@ -183,6 +183,6 @@ def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):
         done = CliRunner().invoke(cli.app, ["causes", *map(str, arguments)])
         assert done.exit_code == 2, text
         assert text in done.stderr
-    done = CliRunner().invoke(cli.app, ["allocate", str(path), "--limit", "P(cross1.F > 700 N) < 0.1"])
+    done = CliRunner().invoke(cli.app, ["allocate", str(path), "--target", "P(cross1.F > 700 N) < 0.1"])
     assert done.exit_code == 2
     assert "share errors with" in done.stderr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import random
 import signal
@@ -134,8 +133,18 @@ def test_the_kernel_is_compiled_before_there_are_workers(tmp_path: Path) -> None
     calls: list[str] = []
     stages = fakes.stages()._replace(warm_up=partial(calls.append, "warm"))
     campaign.run(fakes.Study(), tmp_path / "a.h5", 2, progress=lambda c: calls.append("block"), stages=stages)
-    assert calls[:2] == ["block", "warm"]
+    assert calls[:2] == ["warm", "block"]
     assert calls.count("warm") == 1
+
+
+def test_a_run_names_its_stages(tmp_path: Path) -> None:
+    heard: list[str] = []
+    for _ in range(2):
+        campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages(), stage=heard.append)
+    kernels = progress.kernels()
+    check = "check of the numerical error"
+    assert heard[:4] == ["drawing the errors", kernels, progress.JOINTS, check]
+    assert heard[4:] == ["opening the file", progress.JOINTS, check]
 
 
 def start(
@@ -380,25 +389,35 @@ def test_real_joints_give_the_same_bytes(tmp_path: Path, kind: str) -> None:
 
 
 def test_progress_lines_once_a_minute() -> None:
-    now, out = [0.0], io.StringIO()
-    with progress.Lines(out, clock=lambda: now[0]) as lines:
-        for second, done in ((0, 12), (20, 32), (61, 73), (90, 80), (122, 90)):
+    now, out, details = [0.0], [], []
+    with progress.Lines(out.append, details.append, lambda: now[0]) as lines:
+        lines.stage("drawing the errors")
+        now[0] = 60
+        lines.beat()
+        lines.stage(progress.JOINTS)
+        for second, done in ((60, 12), (80, 32), (121, 73)):
             now[0] = second
             lines(Counts(100, done, 1, 2))
-        now[0] = 125
+        lines.beat()
+        now[0] = 185
         lines(Counts(100, 100, 1, 3))
-    assert out.getvalue().splitlines() == [
-        "tolstat: 73 of 100 joints, 1 joints/s, 0:27 remaining, 2 failed, 1 not settled",
-        "tolstat: 90 of 100 joints, 0.639 joints/s, 0:16 remaining, 2 failed, 1 not settled",
-        "tolstat: 100 of 100 joints, 0.704 joints/s, 0:00 remaining, 3 failed, 1 not settled",
+        lines.stage("report")
+        now[0] = 190
+        lines.beat()
+    assert out == [
+        "drawing the errors, 1:00",
+        "73 of 100 joints, 1 joints/s, 0:27 left, 2 failed, 1 not settled",
+        "100 of 100 joints, 0.704 joints/s, 0:00 left, 3 failed, 1 not settled",
+        "report, 0:05",
     ]
+    assert details == ["drawing the errors: 60.00 s", "joints: 125.00 s", "report: 5.00 s"]
 
 
 def test_progress_text_before_the_first_joint() -> None:
     text = progress.text(Counts(513, 100, 0, 0), begun=100, seconds=0.0)
     assert text == "100 of 513 joints, 0 failed, 0 not settled"
-    assert progress.text(Counts(513, 100, 7, 0, 3), 100, 0.0).endswith(", 0 failed, 4 not settled, 3 not resolved")
-    assert "2:00:00 remaining" in progress.text(Counts(7201, 1, 0, 0), begun=0, seconds=1.0)
+    assert progress.text(Counts(513, 100, 4, 0, 3), 100, 0.0).endswith(", 0 failed, 4 not settled, 3 not resolved")
+    assert "2:00:00 left" in progress.text(Counts(7201, 1, 0, 0), begun=0, seconds=1.0)
 
 
 def test_progress_bar_goes_to_stderr(capfd: pytest.CaptureFixture[str]) -> None:
@@ -408,4 +427,15 @@ def test_progress_bar_goes_to_stderr(capfd: pytest.CaptureFixture[str]) -> None:
     out, err = capfd.readouterr()
     assert out == ""
     assert "10 of 10 joints" in err
-    assert isinstance(progress.reporter(), progress.Lines)
+    assert isinstance(progress.display(), progress.Lines)
+    assert type(progress.display(quiet=True)) is progress.Display
+
+
+def test_progress_bar_fits_80_columns(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    with progress.Bar() as bar:
+        bar(Counts(10_000_000, 1_000_000, 0, 0))
+        bar(Counts(10_000_000, 9_999_999, 123_456, 654_321, 1000))
+    lines = [line for line in capfd.readouterr().err.splitlines() if line.strip()]
+    assert "9999999 of 10000000 joints" in lines[-1]
+    assert 60 < max(map(len, lines)) <= 80

@@ -198,7 +198,10 @@ def small(tmp_path: Path) -> study.Study:
 def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -> None:
     made = plan.plan(small, workers=2, pilot=20)
     assert (made.rows, made.dimensions, made.pilot, made.workers) == (61, 4, 20, 2)
-    assert made.seconds == pytest.approx(made.seconds_per_joint * 61 / 2)
+    assert made.stages["joints"] == pytest.approx(made.seconds_per_joint * 61 / 2)
+    assert list(made.stages) == ["start", "joints", "check", "report"]
+    assert made.stages["check"] > 0
+    assert made.seconds == pytest.approx(sum(made.stages.values()))
     assert made.process_bytes > 1e7
     assert made.wilks == {0.95: 59, 0.99: 299, 0.999: 2995}
     lower, upper = exceedance.clopper_pearson(6, 60)

@@ -227,7 +227,7 @@ def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:
 
 def test_worst_command(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path)
-    done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--n", "3"])
+    done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--top", "3"])
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
     assert lines[0].startswith("row")

@@ -22,9 +22,13 @@ from tolstat.campaign.executors import WorkerDied
 from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
-from tolstat.store import Reader
+from tolstat.display import text
+from tolstat.store import Reader, ResultStore
 
-COMMANDS = (*(command.replace("_", "-") for command in cli.COMMANDS), *bench.INSTRUMENTS)
+COMMANDS = (
+    *(name.replace("_", "-") for names in cli.COMMANDS.values() for name in names),
+    *bench.INSTRUMENTS,
+)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
 
 
@@ -77,10 +81,14 @@ def test_every_command_has_help_with_every_option_explained(command):
 
 
 def test_help_lists_the_commands_in_order_each_with_its_whole_summary():
-    commands = call("--help").stdout.split("Commands:")[1]
-    listed = re.findall(r"^  ([\w-]+(?: [\w-]+)?)  +(.*)$", commands, flags=re.MULTILINE)
+    shown = call("--help").stdout
+    groups = shown[shown.index("Plan:") :]
+    listed = re.findall(r"^  ([a-z-]+(?: [a-z-]+)?)  +([A-Z].*[.])$", groups, flags=re.MULTILINE)
     assert tuple(name for name, _ in listed) == COMMANDS
-    assert [name for name, summary in listed if summary.endswith("...")] == []
+    headings = re.findall(r"^(\w[\w ]*):$", groups, flags=re.MULTILINE)
+    assert headings == [*cli.COMMANDS, "Measure tolstat itself"]
+    assert max(map(len, shown.splitlines())) <= 80
+    assert "..." not in groups
 
 
 def test_a_file_may_be_named_like_an_instrument(tmp_path, monkeypatch):
@@ -159,14 +167,22 @@ def test_status_of_a_file_in_any_state(tmp_path, simulated, pending):
     assert sum(found[state.label] for state in Status) == 61
     if simulated is None:
         assert (found["newton_failed"], found["not_settled"]) == (2, 1)
-    lines = call("status", path).stdout.splitlines()
+    head, _, table = call("status", path).stdout.partition("\n\n")
     shares = found.pop("exceedance")
-    assert lines[: len(found)] == [f"{name}: {value}" for name, value in found.items()]
+    lines = head.splitlines()
+    counts = [f"{state.label}: {found[state.label]}" for state in Status if found[state.label]]
+    assert lines[: 2 + len(counts)] == ["study: small", "joints: 61", *counts]
+    assert lines[2 + len(counts)] == "running: no"
     assert found["running"] is False
     assert "damaged" not in found
-    assert len(lines) == len(found) + len(shares)
-    for share, line in zip(shares, lines[len(found) :], strict=True):
-        assert line.startswith(f"P({share['load']} > {share['limit']:g} {share['unit']}): {share['estimate']} (")
+    if simulated is None:
+        assert set(found["causes"]) == {"newton_failed", "not_settled"}
+        assert "2 joints newton_failed: a step failed" in head
+        assert f"  hint, for row 58: {found['causes']['newton_failed']['remedy']}" in lines
+    for share, line in zip(shares, table.splitlines()[1:], strict=True):
+        assert line.split("  ")[0] == text.limit(share | {"level": share["limit"]})
+        assert f" {share['above']} of {share['of']} " in line
+        assert share["above"] / share["of"] == pytest.approx(share["estimate"], rel=1e-2)
         assert share["lower"] <= share["estimate"] <= share["upper"]
     assert bool(shares) == (simulated != 0)
 
@@ -222,9 +238,13 @@ def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
     assert (table["case", "1"] == "a").equals(table["hole4.offset_t", "m"] == 1e-4)
 
 
-def test_export_to_a_folder_that_is_not_there(tmp_path):
-    done = call("export", synthetic.store(tmp_path), "--csv", tmp_path / "no" / "all.csv")
+def test_missing_folders_are_made_for_files_and_not_inside_a_file(tmp_path):
+    path, new = synthetic.store(tmp_path), tmp_path / "new" / "folder"
+    assert call("export", path, "--csv", new / "all.csv").exit_code == 0
+    assert (new / "all.csv").is_file()
+    done = call("export", path, "--csv", path / "all.csv")
     assert done.exit_code == 2
+    assert f"cannot be written: {path} is no folder" in done.stderr
     assert "hint: " in done.stderr
 
 
@@ -243,9 +263,11 @@ def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
     assert lines[0].startswith("load")
-    assert [line.split()[0] for line in lines[1:]] == [
+    assert [line.split()[0] for line in lines[1:8]] == [
         "cross1.F", "fork1.T", "fork2.T", "fork3.T", "fork4.T", "pin1.contact", "psi"
     ]  # fmt: skip
+    assert lines[8] == ""
+    assert re.fullmatch(r"yield, all limits: [\d.]+ % \(95 %: .* %\), \d+ of 60 joints", lines[9])
     assert f"wrote {tmp_path / 'small_exceedance.png'}" in done.stderr
 
 
@@ -262,16 +284,99 @@ def test_report_creates_its_output_folder(tmp_path):
     assert not (tmp_path / "other").exists()
 
 
+@pytest.mark.parametrize("simulated", [0, 40])
+def test_page_of_an_interrupted_campaign_simulates_nothing(tmp_path, monkeypatch, simulated):
+    def refuse(*_, **__):
+        raise AssertionError("simulated")
+
+    monkeypatch.setattr("tolstat.store.revolutions.simulate_rows", refuse)
+    out = tmp_path / "new" / "page.html"
+    done = call("report", synthetic.store(tmp_path, simulated=simulated), "--out", out)
+    assert done.exit_code == 0, done.stderr
+    assert "has pending joints" in done.stderr
+    assert f"{max(simulated - 1, 0)} joints (random sampling)" in out.read_text(encoding="utf-8")
+
+
+def test_what_a_command_tells(tmp_path):
+    path, log = synthetic.store(tmp_path, simulated=40), tmp_path / "logs" / "tolstat.log"
+    quiet = call("export", path, "--csv", tmp_path / "a.csv", "--quiet", "--log", log)
+    assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (0, "", "")
+    lines = log.read_text(encoding="utf-8").splitlines()
+    assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ (INFO|DEBUG) ", line) for line in lines)
+    assert lines[-1].endswith(f" INFO wrote {tmp_path / 'a.csv'}: 61 joints")
+    assert re.search(r" DEBUG reading the file: \d+\.\d\d s$", lines[-2])
+    loud = call("export", path, "--csv", tmp_path / "a.csv", "--verbose", "--log", log)
+    assert re.search(r"^reading the file: \d+\.\d\d s$", loud.stderr, flags=re.MULTILINE)
+    assert len(log.read_text(encoding="utf-8").splitlines()) == 2 * len(lines)
+    failed = call("status", tmp_path / "none.h5", "--quiet", "--log", log)
+    assert failed.exit_code == 2
+    assert failed.stderr.startswith(f"error: {tmp_path / 'none.h5'}")
+    assert " ERROR error: " in log.read_text(encoding="utf-8")
+
+
+def test_options_of_every_command_are_refused_with_a_remedy(tmp_path):
+    path = synthetic.store(tmp_path)
+    for options in (["--quiet", "--verbose"], ["--log", path / "a.log"]):
+        done = call("status", path, *options)
+        assert (done.exit_code, done.stdout) == (2, "")
+        assert "hint: " in done.stderr
+
+
+def test_an_option_means_the_same_in_all_commands():
+    meaning = {}
+    for command in COMMANDS:
+        options = call(*command.split(), "--help").stdout.split("Options:")[1]
+        for name, metavar in re.findall(r"^  (--[\w-]+)(?: ([A-Z|a-z.:=]+))?  ", options + "  ", flags=re.MULTILINE):
+            meaning.setdefault(name, set()).add(metavar)
+    for name in ("--by", "--workers", "--seed", "--study", "--json", "--wide", "--quiet", "--verbose", "--log"):
+        assert len(meaning[name]) == 1, (name, meaning[name])
+    assert meaning["--by"] == {"LOAD"}
+    assert meaning["--json"] == {""}
+    assert meaning["--out"] <= {"CSV", "FILE", "DIR", "STUDY", "OUT", "DIR|PAGE.html", ""}
+
+
+def test_completion_knows_the_commands_and_loads_nothing_heavy():
+    code = (
+        "import sys\nfrom tolstat.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        f"print(sorted({HEAVY!r} & set(sys.modules)), file=sys.stderr)"
+    )
+    asked = {"_TOLSTAT_COMPLETE": "complete_bash", "COMP_WORDS": "tolstat re", "COMP_CWORD": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ | asked
+    )
+    assert done.stdout.split() == ["replay", "report", "reweight"]
+    assert done.stderr.strip() == "[]"
+
+
 @pytest.mark.slow
 def test_run_ends_with_the_report_and_resumes(study):
     done = call("run", study, "--executor", "serial")
     assert done.exit_code == 0, done.stderr
     assert done.stdout.startswith("load")
     assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
-    with Reader.open("small.h5") as store:
+    assert done.stderr.endswith("next: tolstat report small.h5 --out small.html\n")
+    with ResultStore.open("small.h5") as store:
         assert store.complete
     again = call("run", study, "--executor", "serial")
     assert (again.exit_code, again.stdout) == (0, done.stdout)
+
+
+def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatch):
+    """As `run` sees a finished campaign with two kinds of joints without a load."""
+    path = synthetic.store(study.parent, failed=3, unsettled=1)
+    with ResultStore.open(path) as store:
+        counts = store.counts()
+    monkeypatch.setattr(campaign, "run", lambda *_, **__: counts)
+    told = call("run", "small.toml", "--no-report").stderr.splitlines()
+    assert told[0] == "small.h5: 61 joints, 3 failed, 1 not settled"
+    assert told[1].startswith("3 joints newton_failed: ")
+    assert told[2].startswith("  hint, for row 57: failed at step 0 (")
+    assert told[3].startswith("1 joint not_settled: ")
+    again = "again: tolstat run small.toml --out small.h5 --retry"
+    assert told[5] == f"{again} newton_failed --set solver.steps_per_rev=720"
+    assert told[6].startswith(f"{again} not_settled --set solver.max_revs=")
+    assert told[7] == "next: tolstat report small.h5 --out small.html"
 
 
 def test_run_with_fewer_joints_into_another_file_without_report(study, tmp_path):
@@ -290,9 +395,29 @@ def test_run_checks_the_numerical_error_by_default(study, monkeypatch, option, c
 
 def test_run_refuses_the_file_of_another_study(study):
     call("run", study, "--n", 5, "--executor", "serial", "--no-report")
-    done = call("run", study, "--executor", "serial")
+    study.write_text(synthetic.STUDY.replace("seed = 2021", "seed = 1"), encoding="utf-8")
+    done = call("run", study, "--n", 5, "--executor", "serial")
     assert done.exit_code == 2
-    assert "sampling.n: 5 in the file, 60 in the study" in done.stderr
+    assert "sampling.seed: 2021 in the file, 1 in the study" in done.stderr
+    assert "hint: give another file: --out OTHER.h5" in done.stderr
+
+
+def test_another_number_of_joints_is_an_extension_of_the_file(study):
+    call("run", study, "--n", 5, "--executor", "serial", "--no-report")
+    before = Path("small.h5").read_bytes()
+    more = call("run", study, "--executor", "serial")
+    assert more.exit_code == 2
+    assert more.stderr == (
+        "error: small.h5: is the result file of this study with 5 joints, not 60\n"
+        "  hint: simulate more of its joints: tolstat extend small.h5 --n 60\n"
+    )
+    fewer = call("run", study, "--n", 3, "--executor", "serial")
+    assert "hint: read it as it is: tolstat report small.h5, or give another file: --out OTHER.h5" in fewer.stderr
+    assert Path("small.h5").read_bytes() == before
+    study.write_text(synthetic.STUDY.replace("seed = 2021", 'method = "lhs"'), encoding="utf-8")
+    call("run", study, "--n", 5, "--executor", "serial", "--no-report", "--out", "lhs.h5")
+    strata = call("run", study, "--executor", "serial", "--out", "lhs.h5")
+    assert "hint: give another file: --out OTHER.h5; a Latin hypercube has as many strata" in strata.stderr
 
 
 def test_interrupted_run_says_how_to_resume(study, monkeypatch):
@@ -400,7 +525,8 @@ def test_no_output_replaces_its_input(tmp_path, arguments):
 
 
 def test_a_folder_as_output_is_refused_before_the_work(tmp_path):
-    for target, word in ((tmp_path, "is a folder"), (tmp_path / "none" / "t.csv", "no such folder")):
+    (tmp_path / "file").touch()
+    for target, word in ((tmp_path, "is a folder"), (tmp_path / "file" / "t.csv", "is no folder")):
         ended = call("simulate", tmp_path / "case.toml", "--out", target)
         assert ended.exit_code == 2
         assert word in ended.stderr

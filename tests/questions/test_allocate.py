@@ -186,13 +186,13 @@ def test_cost_model_is_a_reciprocal_power(tmp_path):
 
 def test_command_writes_a_study(path, tmp_path):
     out = tmp_path / "next.toml"
-    done = CliRunner().invoke(app, ["allocate", str(path), "--limit", LIMIT, "--out", str(out)])
+    done = CliRunner().invoke(app, ["allocate", str(path), "--target", LIMIT, "--out", str(out)])
     assert done.exit_code == 0
     assert '"pin[12].offset_t" = { plus_minus' in done.stdout
     assert "joints in the check" in done.stderr
     assert study.load(out).tolerances["pin1.offset_t"].sigma < 1e-4 / 3
-    found = json.loads(CliRunner().invoke(app, ["allocate", str(path), "--limit", LIMIT, "--json"]).stdout)
+    found = json.loads(CliRunner().invoke(app, ["allocate", str(path), "--target", LIMIT, "--json"]).stdout)
     assert found["tolerances"][1]["cost"] > found["tolerances"][1]["cost_before"]
-    refused = CliRunner().invoke(app, ["allocate", str(path), "--limit", "P(cross1.F > 700 N) = 1"])
+    refused = CliRunner().invoke(app, ["allocate", str(path), "--target", "P(cross1.F > 700 N) = 1"])
     assert refused.exit_code == 2
-    assert "write --limit" in refused.stderr
+    assert "write --target" in refused.stderr

@@ -88,7 +88,17 @@ def test_each_error_has_its_share_where_it_acts(known):
 
 
 def test_command_writes_shares_and_picture(known, tmp_path):
-    arguments = ["causes", str(known), "--by", "cross2.F", "--against-angle", str(tmp_path / "out.csv"), "--n", "2"]
+    arguments = [
+        "causes",
+        str(known),
+        "--by",
+        "cross2.F",
+        "--against-angle",
+        "--out",
+        str(tmp_path / "out.csv"),
+        "--top",
+        "2",
+    ]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0
     lines = done.stdout.splitlines()

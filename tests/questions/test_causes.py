@@ -83,13 +83,13 @@ def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeyp
 
 
 def test_command_prints_the_first_errors_and_json_has_all(path):
-    done = run("causes", path, "--n", 2)
+    done = run("causes", path, "--top", 2)
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
     assert [line.split()[0] for line in lines] == ["error", "pin1.offset_t", "pin2.offset_z"]
     assert "*" in lines[1]
     assert "2995 joints, 5 without a valid load" in done.stderr
-    assert "of the logarithm" in run("causes", path, "--log").stderr
+    assert "of the logarithm" in run("causes", path, "--logarithm").stderr
     found = json.loads(run("causes", path, "--by", "psi", "--json").stdout)
     assert len(found["table"]) == 8
     assert found["unit"] == "1"

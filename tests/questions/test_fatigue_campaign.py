@@ -241,7 +241,7 @@ def test_command_prints_loads_and_damage(campaign, tmp_path):
     from tests.cli.test_cli import call
 
     out = tmp_path / "loads.csv"
-    done = call("fatigue", campaign(), campaign("cycles", 5.0), "--share", 0.5, "--share", 0.5, "--csv", out)
+    done = call("fatigue", campaign(), campaign("cycles", 5.0), "--share", 0.5, "--share", 0.5, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert len(done.stdout.splitlines()) == 1 + 16 + 3 + 8
     assert "share of joints whose damage sum exceeds 1" in done.stdout
@@ -252,7 +252,7 @@ def test_command_prints_loads_and_damage(campaign, tmp_path):
     values = damage.equivalent_load(loading.cycles.of("fork1.F_z"), 4.0, 1e7, 1e6)[:, 0]
     ordered = np.sort(values[loading.status == tolstat.Status.OK])
     assert median["estimate"] == pytest.approx(ordered[(len(ordered) + 1) // 2 - 1])
-    only = call("fatigue", campaign(), "--channel", "fork*.F_z")
+    only = call("fatigue", campaign(), "--by", "fork*.F_z")
     assert len(only.stdout.splitlines()) == 1 + 4
     failed = call("fatigue", campaign(), campaign("cycles", 5.0))
     assert (failed.exit_code, failed.stdout) == (2, "")

@@ -253,7 +253,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
     assert "wrote" in done.stderr
-    _, out, accepted, again = calls[0]
+    _, out, accepted, again, _ = calls[0]
     assert (str(out), again) == (asked[0], asked[2])
     assert accepted == pytest.approx(asked[1])
 
@@ -261,7 +261,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--out", "gone/p.html", "--accept", "much"], "no such folder"),
+        (["--out", "gone/p.html", "--accept", "much"], "is not a share"),
         (["--out", "p.html", "--accept", "much"], "is not a share"),
         (["--out", "p.html", "--accept", "110 %"], "is not a share"),
         (["--accept", "5 %"], "is used with an HTML page only"),

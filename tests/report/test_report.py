@@ -43,8 +43,8 @@ def test_failed_and_unsettled_joints_are_counted_both_ways():
     row = table.iloc[0]
     assert (row["n"], row["n_failed"], row["n_unsettled"]) == (200, 7, 5)
     assert row["bound_upper"] - row["bound_lower"] == pytest.approx(12 / 200)
-    assert "with unresolved joints" in as_text(exceedance.LIMITS, table)
-    assert "with unresolved joints" not in as_text(exceedance.LIMITS, query.limits(view()))
+    assert "with unresolved joints" in as_text(exceedance.LIMITS, table, None)
+    assert "with unresolved joints" not in as_text(exceedance.LIMITS, query.limits(view()), None)
 
 
 def test_dependent_samples_have_no_interval_and_the_note_says_why():
@@ -197,7 +197,8 @@ def test_report_of_a_random_view(tmp_path):
     assert [file.name for file in made.files] == names
     assert all(file.parent == tmp_path and file.stat().st_size > 500 for file in made.files)
     assert made.table.splitlines()[0].split()[:4] == ["load", "limit", "nominal", "above"]
-    assert len(made.table.splitlines()) == 1 + 7
+    assert len(made.table.splitlines()) == 1 + 7 + 2
+    assert made.table.splitlines()[-1].endswith("39 of 58 joints")
     assert "60 joints (random sampling), 2 failed, 0 not settled" in made.notes
     limits = pd.read_csv(tmp_path / "small_limits.csv")
     assert list(limits["n"]) == [60] * 7  # the nominal joint is not among them
@@ -240,10 +241,11 @@ def test_same_file_same_bytes(tmp_path):
     assert [file.read_bytes() for file in report.write_report(path)] == first
 
 
-def test_folder_that_is_not_there_and_file_that_is_not_ours(tmp_path):
+def test_folder_that_cannot_be_made_and_file_that_is_not_ours(tmp_path):
     path = synthetic.store(tmp_path)
-    with pytest.raises(InputError, match="existing folder"):
-        report.build(path, tmp_path / "nowhere")
+    assert report.write(path, tmp_path / "new")[0].parent == tmp_path / "new"
+    with pytest.raises(InputError, match="another folder"):
+        report.build(path, path / "nowhere")
     (tmp_path / "other.h5").write_text("not HDF5")
     with pytest.raises(StoreError):
         report.build(tmp_path / "other.h5")

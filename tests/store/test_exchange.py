@@ -24,7 +24,7 @@ def export(*arguments):
 
 def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
     path, out = made(tmp_path, synthetic.STUDY.replace("n = 60", "n = 300")), tmp_path / "all.json"
-    done = export(path, "--json", out, "--by", "cross1.F")
+    done = export(path, "--statistics", out, "--by", "cross1.F")
     assert done.exit_code == 0
     found = json.loads(out.read_text(encoding="utf-8"))
     with Reader.open(path) as store:
@@ -47,7 +47,7 @@ def test_statistics_are_of_a_sample(tmp_path):
         summary.statistics(store.view())
     done = export(synthetic.store(tmp_path), "--csv", "x.csv", "--by", "cross1.F")
     assert done.exit_code == 2
-    assert "--by is used with --json only" in done.stderr
+    assert "--by is used with --statistics only" in done.stderr
 
 
 def test_what_is_not_installed_is_said_before_anything_is_written(tmp_path, monkeypatch):

@@ -44,8 +44,8 @@ def read(monkeypatch):
         ("capability",),
         ("causes", "--by", "psi"),
         ("reweight", "--set", "pin*.offset_t.plus_minus=0.09 mm"),
-        ("allocate", "--limit", "P(cross1.F > 700 N) < 0.1"),
-        ("export", "--json", "all.json"),
+        ("allocate", "--target", "P(cross1.F > 700 N) < 0.1"),
+        ("export", "--statistics", "all.json"),
     ],
 )
 @pytest.mark.slow

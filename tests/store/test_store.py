@@ -263,9 +263,14 @@ def test_create_replaces_nothing(tmp_path: Path, study: fakes.Study) -> None:
     (tmp_path / "b.h5.parts").mkdir()
     with pytest.raises(StoreError, match=r"b.h5.parts: holds histories of another campaign"):
         new_store(tmp_path / "b.h5", study)
-    with pytest.raises(StoreError, match="no such folder"):
-        new_store(tmp_path / "none" / "a.h5", study)
+    with pytest.raises(StoreError, match="cannot be written"):
+        new_store(path / "a.h5", study)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "b.h5.parts"]
+
+
+def test_create_makes_a_missing_folder(tmp_path: Path, study: fakes.Study) -> None:
+    new_store(tmp_path / "new" / "folder" / "a.h5", study).close()
+    assert (tmp_path / "new" / "folder" / "a.h5").is_file()
 
 
 def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, quantile
+from tolstat.campaign import verify
 from tolstat.campaign.executors import available_workers
+from tolstat.campaign.progress import Tell, kernels, silent
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation
+from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation, Status
 from tolstat.display import text
 from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, origin_blocks, streams
 from tolstat.solver import refinement
-from tolstat.solver.simulation import history_specs, simulate_rows
+from tolstat.solver.simulation import history_specs, simulate_rows, warm_up
 from tolstat.store.axes import attach_scales
 from tolstat.store.histories import create_dataset, create_group
 from tolstat.store.new_file import attributes, fill
@@ -40,6 +42,10 @@ ORDINARY = 680.0
 CONFIDENCE = 0.95
 DRAWN = 1 << 14
 """Largest number of joints whose clearances are computed."""
+START_S = 4.0
+"""Time from the command to the first joint: imports, loading the kernels, start of the workers; on one core, s."""
+REPORT_S, REPORT_S_PER_JOINT = 2.0, 2.5e-5
+"""Time of a report with 16 limits: imports and figures, and per joint; on the same core, s."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +129,9 @@ class Plan:
         Mean processor time of a joint, s: its time in one process that has a core of its own.
     workers : int
         Number of processes of the campaign.
-    seconds : float
-        Time of the campaign if every process has a core of its own, s, without start-up and compilation.
+    stages : dict of str to float
+        Time of each stage of the whole command ``tolstat run`` if every process has a core of its own, s: ``start`` (of
+        this process and the workers, kernels compiled), ``joints``, ``check`` of the numerical error, ``report``.
     process_bytes : int
         Peak memory of this process so far; the campaign needs as much for each worker and for its parent process.
     file_bytes : int
@@ -153,7 +160,7 @@ class Plan:
     fidelity: str
     seconds_per_joint: float
     workers: int
-    seconds: float
+    stages: dict[str, float]
     process_bytes: int
     file_bytes: int
     widths: dict[float, float]
@@ -164,8 +171,13 @@ class Plan:
     fit: list[str]
     tolerances: list[dict[str, Any]]
 
+    @property
+    def seconds(self) -> float:
+        """Time of the whole command, s."""
+        return sum(self.stages.values())
 
-def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
+
+def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Tell = silent) -> Plan:
     """Simulate a pilot of joints, spread over the study's rows, and predict cost and precision of the campaign.
 
     Parameters
@@ -176,12 +188,17 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
         Number of processes of the campaign; without it the number of cores.
     pilot : int
         Number of joints to simulate; at most all joints of the study.
+    stage : callable
+        Called with the name of each stage when it begins.
 
     Returns
     -------
     Plan
     """
     workers = workers or available_workers()
+    stage(kernels())
+    warm_up()
+    stage("pilot")
     rows = np.unique(np.linspace(0, study.rows - 1, min(pilot, study.rows)).astype(np.intp))
     errors = _errors(study, rows)
     params = perturbed(study, rows, errors, perturb)
@@ -189,6 +206,10 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
     own = [settings(solver, choice) for solver in study.solvers]
     simulation, seconds = simulate_timed(study, params, [own[number] for number in variants(study, rows)])
     each = seconds / len(rows)
+    stage("check of the numerical error")
+    check = _check(study, params, simulation, [own[number] for number in variants(study, rows)])
+    stages = {"start": START_S, "joints": each * study.rows / workers, "check": check}
+    stages["report"] = REPORT_S + REPORT_S_PER_JOINT * study.rows
     iid = study.sampling.method == "random"
     valid = slice(study.first_sample, None)
     status = simulation.results["status"]
@@ -201,7 +222,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
         fidelity=choice.get("reason", ""),
         seconds_per_joint=each,
         workers=workers,
-        seconds=each * study.rows / workers,
+        stages=stages,
         process_bytes=_process_bytes(),
         file_bytes=_file_bytes(study, errors, simulation, settings(study.solver, choice), choice),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
@@ -220,6 +241,16 @@ def _assembly(study: Study, iid: bool) -> Assembly:
     misfits = int((perturbed(study, rows, errors, perturb)["clearance"] < 0.0).any(axis=1).sum())
     lower, upper = exceedance.clopper_pearson(misfits, rows.size, CONFIDENCE)
     return Assembly(misfits, rows.size, (float(lower), float(upper)) if iid else None)
+
+
+def _check(study: Study, params: NDArray[np.void], simulation: Simulation, options: list[Options]) -> float:
+    """Time of the check at the end of the run, from one on as many settled joints of the pilot, s."""
+    settled = np.flatnonzero(simulation.results["status"] == Status.OK)[: verify.few(study.rows)]
+    if not settled.size:
+        return 0.0
+    begin = time.process_time()
+    verify.run_checks(params[settled], [options[i] for i in settled.tolist()], verify.QUICK_CHECKS)
+    return time.process_time() - begin
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals:

@@ -1,20 +1,27 @@
-"""Progress of a campaign on stderr: a bar on a terminal, otherwise one line a minute."""
+"""Progress of long work on stderr: a bar on a terminal, otherwise one line a minute."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, Self, TextIO
+from typing import TYPE_CHECKING, Protocol, Self
 
 from tolstat.store import Counts
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
+    from rich.progress import Progress, TaskID
 
 LINE_INTERVAL_S = 60.0
 """Time between two lines if stderr is not a terminal, s."""
+WIDTH = 80
+"""Maximum width of the bar with its words, characters."""
+JOINTS = "joints"
+"""Name of the stage in which the joints of a campaign are simulated."""
+
+Tell = Callable[[str], None]
 
 
 class Reporter(Protocol):
@@ -39,13 +46,13 @@ def text(counts: Counts, begun: int, seconds: float) -> str:
     Returns
     -------
     str
-        ``"128 of 513 joints, 2.9 joints/s, 2:12 remaining, 1 failed, 0 not settled"``; without rate and remaining
-        time before the first joint is done.
+        ``"128 of 513 joints, 2.9 joints/s, 2:12 left, 1 failed, 0 not settled"``; without rate and remaining time
+        before the first joint is done.
     """
     words = [f"{counts.done} of {counts.total} joints"]
     if counts.done > begun and seconds > 0:
         rate = (counts.done - begun) / seconds
-        words += [f"{rate:.3g} joints/s", f"{_clock((counts.total - counts.done) / rate)} remaining"]
+        words += [f"{rate:.3g} joints/s", f"{clock((counts.total - counts.done) / rate)} left"]
     return ", ".join([*words, counts.shortfall])
 
 
@@ -54,29 +61,45 @@ def note(text: str) -> None:
     print(f"tolstat: {text}", file=sys.stderr, flush=True)
 
 
-def _clock(seconds: float) -> str:
+def silent(text: str) -> None:
+    """Ignore a message, or the name of a stage."""
+
+
+def clock(seconds: float) -> str:
+    """Format a time as ``2:12`` or ``1:02:12``."""
     minutes, s = divmod(round(seconds), 60)
     hours, m = divmod(minutes, 60)
     return f"{hours}:{m:02d}:{s:02d}" if hours else f"{m}:{s:02d}"
 
 
-class Lines:
-    """Progress as one line a minute, and one at the end of the campaign.
+def kernels() -> str:
+    """Name of the stage that makes the kernels ready: says that they are compiled if they are not in the cache."""
+    from tolstat.solver.simulation import is_compiled
+
+    return "loading the kernels" if is_compiled() else "compiling the kernels, about a minute, once"
+
+
+class Display:
+    """Stages of some work, one after the other; of a campaign also its counts. Shows nothing: subclasses do.
 
     Parameters
     ----------
-    stream : file, optional
-        Where the lines go; stderr without it.
-    clock : callable, optional
+    tell : callable
+        Receives messages.
+    detail : callable
+        Receives the time of each stage when it ends.
+    time : callable
         () -> time, s.
     """
 
-    def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
-        self._stream = stream
-        self._clock = clock
-        self._start: tuple[int, float] | None = None
-        self._printed_at = 0.0
-        self._last = ""
+    def __init__(self, tell: Tell = note, detail: Tell = silent, now: Callable[[], float] = time.monotonic) -> None:
+        self.note = tell
+        self._detail = detail
+        self._now = now
+        self._name = ""
+        self._begun_at = 0.0
+        self._counts: Counts | None = None
+        self._start = 0
 
     def __enter__(self) -> Self:
         return self
@@ -84,68 +107,118 @@ class Lines:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._last:
-            self._print()
+        self._end()
+
+    def stage(self, name: str) -> None:
+        """Begin the stage `name`; that before it has ended."""
+        if name == self._name:
+            return
+        self._end()
+        self._name, self._begun_at, self._counts = name, self._now(), None
 
     def __call__(self, counts: Counts) -> None:
-        """Record `counts`, and print them if a minute has passed."""
-        now = self._clock()
-        if self._start is None:
-            self._start = counts.done, now
-            self._printed_at = now
-        self._last = text(counts, self._start[0], now - self._start[1])
-        if now - self._printed_at >= LINE_INTERVAL_S:
-            self._printed_at = now
-            self._print()
+        """Report the counts of a campaign, or of the joints of the current stage."""
+        if not self._name:
+            self.stage(JOINTS)
+        if self._counts is None:
+            self._start, self._begun_at = counts.done, self._now()
+        self._counts = counts
 
-    def note(self, text: str) -> None:
-        """Print a message."""
-        print(f"tolstat: {text}", file=self._stream or sys.stderr, flush=True)
+    @property
+    def words(self) -> str:
+        """State of the current stage in words."""
+        seconds = self._now() - self._begun_at
+        if self._counts is None:
+            return f"{self._name}, {clock(seconds)}"
+        own = text(self._counts, self._start, seconds)
+        return own if self._name == JOINTS else f"{self._name}: {own}"
 
-    def _print(self) -> None:
-        self.note(self._last)
-        self._last = ""
+    def _end(self) -> None:
+        if self._name:
+            self._detail(f"{self._name}: {self._now() - self._begun_at:.2f} s")
+            self._name = ""
 
 
-class Bar:
-    """Progress as a bar with rate and remaining time, for a terminal."""
+class Lines(Display):
+    """One line a minute, and one at the end of a campaign's joints; for a stderr that is no terminal."""
 
-    def __init__(self) -> None:
-        self._start: tuple[int, float] | None = None
-        self._bar: Progress | None = None
+    _thread: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._every_minute, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        super().__exit__(kind, value, trace)
+
+    def _every_minute(self) -> None:
+        while not self._ended.wait(LINE_INTERVAL_S):
+            self.beat()
+
+    def beat(self) -> None:
+        """Print the state of the current stage; called once a minute."""
+        if self._name:
+            self.note(self.words)
+
+    def _end(self) -> None:
+        if self._name == JOINTS and self._counts is not None:
+            self.beat()
+        super()._end()
+
+
+class Bar(Display):
+    """A bar of the current stage on a terminal; that of the joints stays at the end."""
+
+    _bar: Progress | None = None
+    _task: TaskID | None = None
 
     def __enter__(self) -> Self:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
+        from rich.table import Column
 
-        columns = (BarColumn(), TextColumn("{task.description}"))
-        self._bar = Progress(*columns, console=Console(stderr=True))
+        console = Console(stderr=True)
+        console.width = min(console.width, WIDTH)
+        words = TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis"))
+        self._bar = Progress(BarColumn(bar_width=14), words, console=console, redirect_stdout=False)
         self._bar.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
+        super().__exit__(kind, value, trace)
         if self._bar is not None:
             self._bar.stop()
 
+    def stage(self, name: str) -> None:
+        """Begin the stage `name` with a bar of its own."""
+        if name == self._name:
+            return
+        super().stage(name)
+        if self._bar is not None:
+            self._task = self._bar.add_task(name, total=None)
+
     def __call__(self, counts: Counts) -> None:
         """Move the bar to `counts`."""
-        if self._bar is None:
-            return
-        now = time.monotonic()
-        if self._start is None:
-            self._start = counts.done, now
-            self._bar.add_task("", total=counts.total)
-        words = text(counts, self._start[0], now - self._start[1])
-        self._bar.update(self._bar.task_ids[0], completed=counts.done, description=words)
+        super().__call__(counts)
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, total=counts.total, completed=counts.done, description=self.words)
 
-    def note(self, text: str) -> None:
-        """Print a message above the bar."""
-        if self._bar is not None:
-            self._bar.console.print(f"tolstat: {text}", markup=False, highlight=False)
+    def _end(self) -> None:
+        if self._bar is not None and self._task is not None and self._name != JOINTS:
+            self._bar.remove_task(self._task)
+        self._task = None
+        super()._end()
 
 
-def reporter() -> Bar | Lines:
-    """Return the progress display that suits stderr: a context manager to pass to `campaign.run`."""
-    return Bar() if sys.stderr.isatty() else Lines()
+def display(tell: Tell = note, detail: Tell = silent, quiet: bool = False) -> Display:
+    """Return the display of progress that suits stderr: a context manager to pass to `campaign.run`."""
+    if quiet:
+        return Display(tell, detail)
+    return Bar(tell, detail) if sys.stderr.isatty() else Lines(tell, detail)

@@ -1,15 +1,20 @@
-"""Remedy for a joint whose status is not ok, in one sentence."""
+"""Why joints have no valid load, and the remedy in one sentence."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tolstat.common.tables import MAX_ITERATIONS, Motion, Status
+from tolstat.common.tables import FAILED, MAX_ITERATIONS, STATUS_TEXT, UNSETTLED, Motion, Status
 from tolstat.solver.refinement import MIN_MAX_REVS
+
+if TYPE_CHECKING:
+    from tolstat.store.reader import Reader
 
 MAX_REVS, MAX_STEPS = 1000, 20_000
 """Largest solver.max_revs and solver.steps_per_rev that a study may have."""
@@ -20,6 +25,62 @@ WITHOUT_RESULTS = {
     Status.OUTSIDE_MODEL: "negative clearance, |alpha| >= 90 deg, no speed or no stiffness: change joint or tolerances",
 }
 """Remedies that do not depend on the results of the joint."""
+
+
+class Reason(NamedTuple):
+    """Joints without a valid load that have the same status.
+
+    Attributes
+    ----------
+    status : Status
+        Their status.
+    joints : int
+        How many they are.
+    row : int
+        Row of the first in the campaign.
+    remedy : str
+        Remedy for the first.
+    """
+
+    status: Status
+    joints: int
+    row: int
+    remedy: str
+
+    @property
+    def text(self) -> str:
+        """Number, status, meaning and remedy, in lines."""
+        noun = "joint" if self.joints == 1 else "joints"
+        head = f"{self.joints} {noun} {self.status.label}: {STATUS_TEXT[self.status]}"
+        return f"{head}\n  hint, for row {self.row}: {self.remedy}"
+
+    @property
+    def retry(self) -> str:
+        """Options of `tolstat run` that simulate these joints again as the remedy says; empty if it names none."""
+        setting = re.search(r"(solver\.\w+) = ([\w.e-]+)", self.remedy)
+        if setting:
+            return f"--retry {self.status.label} --set {setting[1]}={setting[2].rstrip('.')}"
+        return f"--retry {self.status.label}" if "--retry" in self.remedy else ""
+
+
+def reasons(store: Reader, status: NDArray[np.uint8]) -> list[Reason]:
+    """Why joints of a file have no valid load, most frequent status first.
+
+    Parameters
+    ----------
+    store : Reader
+        The file.
+    status : ndarray, shape (n,)
+        Status of its joints, the nominal joint included.
+    """
+    found = []
+    for state in (*FAILED, *UNSETTLED):
+        slots = np.flatnonzero(status == state)
+        if slots.size:
+            first = int(slots[0])
+            row = store.results(slice(first, first + 1))[0]
+            found.append(Reason(Status(state), len(slots), int(store.row(slots[:1])[0]), remedy(row, store.options)))
+    return sorted(found, key=lambda reason: -reason.joints)
 
 
 def remedy(row: np.void, options: Mapping[str, Any]) -> str:

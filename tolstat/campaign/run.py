@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from tolstat.campaign import signals, verify
 from tolstat.campaign.blocks import Execution, Stages, pending, simulate_pending
 from tolstat.campaign.executors import WorkerDied
-from tolstat.campaign.progress import Reporter, note
+from tolstat.campaign.extend import NOT_EXTENDABLE
+from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
 from tolstat.campaign.retry import Retry, begin
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
@@ -64,8 +65,9 @@ def run(
     until_row: int | None = None,
     execution: Execution | None = None,
     retry: Retry | None = None,
-    tell: Callable[[str], None] = note,
+    tell: Tell = note,
     check: bool = True,
+    stage: Tell = silent,
 ) -> Counts:
     """Simulate the joints of a study whose results its result file does not hold yet.
 
@@ -96,6 +98,8 @@ def run(
         Called with messages: fidelity that ``auto`` chose, why a joint was given up, how many are simulated again.
     check : bool
         Whether to verify a few joints at the end, to estimate the numerical error; see `verify.check_few`.
+    stage : callable, optional
+        Called with the name of each stage when it begins, such as `progress.Display.stage`.
 
     Returns
     -------
@@ -117,6 +121,7 @@ def run(
     _check_positive(workers=execution.workers, block=execution.block, joint_timeout=execution.joint_timeout)
     stages = stages or _own_stages()
     path = Path(out)
+    stage("drawing the errors" if not path.exists() else "opening the file")
     with signals.caught() as stop, _create_or_resume(study, path, stages, rows, tell) as store:
         if retry:
             retry = retry.chosen(store.fidelity)
@@ -124,11 +129,13 @@ def run(
         counts = store.counts()
         last = store.n if until_row is None else store.slot(until_row)
         try:
-            if progress:
-                progress(counts)
             if next(pending(store, last), None) is not None:
+                stage(kernels())
                 stages.warm_up()
                 store.begin_session(counts.done)
+            stage(JOINTS)
+            if progress:
+                progress(counts)
             finished = simulate_pending(study, store, last, stages, execution, stop)
             with stop.deferred(), closing(finished):
                 for done in finished:
@@ -140,6 +147,7 @@ def run(
                     if progress:
                         progress(counts)
             if check:
+                stage("check of the numerical error")
                 verify.check_few(store, partial(_rows_of, study, store, stages), stages.simulate)
             store.finish()
             store.end_session()
@@ -242,12 +250,33 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
         held = store.versions.get(name, "unknown")
         if held != now[name]:
             differing.append(f"{name}: {noun} {held} in the file, {now[name]} now")
+    if held_n := _other_number(store, study, differing):
+        raise StoreError(str(_of_number(store, held_n, study.samples)))
     if not differing and store.rows != rows:
         held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
         raise StoreError(str(Fault(str(store.path), f"holds rows {held}, not {asked}", f"give --rows {held}")))
     if differing:
         lines = "\n    ".join([found, *differing])
         raise StoreError(str(Fault(str(store.path), lines, remedy)))
+
+
+def _other_number(store: Reader, study: Study, differing: list[str]) -> int:
+    """Number of joints that the file is for if nothing else differs from the study; 0 otherwise."""
+    numbers = len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole
+    return int(store.sampling["n"]) if numbers else 0
+
+
+def _of_number(store: Reader, held: int, asked: int) -> Fault:
+    path, found = store.path, f"is the result file of this study with {held} joints, not {asked}"
+    method = store.sampling["method"]
+    if asked < held:
+        return Fault(str(path), found, f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5")
+    if method in NOT_EXTENDABLE:
+        return Fault(str(path), found, f"give another file: --out OTHER.h5; {NOT_EXTENDABLE[method]}")
+    if store.history_specs and not store.complete:
+        resumed = f"finish it: the same command with --n {held}, then: tolstat extend {path} --n {asked}"
+        return Fault(str(path), found, resumed)
+    return Fault(str(path), found, f"simulate more of its joints: tolstat extend {path} --n {asked}")
 
 
 def _check_positive(**numbers: float | None) -> None:

@@ -216,12 +216,16 @@ def check_campaign(
     return Verification(seed, store.row(slots), base, checks)
 
 
+def few(rows: int) -> int:
+    """Number of joints that are checked at the end of a campaign of `rows` joints."""
+    return min(max(rows // JOINTS_PER_CHECKED, 1), MAX_CHECKED)
+
+
 def check_few(store: ResultStore, parameters: Callable[..., NDArray[np.void]], simulate: Simulate) -> None:
     """Check a few joints of a complete campaign and store the checks, unless the file is a slice or has checks."""
     if not (store.complete and store.whole) or verification.read(store) is not None:
         return
-    joints = min(max(store.n // JOINTS_PER_CHECKED, 1), MAX_CHECKED)
-    found = check_campaign(store, parameters, QUICK_CHECKS, joints, int(store.sampling["seed"]), simulate)
+    found = check_campaign(store, parameters, QUICK_CHECKS, few(store.n), int(store.sampling["seed"]), simulate)
     if found is not None:
         verification.write(store, found)
 

@@ -7,7 +7,10 @@ used; 128 + N stopped by signal N (130 after Ctrl-C). Modules that load slowly a
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,12 +18,16 @@ import typer
 from typer.core import TyperGroup
 
 from tolstat import __version__
+from tolstat.cli._talk import LogFile, Quiet, Verbose, fail, say, session, warn
 from tolstat.common.errors import Fault, InputError, TolstatError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
+
+    import pandas as pd
 
     from tolstat.common.tables import Variant
+    from tolstat.display.table import Column
     from tolstat.joint import Joint
     from tolstat.report import Report
 
@@ -31,22 +38,23 @@ EPILOG = (
 )
 
 
+GROUPS: dict[str, tuple[str, ...]] = {}
+"""Headings of the help, and the words of the commands under each; `tolstat.cli` fills it."""
+
+
 class _Commands(TyperGroup):
-    """Commands of one or two words; errors that a user can mend become a message and an exit code."""
+    """Commands of one or two words, listed in help under the headings of `GROUPS`."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         two = " ".join(args[:2])
         return super().resolve_command(ctx, [two, *args[2:]] if two in self.commands else args)
 
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            return super().invoke(ctx)
-        except TolstatError as error:
-            say(f"error: {error}")
-            raise typer.Exit(2) from error
-        except KeyboardInterrupt as error:
-            say("interrupted")
-            raise typer.Exit(130) from error
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        width = max(map(len, self.commands))
+        for heading, names in GROUPS.items():
+            rows = [(f"{name:{width}}", self.commands[name].get_short_help_str(formatter.width)) for name in names]
+            with formatter.section(heading):
+                formatter.write_dl(rows)
 
 
 app = typer.Typer(
@@ -55,17 +63,30 @@ app = typer.Typer(
     help=ABOUT,
     epilog=EPILOG,
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 ResultFile = Annotated[Path, typer.Argument(metavar="FILE", help="Result file (HDF5) of a campaign.")]
+Wide = Annotated[bool, typer.Option("--wide", help="Print all columns; default: those that fit 80 characters.")]
 Workers = Annotated[
     int | None,
     typer.Option("--workers", metavar="W", min=1, help="Number of worker processes; default: one per core."),
 ]
+ByOne = Annotated[
+    str | None,
+    typer.Option(
+        "--by",
+        metavar="LOAD",
+        help="Load, such as cross1.F, pin2.contact or psi; default: that with the limit exceeded most.",
+    ),
+]
+ByMany = Annotated[
+    list[str] | None,
+    typer.Option("--by", metavar="LOAD", help="Load, such as cross1.F; repeatable; default: loads with limits."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
 StudyOption = Annotated[
     Path | None,
     typer.Option(
@@ -96,9 +117,34 @@ def _options(
     pass
 
 
-def say(text: str) -> None:
-    """Print a message on standard error."""
-    typer.echo(text, err=True)
+def command(function: Callable[..., None]) -> Callable[..., None]:
+    """Add to a command the options that all have; errors that a user can mend become a message and an exit code."""
+
+    @wraps(function)
+    def run(*args: Any, quiet: bool, verbose: bool, log: Path | None, **options: Any) -> None:
+        try:
+            with session(quiet, verbose, log):
+                try:
+                    function(*args, **options)
+                except TolstatError as error:
+                    fail(f"error: {error}")
+                    raise typer.Exit(2) from error
+                except KeyboardInterrupt as error:
+                    fail("interrupted")
+                    raise typer.Exit(130) from error
+        except InputError as error:  # of the options themselves
+            fail(f"error: {error}")
+            raise typer.Exit(2) from error
+
+    own = inspect.signature(function, eval_str=True)
+    added = (("quiet", Quiet, False), ("verbose", Verbose, False), ("log", LogFile, None))
+    parameters = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+        for name, annotation, default in added
+    ]
+    run.__signature__ = own.replace(parameters=[*own.parameters.values(), *parameters])  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
+    return run
 
 
 def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
@@ -106,7 +152,7 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
     places = [f"variant {variant.family!r}: joint" for variant in variants] or ["joint"]
     faults = (f"{place}.{fault}" for place, joint in zip(places, joints, strict=True) for fault in joint.warnings())
     for fault in dict.fromkeys(faults):
-        say(f"warning: {path}: {fault}")
+        warn(f"warning: {path}: {fault}")
 
 
 def tell(report: Report) -> None:
@@ -115,6 +161,22 @@ def tell(report: Report) -> None:
     say(report.notes)
     for path in report.files:
         say(f"wrote {path}")
+
+
+def width_of(wide: bool) -> int | None:
+    """Characters in a line of a table; None for all columns."""
+    from tolstat.display.table import WIDTH
+
+    return None if wide else WIDTH
+
+
+def print_table(columns: Sequence[Column], frame: pd.DataFrame, wide: bool) -> None:
+    """Print a table on standard output, and on standard error the columns left out to fit the line."""
+    from tolstat.display import table
+
+    typer.echo(table.as_text(columns, frame, width_of(wide)))
+    if missing := table.left_out(columns, frame, width_of(wide)):
+        say(missing)
 
 
 def announce_compilation() -> None:

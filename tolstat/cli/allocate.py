@@ -7,15 +7,16 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, StudyOption, as_text, output_file, say
+from tolstat.cli._app import AsJson, ResultFile, StudyOption, Wide, as_text, output_file, print_table
+from tolstat.cli._talk import progress, say
 
 
 def allocate(
     file: ResultFile,
-    limit: Annotated[
+    target: Annotated[
         list[str],
         typer.Option(
-            "--limit",
+            "--target",
             metavar="RULE",
             help='Largest share of joints above a level: "P(cross*.F > 700 N) < 0.001"; repeatable.',
         ),
@@ -42,7 +43,8 @@ def allocate(
         typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the proposed tolerances."),
     ] = None,
     study_file: StudyOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Propose the cheapest tolerances that meet the targets.
 
@@ -53,18 +55,19 @@ def allocate(
     entries as TOML, and a verdict: "holds", or "needs new runs" if the joints in FILE do not suffice. With --out,
     writes a study with the proposed tolerances and another seed, to be run next.
 
-    Example: tolstat allocate a.h5 --limit "P(cross1.F > 1500 N) < 0.05"
+    Example: tolstat allocate iso2768_f.h5 --target "P(cross1.F > 1500 N) < 0.06"
     """
     from tolstat.common.files import check_target
     from tolstat.display import text
+    from tolstat.questions.allocate import rendering
     from tolstat.questions.allocate.query import allocated
     from tolstat.store import Reader
     from tolstat.study.scaling import line
 
     if out is not None:
         check_target(out, file)
-    with Reader.open(file) as store:
-        found = allocated(store.view(study_file), limit, costs, keep or ())
+    with progress("search for the cheapest tolerances"), Reader.open(file) as store:
+        found = allocated(store.view(study_file), target, costs, keep or ())
     if out is not None:
         content = found.text
         with output_file(out) as temporary:
@@ -75,11 +78,12 @@ def allocate(
         tables = {key: text.records(getattr(found, key)) for key in ("tolerances", "limits")}
         typer.echo(as_text({**head, "entries": found.entries, **tables}))
         return
-    typer.echo(text.plain(found.tolerances))
-    typer.echo(f"\n{text.plain(found.limits)}")
+    print_table(rendering.TOLERANCES, found.tolerances, wide)
+    typer.echo()
+    print_table(rendering.LIMITS, found.limits, wide)
     if found.entries:
         typer.echo("\n[tolerances]\n" + "\n".join(line(*item) for item in found.entries.items()))
     before, after = found.tolerances["cost_before"].sum(), found.tolerances["cost"].sum()
     say(f"total cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)\n{found.verdict}")
     if out is not None:
-        say(f"wrote {out}; to run it: tolstat run {out}")
+        say(f"wrote {out}\nnext: tolstat run {out}")

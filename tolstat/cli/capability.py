@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, say
+from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
+from tolstat.cli._talk import progress, say, warn
 from tolstat.common.errors import Fault, InputError, StoreError
 
 
@@ -16,25 +17,25 @@ def capability(
         list[float] | None,
         typer.Option("--one-in", metavar="N", min=1, help="Print the load that one in N joints exceeds; repeatable."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Print ppm and Cpk against each limit of the study.
+    """Print yield and Cpk against each limit of the study.
 
-    Prints for each limit, and for all limits together, the share of joints above it (ppm) and the process capability
+    Prints for each limit, and for all limits together, the share of joints below it (yield) and the process capability
     index Cpk, each with its 95 % interval.
 
     With --one-in N, prints also the load that one in N joints exceeds, and the median of the largest load of N joints,
     from a generalised Pareto distribution fitted to the tail. N may exceed the number of simulated joints: the
     intervals show the uncertainty of the extrapolation.
 
-    Example: tolstat capability iso2768_f.h5 --one-in 10000
+    Example: tolstat capability iso2768_f.h5 --one-in 1000
     """
     from tolstat.display import text
-    from tolstat.display.table import as_text as aligned
     from tolstat.questions.capability import query, rendering
     from tolstat.store import Reader
 
-    with Reader.open(file) as store:
+    with progress("capability"), Reader.open(file) as store:
         view = store.view()
         if not view.limits or view.method in ("sweep", "cases"):
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
@@ -49,10 +50,10 @@ def capability(
     if as_json:
         typer.echo(as_text({"limits": text.records(table), "one_in": [] if rare is None else text.records(rare)}))
         return
-    typer.echo(aligned(rendering.LIMITS, table))
+    print_table(rendering.LIMITS, table, wide)
     if rare is not None:
         typer.echo("\nload that one in N joints exceeds; median of the largest load of N joints")
-        typer.echo(aligned(rendering.RETURNS, rare))
+        print_table(rendering.RETURNS, rare, wide)
     say(rendering.note(table))
     if rare is not None and (rare["p"] < 0.05).any():
-        say("warning: a tail with p < 0.05 is not generalised Pareto; do not use its estimate")
+        warn("warning: a tail with p < 0.05 is not generalised Pareto; do not use its estimate")

@@ -8,7 +8,18 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import StudyOption, Workers, announce_compilation, as_text, output_file, say
+from tolstat.cli._app import (
+    AsJson,
+    ByOne,
+    StudyOption,
+    Wide,
+    Workers,
+    announce_compilation,
+    as_text,
+    output_file,
+    print_table,
+)
+from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 
 
@@ -23,12 +34,10 @@ def causes(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="Result file (HDF5); with --pick-freeze: study file (TOML).")
     ],
-    by: Annotated[
-        str, typer.Option("--by", metavar="LOAD", help="Name of the load, such as cross1.F, pin2.contact or psi.")
-    ] = "cross1.F",
-    n: Annotated[int, typer.Option("--n", metavar="N", min=1, help="Number of errors in the printed table.")] = 12,
-    log: Annotated[
-        bool, typer.Option("--log", help="Explain the variance of the load's logarithm instead of the load's.")
+    by: ByOne = None,
+    top: Annotated[int, typer.Option("--top", metavar="N", min=1, help="Number of errors in the printed table.")] = 12,
+    logarithm: Annotated[
+        bool, typer.Option("--logarithm", help="Explain the variance of the load's logarithm instead of the load's.")
     ] = False,
     points: Annotated[
         int | None,
@@ -43,22 +52,23 @@ def causes(
     ] = Groups.TOLERANCE,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="OUT", help="With --pick-freeze: result file; default: STUDY_causes.h5."),
+        typer.Option(
+            "--out",
+            metavar="OUT",
+            help="With --pick-freeze: result file, default STUDY_causes.h5. With --against-angle: CSV file of the "
+            "indices, and a figure beside it.",
+        ),
     ] = None,
     workers: Workers = None,
     against_angle: Annotated[
-        Path | None,
-        typer.Option(
-            "--against-angle",
-            metavar="OUT.csv",
-            help="Write the indices at each input angle to OUT.csv, and a figure to OUT.png.",
-        ),
-    ] = None,
+        bool, typer.Option("--against-angle", help="Print the indices over the input angle instead.")
+    ] = False,
     joints: Annotated[
         int, typer.Option("--joints", metavar="N", min=100, help="With --against-angle: number of joints used.")
     ] = 1000,
     study_file: StudyOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON with all errors instead of a table.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Print which errors cause the scatter of a load.
 
@@ -70,65 +80,80 @@ def causes(
     one more for each group of errors; it gives total indices with intervals instead of bounds. To resume after an
     interruption, run the same command again. OUT can be given as FILE afterwards.
 
-    With --against-angle OUT.csv, prints and writes the first-order indices of a force or torque at each input angle and
-    over the revolution. Joints are simulated again if FILE has no load histories.
+    With --against-angle, prints the first-order indices of a force or torque over the revolution, and with --out writes
+    them at each input angle. Joints are simulated again if FILE has no load histories.
 
     Example: tolstat causes iso2768_f.h5 --by cross1.F
     """
-    if against_angle is not None:
-        if points is not None or out is not None:
-            remedy = "remove these two, or --against-angle"
-            raise InputError([Fault("--against-angle", "cannot be combined with --pick-freeze or --out", remedy)])
-        _against_angle(file, by, n, log, against_angle, joints, study_file)
+    if against_angle:
+        if points is not None:
+            raise InputError([Fault("--against-angle", "cannot be combined with --pick-freeze", "remove one of them")])
+        _against_angle(file, by, top, logarithm, out, joints, study_file, wide)
         return
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
+    from tolstat.questions.exceedance.query import most_exceeded
     from tolstat.store import Reader
 
     if points is not None:
         file = _run_design(file, points, groups, out, workers)
     elif out is not None:
-        raise InputError([Fault("--out", "is used with --pick-freeze only", "add --pick-freeze 1024")])
-    with Reader.open(file) as store:
-        found = causes_of(store.view(study_file), by, log=log)
+        remedy = "add --pick-freeze 1024, or --against-angle"
+        raise InputError([Fault("--out", "is used with --pick-freeze or --against-angle only", remedy)])
+    with progress("causes"), Reader.open(file) as store:
+        view = store.view(study_file)
+        found = causes_of(view, by or most_exceeded(view), log=logarithm)
     if as_json:
         typer.echo(as_text(rendering.values(found)))
         return
-    typer.echo(rendering.text(found, n))
-    say(rendering.note(found, log))
+    print_table(rendering.columns(found), rendering.largest(found, top), wide)
+    say(rendering.note(found, logarithm))
 
 
 def _run_design(path: Path, points: int, groups: Groups, out: Path | None, workers: int | None) -> Path:
     """Simulate a pick-freeze design of a study; returns the result file."""
     from tolstat import study
     from tolstat.campaign.blocks import Execution
-    from tolstat.cli.run import run_and_report
+    from tolstat.cli import run
     from tolstat.study.rewriting import with_keys
 
     keys = {"method": "pick_freeze", "n": points, "groups": groups.value}
     plan = study.load(path, text=with_keys(study.load(path).text, {("sampling",): keys}, str(path)))
     target = out if out is not None else Path(f"{path.stem}_causes.h5")
-    run_and_report(plan, target, False, execution=Execution("processes", workers))
+    run.simulate(plan, target, execution=Execution("processes", workers))
     return target
 
 
-def _against_angle(file: Path, by: str, n: int, log: bool, out: Path, joints: int, study_file: Path | None) -> None:
+def _against_angle(
+    file: Path,
+    by: str | None,
+    top: int,
+    logarithm: bool,
+    out: Path | None,
+    joints: int,
+    study_file: Path | None,
+    wide: bool,
+) -> None:
     from tolstat.common.files import check_target
     from tolstat.questions.causes import angles_figure
     from tolstat.questions.causes.angles import against_angle
+    from tolstat.questions.exceedance.query import most_exceeded
     from tolstat.store import Reader, revolutions
 
-    figure = out.with_suffix(".png")
-    for path in (out, figure):
-        check_target(path, file)
-    with Reader.open(file) as store:
+    if out is not None:
+        for path in (out, out.with_suffix(".png")):
+            check_target(path, file)
+    with progress("causes over the input angle"), Reader.open(file) as store:
         view = store.view(study_file)
+        load = by or most_exceeded(view)
         if not revolutions.held(store):
             announce_compilation()
-        found = against_angle(view, [by], joints, (by,) if log else ())[0]
-    typer.echo(angles_figure.text(found, n))
-    say(angles_figure.note(found, log))
+        found = against_angle(view, [load], joints, (load,) if logarithm else ())[0]
+    print_table(angles_figure.COLUMNS, angles_figure.rows(found, top), wide)
+    say(angles_figure.note(found, logarithm))
+    if out is None:
+        return
     with output_file(out) as temporary:
         found.table().to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
-    for path in (out, *angles_figure.save(found, log, figure)):
+    for path in (out, *angles_figure.save(found, logarithm, out.with_suffix(".png"))):
         say(f"wrote {path}")

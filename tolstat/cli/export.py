@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, output_file, say
+from tolstat.cli._app import ResultFile, as_text, output_file
+from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -41,11 +42,15 @@ def export(
     ] = None,
     statistics: Annotated[
         str | None,
-        typer.Option("--json", metavar="OUT", help="Write all statistics as JSON; - for standard output."),
+        typer.Option("--statistics", metavar="OUT", help="Write all statistics as JSON; - for standard output."),
     ] = None,
     by: Annotated[
         list[str] | None,
-        typer.Option("--by", metavar="LOAD", help="With --json: load whose causes are included; repeatable."),
+        typer.Option(
+            "--by",
+            metavar="LOAD",
+            help="With --statistics: load whose causes are included, such as cross1.F; repeatable.",
+        ),
     ] = None,
     nominal: Annotated[
         bool,
@@ -63,7 +68,7 @@ def export(
 
     --xlsx writes three sheets: the same columns, the share above each limit, the unit and meaning of each column.
 
-    --json writes the share above each limit, quantiles, capability, the numerical error and the software versions.
+    --statistics writes the share above each limit, quantiles, capability, the numerical error and the versions.
 
     --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
     keeps cycles or load histories. docs/questions/fatigue.md shows how to read it as a pandas Series.
@@ -74,14 +79,14 @@ def export(
     from tolstat.report import workbook as excel
     from tolstat.store import Reader
 
-    given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--xlsx": workbook, "--json": statistics}
+    given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--xlsx": workbook, "--statistics": statistics}
     targets = [target for target in given.values() if target is not None]
     if not targets or len(set(targets)) < len(targets):
         raise typer.BadParameter(
-            "give one or more of --csv, --parquet, --xlsx, --json and --pylife, each with its own file OUT"
+            "give one or more of --csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
         )
     if by and statistics is None:
-        raise typer.BadParameter("--by is used with --json only: add --json OUT")
+        raise typer.BadParameter("--by is used with --statistics only: add --statistics OUT")
     if nominal and (out, parquet, workbook, cycles) == (None, None, None, None):
         raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
     if parquet is not None and find_spec("pyarrow") is None:
@@ -91,7 +96,7 @@ def export(
     for target in targets:
         if target != "-":
             check_target(Path(target), file)
-    with Reader.open(file) as store:
+    with progress("reading the file"), Reader.open(file) as store:
         if workbook is not None:
             excel.check(store, "--xlsx")
         if cycles is not None:

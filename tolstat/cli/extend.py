@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, StudyOption, Workers, say
-from tolstat.cli.run import run_and_report
+from tolstat.cli import run
+from tolstat.cli._app import ResultFile, StudyOption, Wide, Workers
+from tolstat.cli._talk import progress, say
 
 
 def extend(
@@ -16,6 +17,7 @@ def extend(
     study_file: StudyOption = None,
     workers: Workers = None,
     report: Annotated[bool, typer.Option(help="Print the report at the end and write its files.")] = True,
+    wide: Wide = False,
 ) -> None:
     """Add joints to a campaign and simulate them.
 
@@ -25,11 +27,13 @@ def extend(
 
     To resume after an interruption: tolstat run STUDY --n N --out FILE
 
-    Example: tolstat extend iso2768_f.h5 --n 20000
+    Example: tolstat extend iso2768_f.h5 --n 2000
     """
     from tolstat.campaign import extend as combine
     from tolstat.campaign.blocks import Execution
 
-    plan = combine.extend(file, n, study_file)
+    with progress("drawing the errors"):
+        plan = combine.extend(file, n, study_file)
     say(f"{file}: extended to {n} joints")
-    run_and_report(plan, file, report, execution=Execution("processes", workers))
+    run.simulate(plan, file, execution=Execution("processes", workers))
+    run.conclude(file, report, wide)

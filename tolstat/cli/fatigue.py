@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import output_file, say
+from tolstat.cli._app import AsJson, Wide, as_text, output_file, print_table
+from tolstat.cli._talk import progress, say
 
 
 def fatigue(
@@ -24,52 +25,55 @@ def fatigue(
             help="Share of the revolutions, once for each FILE in the same order; sum 1; default: 1 for one file.",
         ),
     ] = None,
-    channel: Annotated[
+    by: Annotated[
         list[str] | None,
         typer.Option(
-            "--channel",
-            metavar="PATTERN",
-            help='Load channels to evaluate, such as "cross*.F_t"; repeatable; default: all.',
+            "--by",
+            metavar="LOAD",
+            help='Component or pattern, such as cross1.F_t or "cross*.F_t"; repeatable; default: the most loaded ones.',
         ),
     ] = None,
-    csv: Annotated[
+    out: Annotated[
         Path | None,
-        typer.Option(
-            "--csv", metavar="OUT", help="Write the damage-equivalent loads of all evaluated channels as CSV."
-        ),
+        typer.Option("--out", metavar="CSV", help="Write the damage-equivalent loads of all components as CSV."),
     ] = None,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Print damage-equivalent loads and damage sums.
 
     Prints the quantiles of the damage-equivalent load over the joints, and for each S-N line the share of joints whose
-    damage sum exceeds 1, with 95 % intervals. Without --channel, prints the most loaded component of each bushing force
+    damage sum exceeds 1, with 95 % intervals. Without --by, prints the most loaded component of each bushing force
     and torque. Exponents, service life and S-N lines are those of [fatigue] in the study of the first FILE.
 
     Several files form a duty cycle: the same joints at several operating points.
 
-    Example: tolstat fatigue low.h5 high.h5 --share 0.3 --share 0.7
+    Example: tolstat fatigue iso2768_f.h5 --by "cross*.F_t"
     """
     from tolstat.common.files import check_target
-    from tolstat.display.table import as_text
+    from tolstat.display import text
     from tolstat.questions.fatigue import query, rendering
     from tolstat.questions.fatigue.counting import channels
     from tolstat.store import Reader
 
-    if csv:
-        check_target(csv, *files)
-    names = channels(channel) if channel else None
-    with ExitStack() as stack:
+    if out is not None:
+        check_target(out, *files)
+    names = channels(by) if by else None
+    with progress("counting cycles"), ExitStack() as stack:
         views = [stack.enter_context(Reader.open(file)).view() for file in files]
         loading = query.load_cycles(views, share or [1.0], names)
-    loads, damages = query.equivalent_loads(loading), query.damages(loading)
-    shown = [] if channel else query.most_loaded(loads)
+        loads, damages = query.equivalent_loads(loading), query.damages(loading)
+    if out is not None:
+        with output_file(out) as temporary:
+            loads.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+        say(f"wrote {out}")
+    if as_json:
+        typer.echo(as_text({"loads": text.records(loads), "damages": text.records(damages)}))
+        return
+    shown = [] if by else query.most_loaded(loads)
     table = rendering.by_channel(loads[loads["channel"].isin(shown)] if shown else loads)
-    typer.echo(as_text(rendering.LOADS, table))
+    print_table(rendering.LOADS, table, wide)
     if len(damages):
         typer.echo("\nshare of joints whose damage sum exceeds 1")
-        typer.echo(as_text(rendering.DAMAGES, damages))
+        print_table(rendering.DAMAGES, damages, wide)
     say(rendering.notes(loading, loads))
-    if csv:
-        with output_file(csv) as temporary:
-            loads.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
-        say(f"wrote {csv}")

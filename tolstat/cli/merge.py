@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import say
+from tolstat.cli._talk import progress, say
 
 
 def merge(
@@ -27,10 +27,12 @@ def merge(
     """
     from tolstat.campaign import extend
 
-    merged = extend.merge(files, out)
+    with progress("merging"):
+        merged = extend.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
     lines = [f"{out}: {counts.done} joints, {counts.shortfall}"]
     lines += [f"{merged.twice} surplus copies of rows, with identical results"] * bool(merged.twice)
     lines += [f"{pending} joints are pending; to simulate them: tolstat run STUDY --out {out}"] * bool(pending)
+    lines += [f"next: tolstat report {out} --out {out.with_suffix('.html')}"] * (not pending)
     say("\n".join(lines))

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, as_text, make_folder, say
+from tolstat.cli._app import AsJson, Wide, Workers, announce_compilation, as_text, make_folder, print_table
+from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
 
@@ -46,7 +47,8 @@ def multifidelity(
         Path, typer.Option("--out", metavar="DIR", help="Folder of STUDY_high.h5 and STUDY_low.h5, created if missing.")
     ] = Path(),
     workers: Workers = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Combine few expensive and many cheap simulations.
 
@@ -57,12 +59,13 @@ def multifidelity(
     Prints each estimate with its 95 % interval, from both fidelities and from the high fidelity alone. Writes two
     ordinary result files. To resume after an interruption, run the same command again.
 
-    Example: tolstat multifidelity a.toml --low dynamic:90 --high dynamic:720
+    Example: tolstat multifidelity studies/iso2768_f.toml --low dynamic:90 --budget "10 s"
     """
     from tolstat import study
     from tolstat.campaign import run as campaign
     from tolstat.cli.run import parse_time
     from tolstat.display import text
+    from tolstat.questions.multifidelity import rendering
     from tolstat.questions.multifidelity.query import two_fidelities
 
     faults: list[Fault] = []
@@ -75,15 +78,16 @@ def multifidelity(
     make_folder(out)
     announce_compilation()
     try:
-        found = two_fidelities(plan, low, high, out, seconds, pilot, by, workers, say)
+        with progress("joints at two fidelities"):
+            found = two_fidelities(plan, low, high, out, seconds, pilot, by, workers, say)
     except campaign.Interrupted as stop:
-        say(str(stop))
+        fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
     if as_json:
         head = found.allocation._asdict() | {"cost_high_s": found.cost_high, "cost_low_s": found.cost_low}
         typer.echo(as_text({**head, "high": found.high, "low": found.low, "statistics": text.records(found.table)}))
     else:
-        typer.echo(text.plain(found.table))
+        print_table(rendering.TABLE, found.table, wide)
     say(f"{found.high} joints at high fidelity, {found.low} at low; where gain < 1, the high fidelity alone is better")
     for path in found.files:
         say(f"results in {path}")

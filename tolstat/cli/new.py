@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import say
+from tolstat.cli._talk import say
 
 
 def new(

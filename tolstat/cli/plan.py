@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, as_text, print_warnings
+from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_warnings
+from tolstat.cli._talk import progress, say
 
 if TYPE_CHECKING:
     from tolstat.campaign.plan import Plan
@@ -23,14 +24,14 @@ def plan(
     pilot: Annotated[
         int, typer.Option("--pilot", metavar="K", min=1, help="Number of joints simulated for the prediction.")
     ] = 128,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Predict time, memory and precision of a campaign.
 
-    Simulates a few joints (pilot) and writes nothing. Prints time, memory and file size of the campaign, the width of
-    the 95 % interval of exceedances and of each limit's exceedance, the number of joints that a 95 % bound of a
-    quantile needs, and what each entry of [tolerances] means: half width, radius or diameter, standard deviation of the
-    error, share of the parts outside.
+    Simulates a few joints (pilot) and writes nothing. Prints the time of the whole command tolstat run (start, joints,
+    check, report), memory and file size of the campaign, the width of the 95 % interval of exceedances and of each
+    limit's exceedance, the number of joints that a 95 % bound of a quantile needs, and what each entry of [tolerances]
+    means: half width, radius or diameter, standard deviation of the error, share of the parts outside.
 
     Example: tolstat plan studies/iso2768_f.toml
     """
@@ -42,8 +43,10 @@ def plan(
     loaded = study.load(study_file, n=n)
     print_warnings(study_file, loaded.joints, loaded.variants)
     announce_compilation()
-    made = plans.plan(loaded, workers, pilot)
-    typer.echo(as_text(asdict(made)) if as_json else _lines(made))
+    with progress() as shown:
+        made = plans.plan(loaded, workers, pilot, shown.stage)
+    typer.echo(as_text(asdict(made) | {"seconds": made.seconds}) if as_json else _lines(made))
+    say(f"next: tolstat run {study_file}" + ("" if n is None else f" --n {n}"))
 
 
 def _lines(made: Plan) -> str:
@@ -55,7 +58,8 @@ def _lines(made: Plan) -> str:
         *_rattle_warning(made),
         *_misfit_warning(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
-        f"time: {_duration(made.seconds)} on {made.workers} cores",
+        f"time: {_duration(made.seconds)} on {made.workers} cores, of which",
+        *(f"  {stage}: {_duration(seconds)}" for stage, seconds in made.stages.items()),
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",
         *made.fit,
@@ -110,10 +114,12 @@ def _misfit_warning(made: Plan) -> list[str]:
 
 
 def _duration(seconds: float) -> str:
+    if seconds < 1:
+        return "less than 1 s"
     for unit, size in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2 * size:
             return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.3g} s"
+    return f"{seconds:.2g} s"
 
 
 def _size(size: int) -> str:

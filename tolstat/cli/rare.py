@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import StudyOption, Workers, announce_compilation, as_text, say
+from tolstat.cli._app import AsJson, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
+from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
@@ -55,7 +56,8 @@ def rare(
     ] = None,
     study_file: StudyOption = None,
     workers: Workers = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Estimate a rare exceedance by subset simulation.
 
@@ -65,7 +67,7 @@ def rare(
     Prints threshold and share of each level, and the probability with its 95 % interval. Writes all joints to a result
     file. To resume after an interruption, run the same command again.
 
-    Example: tolstat rare studies/iso2768_f.toml --limit "cross1.F > 15 kN"
+    Example: tolstat rare studies/iso2768_f.toml --limit "cross1.F > 5 kN"
     """
     from tolstat.campaign import run as campaign
     from tolstat.campaign.executors import WorkerDied
@@ -81,19 +83,20 @@ def rare(
         plan, path = _recall(source, study_file, [limit, out, *given.values()]), source
     announce_compilation()
     try:
-        found = simulation.run(plan, path, workers, say)
+        with progress("levels of the subset simulation"):
+            found = simulation.run(plan, path, workers, say)
     except campaign.Interrupted as stop:
-        say(str(stop))
+        fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
     except WorkerDied as error:
-        say(f"error: {error}")
+        fail(f"error: {error}")
         raise typer.Exit(1) from error
     sampling = found.sampling
     levels = tables.table(found.levels, sampling.load)
     if as_json:
         typer.echo(as_text(_summary(found) | {"levels": text.records(levels)}))
     else:
-        typer.echo(text.plain(levels))
+        print_table(tables.LEVELS, levels, wide)
         typer.echo(tables.sentence(found.estimate, sampling.load, sampling.above))
     _print_messages(found, path)
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, announce_compilation, as_text, say
+from tolstat.cli._app import AsJson, ResultFile, announce_compilation, as_text
+from tolstat.cli._talk import progress, say
 from tolstat.cli.simulate import case_text, warn_unless_ok, write_trace
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def replay(
         Path | None,
         typer.Option("--out", metavar="CSV", help="Write the load histories of the last revolution as CSV."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Simulate one joint again and compare with the file.
 
@@ -38,7 +39,7 @@ def replay(
     if out is not None:
         check_target(out, file)
     announce_compilation()
-    with Reader.open(file) as store:
+    with progress("simulation"), Reader.open(file) as store:
         again = replays.replay(store, row)
     summary = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     summary |= again.result.summary()

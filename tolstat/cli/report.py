@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, announce_compilation, make_folder, say, tell
+from tolstat.cli._app import ResultFile, Wide, announce_compilation, make_folder, tell, width_of
+from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
 PAGES = (".html", ".htm")
@@ -33,15 +34,16 @@ def report(
         ),
     ] = None,
     again: Annotated[
-        int,
+        int | None,
         typer.Option(
             "--replay",
             metavar="N",
             min=0,
-            help="With an HTML page: number of joints evaluated over the input angle; simulated again if FILE has no "
-            "load histories.",
+            help="With an HTML page: number of joints evaluated over the input angle, simulated again if FILE "
+            "has no load histories; default: 1000, but none is simulated again if FILE has pending joints.",
         ),
-    ] = 1000,
+    ] = None,
+    wide: Wide = False,
 ) -> None:
     """Report the share of joints above each load.
 
@@ -49,7 +51,7 @@ def report(
     loads against the swept value. Writes the curves as PNG, SVG and CSV.
 
     With --out PAGE.html, writes a single page instead, with verdict, exceedance, capability, causes, worst joints,
-    fatigue, contact modes, numerical error, failed joints and provenance.
+    fatigue, contact modes, numerical error, failed joints and provenance. The campaign may be unfinished.
 
     Example: tolstat report iso2768_f.h5 --out page.html --accept "1 %"
     """
@@ -64,10 +66,12 @@ def report(
     if out is not None:
         Reader.open(file).close()  # check the file before the folder is created
         make_folder(out)
-    tell(build(file, out))
+    with progress("report") as shown:
+        made = build(file, out, width_of(wide), shown.stage)
+    tell(made)
 
 
-def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
+def _page(file: Path, out: Path, accept: str | None, again: int | None) -> None:
     from tolstat.campaign.executors.common import THREAD_VARIABLES
 
     for name in THREAD_VARIABLES:  # for many small products, BLAS threads only cost time
@@ -86,9 +90,16 @@ def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
     if faults:
         raise InputError(faults)
     with Reader.open(file) as store:
-        if again and store.sampling["method"] in DRAWN and not revolutions.held(store):
+        held = bool(revolutions.held(store))
+        if again is None:
+            again = page.REPLAYED if held or store.complete else 0
+            if not again:
+                say(f"{file} has pending joints: the page shows the others, and none over the input angle (--replay)")
+        if again and store.sampling["method"] in DRAWN and not held:
             announce_compilation()
-    say(f"wrote {page.write_page(file, out, accepted, again)}")
+    with progress("page") as shown:
+        page.write_page(file, out, accepted, again, shown.stage)
+    say(f"wrote {out}")
 
 
 def parse_share(text: str) -> float:

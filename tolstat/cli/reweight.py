@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, StudyOption, as_text, say
+from tolstat.cli._app import AsJson, ResultFile, StudyOption, Wide, as_text, print_table
+from tolstat.cli._talk import progress, say
 
 
 def reweight(
@@ -18,7 +19,8 @@ def reweight(
         ),
     ],
     study_file: StudyOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Estimate exceedances for changed tolerances.
 
@@ -28,18 +30,19 @@ def reweight(
     Prints the share of joints above each limit with its 95 % interval, and a verdict. The verdict is "needs new runs"
     if few joints have most of the weight; the table is then unreliable.
 
-    Example: tolstat reweight a.h5 --set "pin*.offset_t.plus_minus=0.05 mm"
+    Example: tolstat reweight iso2768_f.h5 --set "pin*.offset_t.plus_minus=0.1 mm"
     """
     from tolstat.display import text
+    from tolstat.questions.reweight import rendering
     from tolstat.questions.reweight.query import reweighted
     from tolstat.store import Reader
 
-    with Reader.open(file) as store:
+    with progress("reweighting"), Reader.open(file) as store:
         found = reweighted(store.view(study_file), settings)
     if as_json:
         w = found.weights
         head = {"usable": w.usable, "ess": w.ess, "pareto_k": w.k if abs(w.k) < 1e300 else None, "allowed_k": w.allowed}
         typer.echo(as_text({**head, "changed": found.changed, "loads": text.records(found.table)}))
         return
-    typer.echo(text.plain(found.table))
+    print_table(rendering.columns(found.table), found.table, wide)
     say(f"{len(found.changed)} errors changed; {found.verdict}")

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, print_warnings, say, tell
+from tolstat.cli._app import Wide, Workers, announce_compilation, print_warnings, tell, width_of
+from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
-    from tolstat.store import Counts
+    from tolstat.store import Counts, Reader
     from tolstat.study import Study
 
 SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -89,16 +90,17 @@ def run(
         bool, typer.Option(help="Check the numerical error on one joint in 400 (1 to 16) at the end.")
     ] = True,
     report: Annotated[bool, typer.Option(help="Print the report at the end and write its files.")] = True,
+    wide: Wide = False,
 ) -> None:
     """Simulate the joints of a study and print a report.
 
     Simulates the joints that are pending in the result file, which is created if missing. To resume after an
     interruption (Ctrl-C, kill, power failure), run the same command again.
 
-    Prints the share of joints above each limit (see tolstat report). Writes the result file, and beside it the curves
-    as PNG, SVG and CSV.
+    Prints the share of joints above each limit (see tolstat report) and of those that keep all limits, why joints have
+    no valid load, and the next command. Writes the result file, and beside it the curves as PNG, SVG and CSV.
 
-    Example: tolstat run studies/iso2768_f.toml --n 4096 --out large.h5
+    Example: tolstat run studies/iso2768_f.toml --n 512 --out first.h5
     """
     from tolstat import study
     from tolstat.campaign.blocks import Execution
@@ -127,9 +129,10 @@ def run(
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:
-        run_and_report(plan, path, report, execution=execution, check=verify, rows=part, retry=again)
+        simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
     else:
-        run_and_report(plan, path, report, until, execution=execution, check=verify)
+        simulate(plan, path, until, execution=execution, check=verify)
+    conclude(path, report, wide, str(study_file))
 
 
 def parse_time(text: str, option: str = "--joint-timeout") -> float:
@@ -164,44 +167,71 @@ def parse_rows(text: str) -> range:
     return range(int(first), int(last))
 
 
-def run_and_report(plan: Study, path: Path, report: bool, until: str | None = None, **choices: Any) -> None:
-    """Run a campaign with progress on standard error, then print its report; `choices` go to `campaign.run`."""
+def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) -> None:
+    """Simulate a campaign with progress on standard error; `choices` go to `campaign.run`."""
     from tolstat.campaign import run as campaign
     from tolstat.campaign.executors import WorkerDied
 
+    announce_compilation()
     try:
         counts = _campaign_until(until, plan, path, **choices) if until else _campaign(plan, path, **choices)
     except campaign.Interrupted as stop:
-        say(str(stop))
+        fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
     except WorkerDied as error:
-        say(f"error: {error}")
+        fail(f"error: {error}")
         raise typer.Exit(1) from error
     say(f"{path}: {counts.done} joints, {counts.shortfall}")
-    if report:
-        from tolstat.report import build
 
-        tell(build(path))
+
+def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None:
+    """Print the report of a campaign if asked for, why joints have no valid load, and the next command.
+
+    `study` is the study file as the user gave it.
+    """
+    from tolstat.campaign.remedy import reasons
+    from tolstat.store import Reader
+
+    if report:
+        with progress("report") as shown:
+            from tolstat.report import build
+
+            made = build(path, None, width_of(wide), shown.stage)
+        tell(made)
+    with Reader.open(path) as store:
+        found = reasons(store, store.status())
+        for reason in found:
+            say(reason.text)
+        for reason in found:
+            if reason.retry:
+                say(f"again: tolstat run {study} --out {path} {reason.retry}")
+        say(f"next: {_next(store, path)}")
+
+
+def _next(store: Reader, path: Path) -> str:
+    """Command that follows the run of a campaign."""
+    if not store.whole:
+        return f"tolstat merge {path} OTHER_SLICES --out WHOLE.h5"
+    if store.case_names:
+        return f"tolstat export {path} --csv {path.with_suffix('.csv')}"
+    return f"tolstat report {path} --out {path.with_suffix('.html')}"
 
 
 def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat.campaign import progress
     from tolstat.campaign import run as campaign
 
-    announce_compilation()
-    with progress.reporter() as reporter:
-        return campaign.run(plan, path, progress=reporter, tell=reporter.note, **choices)
+    with progress() as shown:
+        return campaign.run(plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
 
 
 def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat.campaign import progress, stop_rule
     from tolstat.campaign import run as campaign
+    from tolstat.campaign import stop_rule
     from tolstat.store import Reader
 
     rule = stop_rule.parse(text)
-    announce_compilation()
-    with progress.reporter() as reporter:
-        run = partial(campaign.run, plan, path, progress=reporter, tell=reporter.note, **choices)
+    with progress() as shown:
+        run = partial(campaign.run, plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
         outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
     look = outcome.look
     n_looks = len(outcome.looks)

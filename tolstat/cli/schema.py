@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import as_text, output_file, say
+from tolstat.cli._app import as_text, output_file
+from tolstat.cli._talk import say
 
 
 def schema(

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import make_folder, output_folder, say
+from tolstat.cli._app import make_folder, output_folder
+from tolstat.cli._talk import say
 from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -99,10 +100,10 @@ def _drawn(shown: Shown, errors: bool, columns: int) -> tuple[Figure, str]:
 
     if errors:
         rows = cells(rendering.MEANING, rendering.meanings())
-        return rendering.draw_errors(shown.joint), align(rows, text_last=True)
+        return rendering.draw_errors(shown.joint), align(rows, words=(True, True, True))
     if shown.errors is not None:
         figure = rendering.draw_row(shown.joint, shown.errors, shown.title)
         return figure, as_text(rendering.NUMBERS, rendering.numbers(query.pairs(shown.joint, shown.errors)))
     figure = rendering.draw_joint(shown.joint, shown.alpha, shown.title, columns)
     rows = cells(rendering.LENGTHS, rendering.lengths(shown.joint, shown.alpha))
-    return figure, align(rows, text_last=True)
+    return figure, align(rows, words=(True, True, True))

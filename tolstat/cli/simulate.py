@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import announce_compilation, as_text, output_file, print_warnings, say
+from tolstat.cli._app import AsJson, announce_compilation, as_text, output_file, print_warnings
+from tolstat.cli._talk import progress, say, warn
 
 if TYPE_CHECKING:
     from tolstat.campaign.trace import CaseResult
@@ -19,7 +20,7 @@ def simulate(
         Path | None,
         typer.Option("--out", metavar="CSV", help="Write the load histories of the last revolution as CSV."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Simulate one joint, with and without its errors.
 
@@ -37,7 +38,8 @@ def simulate(
     loaded = study.load_case(case)
     print_warnings(case, [loaded.joint])
     announce_compilation()
-    result = trace.simulate_case(loaded)
+    with progress("simulation"):
+        result = trace.simulate_case(loaded)
     summary = result.summary()
     typer.echo(as_text(summary) if as_json else case_text(summary))
     warn_unless_ok(summary, result.remedy())
@@ -75,7 +77,7 @@ def warn_unless_ok(summary: dict[str, Any], remedy: str) -> None:
 
     state = Status[str(summary["status"]).upper()]
     if state != Status.OK:
-        say(f"warning: {state.label}: {STATUS_TEXT[state]}\n  hint: {remedy}")
+        warn(f"warning: {state.label}: {STATUS_TEXT[state]}\n  hint: {remedy}")
 
 
 def write_trace(result: CaseResult, out: Path) -> None:

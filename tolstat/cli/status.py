@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text
+from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
+from tolstat.cli._talk import progress
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,30 +17,66 @@ if TYPE_CHECKING:
     from tolstat.store import Reader
 
 
-def status(
-    file: ResultFile,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
-) -> None:
+def status(file: ResultFile, wide: Wide = False, as_json: AsJson = False) -> None:
     """Print the number of joints by status.
 
-    Prints one line per status, and the share of joints above each limit so far with its 95 % interval. During a run,
-    prints also its rate and the remaining time; reading the file does not disturb the run.
+    Prints the number of joints, why joints have no valid load and what to do, and the share of joints above each limit
+    so far with its 95 % interval. During a run, prints also its rate and the remaining time; reading the file does not
+    disturb the run. With --json, prints the number of every status.
 
     Example: tolstat status iso2768_f.h5
     """
+    from tolstat.campaign.remedy import reasons
     from tolstat.store import Reader
 
-    with Reader.open(file) as store:
-        summary = _summary(store)
-    lines = [f"{name}: {value}" for name, value in summary.items() if name != "exceedance"]
-    lines += [
-        "P({load} > {limit:g} {unit}): {estimate} ({lower} to {upper})".format(**e) for e in summary["exceedance"]
-    ]
-    typer.echo(as_text(summary) if as_json else "\n".join(lines))
+    with progress("reading the file"), Reader.open(file) as store:
+        summary, states = _summary(store)
+        why = reasons(store, states)
+    if as_json:
+        causes = {r.status.label: {"row": r.row, "remedy": r.remedy} for r in why}
+        typer.echo(as_text(summary | {"causes": causes}))
+        return
+    typer.echo(_text(summary))
+    for reason in why:
+        typer.echo(reason.text)
+    if summary["exceedance"]:
+        _print_shares(summary["exceedance"], wide)
 
 
-def _summary(store: Reader) -> dict[str, Any]:
-    """Collect the counts and shares, some rows at a time; blocks of pending rows are skipped."""
+def _text(summary: dict[str, Any]) -> str:
+    """Counts and pace as lines; statuses without joints are left out."""
+    from tolstat.campaign.progress import clock
+    from tolstat.common.tables import Status
+
+    found = {state.label: summary[state.label] for state in Status if summary[state.label]}
+    lines = [f"study: {summary['study']}", f"joints: {summary['joints']}"]
+    lines += [f"{name}: {count}" for name, count in found.items()]
+    lines += [f"{name}: {summary[name]}" for name in ("damaged", "simulated_again") if name in summary]
+    pace = ""
+    if "joints_per_s" in summary:
+        pace = f", {summary['joints_per_s']:g} joints/s, {clock(summary['s_to_go'])} left"
+    return "\n".join([*lines, f"running: {'yes' if summary['running'] else 'no'}{pace}"])
+
+
+def _print_shares(shares: list[dict[str, Any]], wide: bool) -> None:
+    import pandas as pd
+
+    from tolstat.display import text
+    from tolstat.display.table import Column
+
+    frame = pd.DataFrame(shares).rename(columns={"limit": "level"}).astype({"lower": float, "upper": float})
+    columns = (
+        Column("load > limit", text.limit),
+        Column("above", lambda row: f"{row['above']} of {row['of']}"),
+        Column("share", lambda row: text.percent(row["estimate"])),
+        Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    )
+    typer.echo()
+    print_table(columns, frame.astype({"estimate": float}), wide)
+
+
+def _summary(store: Reader) -> tuple[dict[str, Any], NDArray[np.uint8]]:
+    """Collect counts and shares, some rows at a time; blocks of pending rows are skipped. Also return the states."""
     import numpy as np
 
     from tolstat.common.loads import LOADS
@@ -65,7 +102,7 @@ def _summary(store: Reader) -> dict[str, Any]:
     summary |= {name: count for name, count in condition.items() if count} | _pace(store, summary["pending"])
     done = summary["pending"] < store.n
     summary["exceedance"] = [_exceedance(store, states, name, loads[name]) for name in loads if done]
-    return summary
+    return summary, states
 
 
 def _pace(store: Reader, pending: int) -> dict[str, Any]:
@@ -94,4 +131,5 @@ def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDA
     share = load.above(limit)
     numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
     rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}
-    return {"load": name, "limit": limit, "unit": unit, **rounded}
+    joints = {"above": share.count, "of": share.n - share.n_failed - share.n_unsettled}
+    return {"load": name, "limit": limit, "unit": unit, **joints, **rounded}

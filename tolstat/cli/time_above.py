@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, make_folder, output_folder, say
+from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, make_folder, output_folder, print_table
+from tolstat.cli._talk import progress, say
 
 
 def time_above(
@@ -28,7 +29,8 @@ def time_above(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Write curves (PNG, SVG, CSV) to this folder, created if missing."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Print how much of a revolution loads are above a level.
 
@@ -36,23 +38,23 @@ def time_above(
     the joints; and the exceedance, the share of joints that are above the level at any time. The study must keep load
     histories (output.histories "full" or "harmonics").
 
-    Example: tolstat time-above a.h5 --by cross1.F --level "1500 N"
+    Example: tolstat time-above iso2768_f.h5 --by cross1.F --level "1500 N"
     """
-    from tolstat.display import table, text
+    from tolstat.display import text
     from tolstat.questions.time_above import query, rendering
     from tolstat.store import Reader
 
-    with Reader.open(file) as store:
+    with progress("time above the levels"), Reader.open(file) as store:
         found = query.time_above(store.view(), by or (), level or (), curves=out is not None)
     if as_json:
         summary = {"joints": found.joints, "left_out": found.left_out, "loads": text.records(found.table)}
         typer.echo(as_text(summary))
     else:
-        typer.echo(table.as_text(rendering.LEVELS, found.table))
+        print_table(rendering.LEVELS, found.table, wide)
     say(rendering.note(found))
     if out is not None:
         make_folder(out)
-        with output_folder(out):
+        with progress("figures"), output_folder(out):
             files = rendering.write(found, out / file.stem)
         for path in files:
             say(f"wrote {path}")

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Workers, announce_compilation, as_text, output_file, say
+from tolstat.cli._app import AsJson, Wide, Workers, announce_compilation, as_text, output_file, print_table
+from tolstat.cli._talk import progress, say
 
 if TYPE_CHECKING:
     from tolstat.store.verification import Verification
@@ -24,7 +25,8 @@ def verify(
         Path | None, typer.Option("--out", metavar="CSV", help="Write the errors of each joint, check and load as CSV.")
     ] = None,
     workers: Workers = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Estimate the numerical error on some joints.
 
@@ -34,25 +36,23 @@ def verify(
 
     Of a result file, checks settled joints and stores the checks in the file for the report.
 
-    Example: tolstat verify iso2768_f.h5 --joints 24 --out errors.csv
+    Example: tolstat verify iso2768_f.h5 --joints 2 --out errors.csv
     """
-    from tolstat.campaign import progress
     from tolstat.campaign import verify as verification
     from tolstat.campaign.executors import available_workers
     from tolstat.common.files import check_target
-    from tolstat.display.table import as_text as aligned
     from tolstat.questions.accuracy import query, rendering
 
     if out is not None:
         check_target(out, what)
-    with progress.reporter() as reporter:
+    with progress("checks, then tight references") as shown:
         found = verification.check(
-            what, joints, seed, announce_compilation, workers or available_workers(), progress=reporter
+            what, joints, seed, announce_compilation, workers or available_workers(), progress=shown
         )
     if as_json:
         typer.echo(as_text(_summary(found)))
     else:
-        typer.echo(aligned(rendering.ERRORS, query.distribution(found)))
+        print_table(rendering.ERRORS, query.distribution(found), wide)
     say(rendering.note(found))
     if out is not None:
         with output_file(out) as temporary:

@@ -6,33 +6,36 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, StudyOption, as_text, say
+from tolstat.cli._app import AsJson, ByOne, ResultFile, StudyOption, Wide, as_text, print_table
+from tolstat.cli._talk import progress, say
 
 
 def worst(
     file: ResultFile,
-    by: Annotated[
-        str, typer.Option("--by", metavar="LOAD", help="Load (cross1.F, pin2.contact, psi) or column of the results.")
-    ],
-    n: Annotated[int, typer.Option("--n", metavar="N", min=1, help="Number of joints to list.")] = 10,
+    by: ByOne = None,
+    top: Annotated[int, typer.Option("--top", metavar="N", min=1, help="Number of joints to list.")] = 10,
     study_file: StudyOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON with all errors instead of a table.")] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """List the joints with the largest load and their errors.
 
     Prints row, load and status of each joint, and its largest errors in sigma: the standard normal score that has the
-    same probability as the error in its own distribution.
+    same probability as the error in its own distribution. --by takes columns of the results too, such as revolutions.
 
-    Example: tolstat worst iso2768_f.h5 --by cross1.F --n 20
+    Example: tolstat worst iso2768_f.h5 --by cross1.F --top 20
     """
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.tail import worst_joints
+    from tolstat.questions.exceedance.query import most_exceeded
     from tolstat.store import Reader
 
-    with Reader.open(file) as store:
-        found = worst_joints(store.view(study_file), by, n)
+    with progress("worst joints"), Reader.open(file) as store:
+        view = store.view(study_file)
+        found = worst_joints(view, by or most_exceeded(view), top)
     if as_json:
         typer.echo(as_text(rendering.worst_values(found)))
         return
-    typer.echo(rendering.worst_text(found))
-    say(f"to simulate one of them again: tolstat replay {file} --row ROW --out trace.csv")
+    print_table(rendering.worst_columns(found), rendering.worst_rows(found), wide)
+    if found.joints:
+        say(f"next: tolstat replay {file} --row {found.joints[0].row} --out trace.csv")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -24,22 +25,38 @@ def check_target(path: Path, *inputs: Path) -> None:
     Raises
     ------
     InputError
-        When `path` is a folder, its parent folder does not exist, or it is one of `inputs`.
+        When `path` is a folder, or one of `inputs`, or lies in what is no folder. A missing folder is made by
+        `atomic_write`.
     """
     place = str(path)
     if path.is_dir():
         raise InputError([Fault(place, "cannot be written: is a folder", "give the path of a file in it")])
-    if not path.parent.is_dir():
-        raise InputError(
-            [Fault(place, "cannot be written: no such folder", f"create the folder: mkdir -p {path.parent}")]
-        )
+    above = next((folder for folder in path.parents if folder.exists()), path.parent)
+    if not above.is_dir():
+        raise InputError([Fault(place, f"cannot be written: {above} is no folder", "give another folder")])
     if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
         raise InputError([Fault(place, "cannot be written: it is the input", "give the output another name")])
+
+
+def make_parent(path: Path) -> None:
+    """Make the folder of `path` if it is missing.
+
+    Raises
+    ------
+    NotADirectoryError
+        When a file is in the way.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise NotADirectoryError(errno.ENOTDIR, "not a folder", str(path.parent)) from error
 
 
 @contextmanager
 def atomic_write(path: Path, overwrite: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `path`, and rename the file written there to `path` if no exception occurs.
+
+    A missing folder is made.
 
     Parameters
     ----------
@@ -53,6 +70,7 @@ def atomic_write(path: Path, overwrite: bool = True) -> Iterator[Path]:
     FileExistsError
         When `overwrite` is false and `path` exists, even if it was created in the meantime.
     """
+    make_parent(path)
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         yield temporary

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from tolstat.common.errors import TolstatError
+
+
+def silent(text: str) -> None:
+    """Ignore the name of a stage."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +30,15 @@ class Asked:
         the page shows no histories.
     notes : list of str
         Remarks that concern the whole page; sections append to it.
+    stage : callable
+        Called with the name of each part of the page when its computation begins.
     """
 
     path: Path
     accepted: float = math.nan
     replay: int = 0
     notes: list[str] = field(default_factory=list)
+    stage: Callable[[str], None] = silent
 
     @property
     def judges(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +13,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 UNITS = {"N*m": "N m", "1": ""}
-
-
-def plain(table: pd.DataFrame) -> str:
-    """Text of any frame, numbers to five digits, headed by its columns."""
-    rows = [[str(column) for column in table.columns]]
-    for line in table.itertuples(index=False):
-        rows.append([("-" if math.isnan(x) else f"{x:.5g}") if isinstance(x, float) else str(x) for x in line])
-    return align(rows)
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -40,21 +33,25 @@ def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
     return path
 
 
-def align(rows: list[list[str]], text_last: bool = False) -> str:
-    """Align rows of text in columns: the first to the left, the others to the right; with `text_last` the last left."""
+def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
+    """Align rows of text in columns: the first and those of `words` to the left, the others to the right."""
+    left = [k == 0 or (k < len(words) and words[k]) for k in range(len(rows[0]))]
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for row in rows:
-        cells = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
-        if text_last:
-            cells[-1] = row[-1]
-        lines.append("  ".join([row[0].ljust(widths[0]), *cells]).rstrip())
+        cells = (c.ljust(w) if own else c.rjust(w) for c, w, own in zip(row, widths, left, strict=True))
+        lines.append("  ".join(cells).rstrip())
     return "\n".join(lines)
 
 
 def value(x: float, unit: str) -> str:
     """Format a load with its unit, four digits; NaN gives a dash."""
     return f"{number(x)} {UNITS.get(unit, unit)}".strip() if not math.isnan(x) else "-"
+
+
+def limit(row: Mapping[Any, Any]) -> str:
+    """Words for a row with ``load``, ``level`` and ``unit``: ``cross1.F > 1500 N``."""
+    return f"{row['load']} > {value(row['level'], row['unit'])}"
 
 
 def number(x: float) -> str:

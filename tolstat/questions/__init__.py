@@ -1,7 +1,7 @@
 """Registry of the questions: a folder each, whose query takes a `store.view.View`, a study to simulate, or a joint.
 
-Commands, public names, sections of the page and the JSON summary come from here, in this order; `report`, `verify` and
-`status` print more than one question and are commands of their own. Modules are imported on first use.
+Public names, sections of the page and the JSON summary come from here, in this order. Modules are imported on first
+use.
 
 A folder has `query.py` (computes), `rendering.py` (text, tables, figures) and, where
 the page shows the question, `section.py` with ``sections(view, asked)``.
@@ -40,8 +40,6 @@ class Question(NamedTuple):
     ----------
     name : str
         The folder.
-    commands : tuple of str
-        Files of the package `cli` that ask it, each with a function of the same name.
     public : tuple of str
         ``module.function`` in the folder that `tolstat` offers under the function's name.
     has_section : bool
@@ -51,7 +49,6 @@ class Question(NamedTuple):
     """
 
     name: str
-    commands: tuple[str, ...] = ()
     public: tuple[str, ...] = ()
     has_section: bool = False
     has_summary: bool = False
@@ -59,37 +56,20 @@ class Question(NamedTuple):
 
 QUESTIONS = (
     Question("exceedance", has_section=True, has_summary=True),
-    Question("capability", ("capability",), has_section=True, has_summary=True),
-    Question(
-        "causes",
-        ("worst", "causes"),
-        ("query.causes_of", "angles.against_angle", "tail.worst_joints"),
-        has_section=True,
-    ),
-    Question(
-        "show",
-        ("show",),
-        ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"),
-        has_section=True,
-    ),
-    Question(
-        "fatigue",
-        ("fatigue",),
-        ("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"),
-        has_section=True,
-    ),
+    Question("capability", has_section=True, has_summary=True),
+    Question("causes", ("query.causes_of", "angles.against_angle", "tail.worst_joints"), has_section=True),
+    Question("show", ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"), has_section=True),
+    Question("fatigue", ("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"), has_section=True),
     Question("accuracy", has_section=True, has_summary=True),
     Question("joints", has_section=True),
-    Question("time_above", ("time_above",), ("query.time_above",)),
-    Question("reweight", ("reweight",), ("query.reweighted",)),
-    Question("allocate", ("allocate",), ("query.allocated",)),
-    Question("compare", ("compare",), ("query.compared",)),
-    Question("rare", ("rare",), ("query.rare_event",)),
-    Question("multifidelity", ("multifidelity",), ("query.two_fidelities",)),
+    Question("time_above", ("query.time_above",)),
+    Question("reweight", ("query.reweighted",)),
+    Question("allocate", ("query.allocated",)),
+    Question("compare", ("query.compared",)),
+    Question("rare", ("query.rare_event",)),
+    Question("multifidelity", ("query.two_fidelities",)),
 )
 
-COMMANDS = tuple(command for question in QUESTIONS for command in question.commands)
-"""Files of the package `cli`."""
 PUBLIC = {
     function: f"tolstat.questions.{question.name}.{module}"
     for question in QUESTIONS
@@ -100,8 +80,12 @@ PUBLIC = {
 
 def sections(view: View, asked: Asked) -> list[Section]:
     """Sections of the page, in the order of `QUESTIONS`; questions that the file cannot answer have none."""
-    modules = (_module(question, "section") for question in QUESTIONS if question.has_section)
-    return [section for module in modules for section in module.sections(view, asked)]
+    found: list[Section] = []
+    for question in QUESTIONS:
+        if question.has_section:
+            asked.stage(f"page: {question.name}")
+            found += _module(question, "section").sections(view, asked)
+    return found
 
 
 def summary(view: View, confidence: float) -> dict[str, Any]:

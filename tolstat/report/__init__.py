@@ -6,15 +6,21 @@ gets its table.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
-from tolstat.display import text
+from tolstat.display import table, text
+from tolstat.display.asked import silent
+from tolstat.display.table import WIDTH
 from tolstat.solver import fidelity
 from tolstat.store import Reader
 from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Report(NamedTuple):
@@ -46,7 +52,12 @@ def write_report(path: str | Path, out_dir: str | Path | None = None) -> list[Pa
     return build(path, out_dir).files
 
 
-def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
+def build(
+    path: str | Path,
+    out_dir: str | Path | None = None,
+    width: int | None = WIDTH,
+    stage: Callable[[str], None] = silent,
+) -> Report:
     """Write the report of a result file; the campaign may be unfinished.
 
     For ``FILE.h5`` it writes ``FILE_exceedance.png``, ``.svg`` and ``.csv`` (the curves),
@@ -60,7 +71,11 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
     path : str or Path
         The result file.
     out_dir : str or Path, optional
-        An existing folder; by default that of the file.
+        Folder, made if missing; by default that of the file.
+    width : int or None
+        Characters in a line of the table; None for all columns.
+    stage : callable
+        Called with the name of each stage when it begins.
 
     Returns
     -------
@@ -77,69 +92,86 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
     path = Path(path)
     stem = (Path(out_dir) if out_dir is not None else path.parent) / path.stem
     try:
+        stage("report")
         with Reader.open(path) as store:
             stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
-                return _noted(_cases(store, stem), stands_on)
+                return _noted(_cases(store, stem, width), stands_on)
             view = store.view()
-            report = _sweep(view, stem) if view.method == "sweep" else _exceedance(view, stem)
+            report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width)
             for note in (view.missing(), _stopped(store.stop) if store.stop else "", stands_on):
                 report = _noted(report, note)
             return report
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
-        raise InputError([Fault(str(stem.parent), found, "name an existing folder with --out")]) from error
+        raise InputError([Fault(str(stem.parent), found, "give another folder with --out")]) from error
 
 
 def _noted(report: Report, note: str) -> Report:
     return report._replace(notes=f"{report.notes}\n{note}") if note else report
 
 
-def _exceedance(view: View, stem: Path) -> Report:
+def _exceedance(view: View, stem: Path, width: int | None) -> Report:
     from tolstat.display import style
-    from tolstat.display.table import as_text
+    from tolstat.questions.capability import query as capability
+    from tolstat.questions.capability import rendering as capabilities
     from tolstat.questions.exceedance import query, rendering
 
-    files, table = [], "no largest load is kept; the results that are: tolstat export"
+    files, shown, more = [], "no largest load is kept; the results that are: tolstat export", ""
     if view.bushing_loads:
         files = style.save(rendering.figure(view), stem.with_name(f"{stem.name}_exceedance"))
     if view.shown_loads:
         files.append(text.csv(query.curves(view), stem, "exceedance"))
         quantiles = query.quantiles(view)
         files.append(text.csv(quantiles, stem, "quantiles"))
-        table = as_text(rendering.quantile_columns(), rendering.by_load(quantiles))
+        shown, more = _fitted(rendering.quantile_columns(), rendering.by_load(quantiles), width)
     if view.limits:
         limits = query.limits(view)
         files.append(text.csv(limits, stem, "limits"))
-        table = as_text(rendering.LIMITS, limits)
-    return Report(table, f"{view.head()}\n{rendering.note(view)}{_accuracy(view)}", files)
+        shown, more = _fitted(rendering.LIMITS, limits, width)
+        if not view.weighted and limits["estimate"].notna().any():
+            shown += f"\n\n{capabilities.together(capability.limits(view))}"
+    notes = [more, view.head(), rendering.note(view), _accuracy(view)]
+    return Report(shown, "\n".join(note for note in notes if note), files)
 
 
-def _sweep(view: View, stem: Path) -> Report:
+def _sweep(view: View, stem: Path, width: int | None) -> Report:
     from tolstat.display import style
     from tolstat.questions.exceedance import sweep
 
     files = style.save(sweep.figure(view), stem.with_name(f"{stem.name}_sweep")) if view.bushing_loads else []
     files.append(text.csv(sweep.table(view), stem, "sweep"))
-    return Report(text.plain(sweep.worst(view)), f"{view.head()}{_accuracy(view)}", files)
+    short = sweep.worst(view)
+    shown, more = _fitted(
+        table.plain(short, [str(name) for name in short.columns if "." in str(name)][1:]), short, width
+    )
+    return Report(shown, "\n".join(note for note in (more, view.head(), _accuracy(view)) if note), files)
 
 
 def _accuracy(view: View) -> str:
     from tolstat.questions.accuracy import rendering
 
-    return f"\n{rendering.note(view.verification)}" if view.verification else ""
+    return rendering.note(view.verification) if view.verification else ""
 
 
-def _cases(store: Reader, stem: Path) -> Report:
+def _cases(store: Reader, stem: Path, width: int | None) -> Report:
     from tolstat.report import cases
 
     full = cases.table(store)
     files = [text.csv(full, stem, "cases")]
-    counts = store.counts()
-    notes = "\n".join([f"{counts.done} of {counts.total} joints, {counts.shortfall}", *cases.advice(full)])
+    counts, worst = store.counts(), cases.worst(full)
+    shown, more = _fitted(table.plain(worst, ["revolutions", "motion", "status"]), worst, width)
+    notes = "\n".join(
+        [*([more] if more else []), f"{counts.done} of {counts.total} joints, {counts.shortfall}", *cases.advice(full)]
+    )
     if full["note"].any():
         files.append(_text(cases.markdown(full), stem, "cases.md"))
-    return Report(text.plain(cases.worst(full)), notes, files)
+    return Report(shown, notes, files)
+
+
+def _fitted(columns: Sequence[table.Column], frame: pd.DataFrame, width: int | None) -> tuple[str, str]:
+    """Text of a table, and the sentence on its columns that are left out."""
+    return table.as_text(columns, frame, width), table.left_out(columns, frame, width)
 
 
 def _text(content: str, stem: Path, ending: str) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
-from tolstat.display.asked import Asked
+from tolstat.display.asked import Asked, silent
 from tolstat.display.blocks import Facts, Listing, Page, Section
 from tolstat.report import html, verdict
 from tolstat.solver import fidelity
@@ -27,7 +27,13 @@ REPLAYED = 1000
 """Default number of joints whose load histories are evaluated: some 2 s if they are simulated again."""
 
 
-def write_page(path: str | Path, out: str | Path, accepted: float = np.nan, replay: int = REPLAYED) -> Path:
+def write_page(
+    path: str | Path,
+    out: str | Path,
+    accepted: float = np.nan,
+    replay: int = REPLAYED,
+    stage: Callable[[str], None] = silent,
+) -> Path:
     """Write the report of a result file as one page; the campaign may be unfinished.
 
     Parameters
@@ -41,6 +47,8 @@ def write_page(path: str | Path, out: str | Path, accepted: float = np.nan, repl
     replay : int
         Number of joints whose load histories are evaluated; without stored histories they are simulated again. With 0
         the page shows no histories.
+    stage : callable
+        Called with the name of each part of the page when its computation begins.
 
     Returns
     -------
@@ -61,9 +69,9 @@ def write_page(path: str | Path, out: str | Path, accepted: float = np.nan, repl
         if store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
             raise StoreError(str(Fault(str(path), "lists its joints one by one", remedy)))
-        html.write(
-            compose(store.view(), Asked(store.path, accepted, replay)), Path(out)
-        )  # pictures are drawn from the view
+        made = compose(store.view(), Asked(store.path, accepted, replay, stage=stage))
+        stage("page: pictures")  # drawn from the view
+        html.write(made, Path(out))
     return Path(out)
 
 

@@ -84,7 +84,7 @@ def assemble(
             else:
                 _histories_inside(file, n, sources)
     except FileExistsError as error:
-        raise store_error(path, "exists already", "delete it, or give another file: --out OTHER.h5") from error
+        raise store_error(path, "exists already", "give another file: --out OTHER.h5") from error
     except OSError as error:
         reason = error.strerror or str(error)
         raise store_error(
@@ -160,13 +160,11 @@ def check_free(path: Path) -> None:
     Raises
     ------
     StoreError
-        When the file or a folder of its histories exists, or its parent folder does not exist.
+        When the file or a folder of its histories exists.
     """
     if path.exists():
-        raise store_error(path, "exists already", "delete it, or give another file: --out OTHER.h5")
+        raise store_error(path, "exists already", "give another file: --out OTHER.h5")
     if parts_folder(path).exists():
         raise store_error(
-            parts_folder(path), "holds histories of another campaign", "delete it, or give another file: --out OTHER.h5"
+            parts_folder(path), "holds histories of another campaign", "give another file: --out OTHER.h5"
         )
-    if not path.parent.is_dir():
-        raise store_error(path, "cannot be written: no such folder", f"create the folder: mkdir -p {path.parent}")

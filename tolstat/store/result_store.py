@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
-from tolstat.common.files import atomic_write, check_disk_space
+from tolstat.common.files import atomic_write, check_disk_space, make_parent
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store.histories import HISTORY_BYTES
 from tolstat.store.integrity import history_checks, results_hash
@@ -81,13 +81,10 @@ class ResultStore(Reader):
         specs = {name: HistorySpec(*spec) for name, spec in (histories or {}).items()}
         parts = parts_folder(path)
         if parts.exists():
-            raise store_error(
-                parts, "holds histories of another campaign", "delete it, or give another file: --out OTHER.h5"
-            )
-        if not path.parent.is_dir():
-            raise store_error(path, "cannot be written: no such folder", f"create the folder: mkdir -p {path.parent}")
+            raise store_error(parts, "holds histories of another campaign", "give another file: --out OTHER.h5")
         held = range(study.rows) if rows is None else rows
         try:
+            make_parent(path)
             check_disk_space(path, size_of_new(len(held), selected_results.columns(study.identity())))
             with atomic_write(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
                 blocks = [errors] if isinstance(errors, np.ndarray) else errors
@@ -96,7 +93,7 @@ class ResultStore(Reader):
                 fill(file, attrs, held, blocks, design, origin)
         except FileExistsError as error:
             raise store_error(
-                path, "exists already", "resume or delete it, or give another file: --out OTHER.h5"
+                path, "exists already", "resume it with its own study, or give another file: --out OTHER.h5"
             ) from error
         except OSError as error:
             reason = error.strerror or str(error)

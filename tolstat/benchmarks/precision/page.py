@@ -18,7 +18,7 @@ from tolstat.benchmarks.points import build, cost, leaders
 from tolstat.benchmarks.precision.setup import Setup
 from tolstat.benchmarks.runs import Run
 from tolstat.common.files import atomic_write
-from tolstat.display import style, text
+from tolstat.display import style, table
 from tolstat.report import Report
 from tolstat.study import Study
 
@@ -71,7 +71,8 @@ def write(runs: Sequence[Run], setup: Setup, base: Study, stem: Path) -> Report:
         points.to_csv(temporary, index=False, float_format="%.4g", encoding="utf-8", lineterminator="\n")
     with atomic_write(markdown) as temporary:
         temporary.write_text(page(points, truth, subtitle, f"{stem.name}.png"), encoding="utf-8")
-    return Report(text.plain(_ahead(points, truth, "loads")), subtitle, [*files, csv, markdown])
+    ahead = _ahead(points, truth, "loads")
+    return Report(table.as_text(table.plain(ahead), ahead), subtitle, [*files, csv, markdown])
 
 
 def short(runs: Sequence[Run]) -> str:

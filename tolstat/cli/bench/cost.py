@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import announce_compilation, as_text, say
+from tolstat.cli._app import announce_compilation, as_text
+from tolstat.cli._talk import say
 
 
 def cost(

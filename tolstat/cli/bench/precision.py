@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import announce_compilation, make_folder, say, tell
+from tolstat.cli._app import announce_compilation, make_folder, tell
+from tolstat.cli._talk import say
 
 MARK = "precision"
 

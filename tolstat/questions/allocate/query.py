@@ -23,7 +23,7 @@ from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
 
-EXAMPLE = 'write --limit "P(cross1.F > 700 N) < 0.001"'
+EXAMPLE = 'write --target "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3
 """Significant digits of the tolerances proposed."""
 SEARCH_CONFIDENCE = 0.999
@@ -201,11 +201,11 @@ def _read_request(view: View, limits: Sequence[str], cost_file: Path | None, kee
     statements: list[Statement] = []
     for text in limits:
         with gather(faults):
-            statements.append(rule.parse(text, "", "--limit", EXAMPLE))
+            statements.append(rule.parse(text, "", "--target", EXAMPLE))
             lacking = [name for name in statements[-1].loads if not selected_results.holds(view.columns, name)]
             if lacking:
                 kept = f"give one of: {', '.join(view.kept_loads)}"
-                faults.append(Fault("--limit", f"the file does not keep {', '.join(lacking)}", kept))
+                faults.append(Fault("--target", f"the file does not keep {', '.join(lacking)}", kept))
     kept_names: set[str] = set()
     for pattern in keep:
         names = selection.select(pattern, study.tolerances)

@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.display import style
-from tolstat.display.text import UNITS, align
+from tolstat.display.table import Column
+from tolstat.display.text import UNITS
 
 if TYPE_CHECKING:
     from tolstat.questions.causes.angles import AgainstAngle
@@ -25,16 +27,25 @@ ORIGIN = {
 }
 
 
-def text(found: AgainstAngle, shown: int = 12) -> str:
-    """Table of the `shown` errors with the largest share over the revolution, and the angle of its maximum."""
-    rows = [["error", "revolution, %", "95 % interval", "largest, %", "at, deg"]]
+COLUMNS = (
+    Column("error", lambda row: str(row["error"])),
+    Column("revolution, %", lambda row: f"{row['share']:.1f}"),
+    Column("95 % interval", lambda row: "-" if np.isnan(row["lower"]) else f"{row['lower']:.1f} .. {row['upper']:.1f}"),
+    Column("largest, %", lambda row: f"{row['largest']:.1f}"),
+    Column("at, deg", lambda row: f"{row['angle']:.0f}"),
+)
+"""Columns of the table `rows`."""
+
+
+def rows(found: AgainstAngle, shown: int = 12) -> pd.DataFrame:
+    """Shares, per cent, of the `shown` errors with the largest over the revolution, and the angle of its maximum."""
+    own = []
     for i, name in enumerate(found.names[:shown]):
         share, low, high = (100.0 * part[i] for part in found.overall[:3])
         k = int(np.argmax(found.first.estimate[i]))
-        ends = "-" if np.isnan(low) else f"{low:.1f} .. {high:.1f}"
-        largest = f"{100.0 * found.first.estimate[i, k]:.1f}"
-        rows.append([name, f"{share:.1f}", ends, largest, f"{np.degrees(found.angles[k]):.0f}"])
-    return align(rows)
+        head = {"error": name, "share": share, "lower": low, "upper": high}
+        own.append({**head, "largest": 100.0 * found.first.estimate[i, k], "angle": np.degrees(found.angles[k])})
+    return pd.DataFrame(own)
 
 
 def note(found: AgainstAngle, log: bool = False) -> str:

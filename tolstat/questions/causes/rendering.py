@@ -7,12 +7,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from tolstat.display.table import Column, Row, as_text
-from tolstat.display.text import UNITS, align, records
+import pandas as pd
+
+from tolstat.display.table import Column, Row
+from tolstat.display.text import UNITS, records
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tolstat.questions.causes.query import Causes
     from tolstat.questions.causes.tail import Tail
 
@@ -20,11 +20,6 @@ SIGNIFICANT = 0.05
 """p-value below which a table marks an error of the tail."""
 ERRORS = 5
 """Number of errors of a joint that the table of the worst joints shows."""
-
-
-def text(causes: Causes, shown: int = 12) -> str:
-    """Table of the causes as aligned text; see `columns` and `largest`."""
-    return as_text(columns(causes), largest(causes, shown))
 
 
 def largest(causes: Causes, shown: int) -> pd.DataFrame:
@@ -44,14 +39,14 @@ def columns(causes: Causes) -> list[Column]:
     if causes.from_design:
         total = Column("in all, %", partial(_interval, name="total", factor=100), shown=_has("total"))
     else:  # given data yield bounds only
-        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=_has("total_lower"))
+        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=_has("total_lower"), rank=3)
     return [
         Column("error", lambda row: str(row["error"])),
         Column("alone, %", partial(_interval, name="first", factor=100), shown=_has("first")),
         total,
         Column("rank coefficient", partial(_interval, name="srrc"), shown=_has("srrc")),
-        Column("tail: larger", partial(_tail, name="direction"), shown=_has("direction")),
-        Column("tail: farther out", partial(_tail, name="size"), shown=_has("size")),
+        Column("tail: larger", partial(_tail, name="direction"), shown=_has("direction"), rank=2),
+        Column("tail: farther out", partial(_tail, name="size"), shown=_has("size"), rank=1),
     ]
 
 
@@ -90,14 +85,34 @@ def values(causes: Causes) -> dict[str, Any]:
     return found | {"r2": None if causes.from_design else causes.r2}
 
 
-def worst_text(tail: Tail) -> str:
-    """Table of the worst joints, with the `ERRORS` largest errors of each."""
+def worst_columns(tail: Tail) -> list[Column]:
+    """Columns of `worst_rows`: the largest errors of each joint, each in a column of its own."""
     unit = f" [{tail.unit}]" if tail.unit != "1" else ""
-    lines = [["row", f"{tail.by}{unit}", "status", "errors in sigma, the largest first"]]
-    for joint in tail.joints:
-        errors = [f"{name} {z:+.2f}" for name, z in list(joint.scores.items())[:ERRORS]]
-        lines.append([str(joint.row), f"{joint.value:.6g}", joint.status.label, "  ".join(errors) or "-"])
-    return align(lines, text_last=True)
+
+    def error(place: int) -> Column:
+        head = ("largest error in σ", "second", "third", "fourth", "fifth")[place]
+        return Column(head, lambda row: row["errors"][place] if place < len(row["errors"]) else "-", True, rank=place)
+
+    return [
+        Column("row", lambda row: str(row["row"])),
+        Column(f"{tail.by}{unit}", lambda row: f"{row['value']:.6g}"),
+        Column("status", lambda row: str(row["status"]), words=True),
+        *(error(place) for place in range(ERRORS)),
+    ]
+
+
+def worst_rows(tail: Tail) -> pd.DataFrame:
+    """One row per joint: ``row``, ``value``, ``status``, and its `ERRORS` largest errors in words, a list."""
+    return pd.DataFrame(
+        {
+            "row": [joint.row for joint in tail.joints],
+            "value": [joint.value for joint in tail.joints],
+            "status": [joint.status.label for joint in tail.joints],
+            "errors": [
+                [f"{name} {z:+.2f}" for name, z in list(joint.scores.items())[:ERRORS]] for joint in tail.joints
+            ],
+        }
+    )
 
 
 def worst_values(tail: Tail) -> dict[str, Any]:

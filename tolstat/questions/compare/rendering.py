@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import difference, exceedance
 from tolstat.display import style
-from tolstat.display.table import Column, Row, as_text
-from tolstat.display.text import UNITS, csv, percent
+from tolstat.display.table import Column, Row
+from tolstat.display.text import UNITS, csv, limit, percent
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tolstat.questions.compare.query import Change, Comparison, Sides
 
 LEVELS = 200
@@ -29,12 +31,10 @@ MAX_LOADS = 4
 """Maximum number of loads in the picture."""
 
 
-def text(found: Comparison, loads: bool = False) -> str:
+def tables(found: Comparison, loads: bool = False) -> list[tuple[Sequence[Column], pd.DataFrame]]:
     """Tables of the differences: shares above limits; quantiles and means with `loads` or without limits."""
-    tables = [as_text(_share_columns(found.sides.paired), found.shares)] if len(found.shares) else []
-    if loads or not tables:
-        tables.append(as_text(LOADS, found.loads))
-    return "\n\n".join(tables)
+    shares = [(_share_columns(found.sides.paired), found.shares)] if len(found.shares) else []
+    return [*shares, (LOADS, found.loads)] if loads or not shares else [*shares]
 
 
 def note(found: Comparison, a: str, b: str) -> str:
@@ -164,20 +164,17 @@ def _levels(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float6
 def _share_columns(paired: bool) -> tuple[Column, ...]:
     """Columns of the table `Comparison.shares`; joints above on one side only are counted for pairs."""
 
-    def limit(row: Row) -> str:
-        return f"{row['load']} > {row['level']:g} {UNITS.get(row['unit'], row['unit'])}".rstrip()
-
     def only(side: str) -> Callable[[Row], str]:
         return lambda row: str(row[f"only_{side}"]) if paired else "-"
 
     return (
-        Column("P(load > limit)", limit),
+        Column("load > limit", limit),
         Column("A", lambda row: percent(row["a"])),
         Column("B", lambda row: percent(row["b"])),
         Column("B - A", lambda row: f"{100 * row['estimate']:+.3g} %"),
         Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
-        Column("only A", only("a")),
-        Column("only B", only("b")),
+        Column("only A", only("a"), rank=1),
+        Column("only B", only("b"), rank=1),
         Column("p", lambda row: "-" if math.isnan(row["p"]) else f"{row['p']:.2g}"),
     )
 

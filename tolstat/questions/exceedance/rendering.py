@@ -42,12 +42,12 @@ def _outer(row: Row) -> str:
 LIMITS = (
     Column("load", lambda row: str(row["load"])),
     Column("limit", lambda row: text.value(row["level"], row["unit"])),
-    Column("nominal", lambda row: text.value(row["nominal"], row["unit"])),
+    Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=1),
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("share", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
-    Column("with unresolved joints", _outer, shown=_has_unresolved),
-    Column("total interval", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=_has_error),
+    Column("with unresolved joints", _outer, shown=_has_unresolved, rank=2),
+    Column("total interval", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=_has_error, rank=3),
 )
 """Columns of the table `query.limits`. Joints above are counted among the valid ones, as the share is; the last two
 columns count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""
@@ -58,7 +58,7 @@ def _numerical(row: Row) -> str:
 
 
 BUDGET = (
-    Column("limit", lambda row: f"{row['load']} > {text.value(row['level'], row['unit'])}"),
+    Column("limit", text.limit),
     Column("share", lambda row: text.percent(row["estimate"])),
     Column("sampling, ±", lambda row: text.percent(0.5 * (row["upper"] - row["lower"]))),
     Column("numerical error, up to", _numerical),
@@ -80,7 +80,8 @@ def quantile_columns(tolerance: dict[str, float] | None = None) -> tuple[Column,
             ends = f" ({text.number(lower)} .. {text.number(upper)})" if tolerance and not math.isnan(lower) else ""
             return text.value(own, row["unit"]) + ends
 
-        return Column(f"{100 * share:g} %" + (" stay below" if tolerance else ""), cell)
+        rank = {SHARES[-1]: 0, SHARES[0]: 0}.get(share, 3)
+        return Column(f"{100 * share:g} %" + (" stay below" if tolerance else ""), cell, rank=rank)
 
     def interval(row: Row) -> str:
         _, lower, upper = row[SHARES[-1]]
@@ -88,7 +89,7 @@ def quantile_columns(tolerance: dict[str, float] | None = None) -> tuple[Column,
 
     head = (
         Column("load", lambda row: str(row["load"])),
-        Column("nominal", lambda r: text.value(r["nominal"], r["unit"])),
+        Column("nominal", lambda r: text.value(r["nominal"], r["unit"]), rank=1),
     )
     last = Column(f"95 % interval of {100 * SHARES[-1]:g} %", interval) if tolerance is None else None
     last = last or Column("tolerance limit 99 % / 95 %", limit)

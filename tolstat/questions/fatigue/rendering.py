@@ -25,7 +25,11 @@ MAX_LACKING = 1e-3
 
 
 def _quantile(share: float) -> Column:
-    return Column(f"{100 * share:g} % stay below", lambda row: text.value(row[share][0], row["unit"]))
+    return Column(
+        f"{100 * share:g} % below",
+        lambda row: text.value(row[share][0], row["unit"]),
+        rank=0 if share == SHARES[-1] else 1,
+    )
 
 
 def _interval(row: Row) -> str:
@@ -43,16 +47,16 @@ def _damage(x: float) -> str:
 
 LOADS = (
     Column("channel and exponent", lambda row: f"{row['channel']}, m = {row['m']:g}"),
-    Column("nominal", lambda row: text.value(row["nominal"], row["unit"])),
+    Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=2),
     *(_quantile(share) for share in SHARES),
     Column(f"95 % interval of {100 * SHARES[-1]:g} %", _interval),
 )
 """Columns of the table `by_channel`."""
 DAMAGES = (
     Column("channel", lambda row: str(row["channel"])),
-    Column("S–N line", _line, words=True),
-    Column("nominal damage", lambda row: _damage(row["nominal"])),
-    Column("median", lambda row: _damage(row["median"])),
+    Column("S–N line", _line, words=True, rank=3),
+    Column("nominal damage", lambda row: _damage(row["nominal"]), rank=2),
+    Column("median", lambda row: _damage(row["median"]), rank=1),
     Column("joints above 1", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("share", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),

@@ -242,7 +242,7 @@ def _read(plans: tuple[_Plan, _Plan], names: Sequence[str], costs: tuple[float, 
             found.append({load.name: load for load in view.loads(names)})
     high, low = found
     if len(high[names[0]].values) > len(low[names[0]].values):
-        fault = Fault(str(plans[1].path), f"has fewer joints than {plans[0].path}", "delete both files and run again")
+        fault = Fault(str(plans[1].path), f"has fewer joints than {plans[0].path}", "give another folder: --out OTHER")
         raise StoreError(str(fault))
     return _Loads(high, low, costs)
 

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from tolstat.display import style
 from tolstat.display.table import Column, Row
-from tolstat.display.text import UNITS, csv
+from tolstat.display.text import UNITS, csv, limit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,12 +40,12 @@ def _share(name: str) -> Callable[[Row], str]:
 
 
 LEVELS = (
-    Column("load > level", lambda row: f"{row['load']} > {row['level']:g} {UNITS.get(row['unit'], row['unit'])}"),
-    Column("joints above it at any time", _share("joints_above")),
-    Column("time above it: mean", _share("time")),
-    Column("median", _share("time_50")),
-    Column("90 % below", _share("time_90")),
-    Column("99 % below", _share("time_99")),
+    Column("load > level", limit),
+    Column("joints above", _share("joints_above")),
+    Column("mean time above", _share("time")),
+    Column("median", _share("time_50"), rank=3),
+    Column("90 % below", _share("time_90"), rank=2),
+    Column("99 % below", _share("time_99"), rank=1),
 )
 """Columns of the table `TimeAbove.table`; shares in per cent."""
 

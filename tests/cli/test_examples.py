@@ -1,0 +1,101 @@
+"""The example on each help page runs, and no line of a table is longer than 80 characters."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import tolstat
+from tests.support import synthetic
+from tests.support.environment import ROOT
+from tolstat import cli
+from tolstat.cli import bench
+
+COMMANDS = [name.replace("_", "-") for names in cli.COMMANDS.values() for name in names]
+STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
+CHEAP = 'histories = "harmonics+cycles"\n\n[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 36\n\n[sampling]'
+UNIFORM = 'upper = "0.030 mm", distribution = "uniform"'
+
+
+def call(*args: object) -> Result:
+    """Run a command in this process."""
+    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
+
+
+def example(command: str) -> list[str]:
+    """Words of the example on the help page of a command."""
+    (line,) = re.findall(r"^  Example: tolstat (.*)$", call(*command.split(), "--help").stdout, flags=re.MULTILINE)
+    return shlex.split(line)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the files that the examples name, of few joints at a cheap fidelity."""
+    folder = tmp_path_factory.mktemp("examples")
+    text = STUDY.replace("n = 1024", "n = 600").replace("[sampling]", f"[output]\n{CHEAP}")
+    (folder / "studies").mkdir()
+    shutil.copy(ROOT / "studies" / "precision.toml", folder / "studies")
+    study = folder / "studies" / "iso2768_f.toml"
+    study.write_text(text, encoding="utf-8")
+    narrow = folder / "narrow.toml"
+    narrow.write_text(text.replace('upper = "0.030 mm", distribution = "normal", cpk = 1.0', UNIFORM), encoding="utf-8")
+    (folder / "case.toml").write_text(synthetic.HEAD, encoding="utf-8")
+    tolstat.run(tolstat.load(study), folder / "iso2768_f.h5", workers=1)
+    tolstat.run(tolstat.load(narrow), folder / "narrow.h5", workers=1)
+    for part, rows in (("part1", range(300)), ("part2", range(300, 601))):
+        tolstat.run(tolstat.load(study), folder / f"{part}.h5", workers=1, rows=rows)
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
+def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(made, tmp_path / "work")
+    monkeypatch.chdir(tmp_path / "work")
+    done = call(*example(command))
+    assert done.exit_code == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    if command not in bench.INSTRUMENTS:
+        table = done.stdout.partition("[tolerances]")[0]
+        assert [line for line in table.splitlines() if len(line) > 80] == []
+
+
+TABLES = {
+    "status": (),
+    "report": (),
+    "capability": ("--one-in", 100),
+    "worst": (),
+    "causes": (),
+    "reweight": ("--set", "pin*.offset_t.cpk=1.2"),
+    "allocate": ("--target", "P(cross1.F > 700 N) < 0.25"),
+    "compare": ("other.h5", "--by", "cross1.F"),
+}
+
+
+@pytest.mark.parametrize("command", TABLES)
+def test_tables_fit_80_columns_and_wide_ones_have_all(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = STUDY.replace("n = 1024", "n = 1300")
+    for name, failed in (("small", 12), ("other", 3)):
+        synthetic.store(tmp_path, text, name, failed=failed, unsettled=9)
+    args = (command, "small.h5", *TABLES[command])
+    done, wide = call(*args), call(*args, "--wide")
+    assert (done.exit_code, wide.exit_code) == (0, 0), done.stderr + wide.stderr
+    lines = done.stdout.partition("[tolerances]")[0].splitlines()
+    if command == "status":
+        lines = lines[lines.index("") :]
+    assert len(lines) > 1
+    assert [line for line in lines if len(line) > 80] == []
+    named = re.findall(r"^with --wide also: (.*)$", done.stderr, flags=re.MULTILINE)
+    heads = [head for line in named for head in line.split(", ")]
+    assert all(head in wide.stdout for head in heads)
+    assert "--wide" not in wide.stderr
+    if heads:
+        assert max(map(len, wide.stdout.splitlines())) > 80

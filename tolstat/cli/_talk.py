@@ -1,0 +1,108 @@
+"""What commands say on standard error and in a log file: messages, warnings, errors, details."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tolstat import __version__
+from tolstat.common.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from tolstat.campaign.progress import Display
+
+LOG = logging.getLogger("tolstat.cli")
+LOG.propagate = False
+
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print warnings and errors only on standard error.")]
+Verbose = Annotated[bool, typer.Option("--verbose", help="Print each stage and its time on standard error.")]
+LogFile = Annotated[
+    Path | None,
+    typer.Option("--log", metavar="FILE", help="Append messages with times to FILE, created if missing."),
+]
+
+
+class _Stderr(logging.Handler):
+    """Prints messages on the standard error of the moment: above the bar while one is shown."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(record.getMessage(), file=sys.stderr, flush=True)
+
+
+def say(text: str) -> None:
+    """Tell a message."""
+    LOG.info("%s", text)
+
+
+def warn(text: str) -> None:
+    """Tell a warning, also with --quiet."""
+    LOG.warning("%s", text)
+
+
+def fail(text: str) -> None:
+    """Tell why the command ends early, also with --quiet."""
+    LOG.error("%s", text)
+
+
+@contextmanager
+def session(quiet: bool, verbose: bool, log: Path | None) -> Iterator[None]:
+    """Tell messages as the options of one command ask.
+
+    Raises
+    ------
+    InputError
+        When the log cannot be written, or is to be quiet and verbose.
+    """
+    own = _Stderr()
+    LOG.handlers = [own]
+    LOG.setLevel(logging.DEBUG)
+    own.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
+    try:
+        if quiet and verbose:
+            raise InputError([Fault("--quiet", "cannot be combined with --verbose", "remove one of them")])
+        if log is not None:
+            LOG.addHandler(_log_file(log))
+        LOG.debug("tolstat %s: %s", __version__, " ".join(sys.argv[1:]))
+        yield
+    finally:
+        for handler in LOG.handlers[1:]:
+            handler.close()
+        LOG.handlers = [own]
+
+
+def _log_file(path: Path) -> logging.Handler:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handler = logging.FileHandler(path, encoding="utf-8")
+    except OSError as error:
+        found = f"cannot be written: {error.strerror or error}"
+        raise InputError(
+            [Fault(f"--log {path}", found, "give the path of a file, for example: --log run.log")]
+        ) from error
+    form = logging.Formatter("%(asctime)s %(levelname)s %(message)s", "%Y-%m-%dT%H:%M:%SZ")
+    form.converter = time.gmtime
+    handler.setFormatter(form)
+    return handler
+
+
+@contextmanager
+def progress(first: str = "") -> Iterator[Display]:
+    """Show progress on standard error, with the stage `first` to begin with; see `campaign.progress.Display`."""
+    from tolstat.campaign.progress import display
+
+    quiet = bool(LOG.handlers) and LOG.handlers[0].level > logging.INFO
+    with display(say, _detail, quiet) as shown:
+        if first:
+            shown.stage(first)
+        yield shown
+
+
+def _detail(text: str) -> None:
+    LOG.debug("%s", text)

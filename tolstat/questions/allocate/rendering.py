@@ -1,0 +1,34 @@
+"""Proposed tolerances and the shares that they are expected to give, as columns of tables."""
+
+from __future__ import annotations
+
+import math
+
+from tolstat.common.units import DISPLAY_UNITS
+from tolstat.display import text
+from tolstat.display.table import Column, Row
+
+
+def _width(row: Row, key: str) -> str:
+    unit, factor = DISPLAY_UNITS.get(row["unit"], (row["unit"], 1.0))
+    return f"{factor * row[key]:.4g} {unit}".rstrip()
+
+
+TOLERANCES = (
+    Column("tolerance", lambda row: str(row["tolerance"])),
+    Column("errors", lambda row: str(row["errors"]), rank=1),
+    Column("± before", lambda row: _width(row, "before")),
+    Column("± proposed", lambda row: _width(row, "proposed")),
+    Column("factor", lambda row: f"{row['factor']:.3g}"),
+    Column("cost before", lambda row: f"{row['cost_before']:.4g}"),
+    Column("cost", lambda row: f"{row['cost']:.4g}"),
+)
+"""Columns of the table `Allocation.tolerances`."""
+LIMITS = (
+    Column("target", lambda row: str(row["limit"])),
+    Column("before", lambda row: text.percent(row["before"])),
+    Column("proposed", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("counts as joints", lambda row: "-" if math.isnan(row["ess"]) else f"{row['ess']:.0f}", rank=1),
+)
+"""Columns of the table `Allocation.limits`."""

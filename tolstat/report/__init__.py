@@ -160,7 +160,7 @@ def _cases(store: Reader, stem: Path, width: int | None) -> Report:
     full = cases.table(store)
     files = [text.csv(full, stem, "cases")]
     counts, worst = store.counts(), cases.worst(full)
-    shown, more = _fitted(table.plain(worst, ["revolutions", "motion", "status"]), worst, width)
+    shown, more = _fitted(table.plain(worst, ["status", "alpha [deg]", "motion"]), worst, width)
     notes = "\n".join(
         [*([more] if more else []), f"{counts.done} of {counts.total} joints, {counts.shortfall}", *cases.advice(full)]
     )

@@ -25,22 +25,24 @@ first = folder / "example.h5"
 tolstat.run(study, first, workers=1)
 
 # %% [markdown]
-# Row i is joint i: its errors, then its results. Row 0 is the joint without errors.
+# Row i is joint i: its errors, then its results. Loads have names; the joint without errors stands apart.
 
 # %%
 with tolstat.open(first) as store:
     frame = store.to_pandas()
+    force, nominal = store.loads["cross1.F"], store.nominal["cross1.F"]
 print(frame[["pin1.offset_t", "hole1.tilt_z", "cross1.F_max", "status"]].head())
+print(
+    f"cross1.F [{force.attrs['units']}]: {nominal:.0f} without errors, {force.min():.0f} to {force.max():.0f} with them"
+)
 
 # %% [markdown]
 # How many joints exceed 1500 N, and which load do 99 % of them stay below?
 
 # %%
 with tolstat.open(first) as store:
-    joints = store.results()[1:]
-force, status = joints["F_max"][:, 0], joints["status"]
-above = tolstat.exceedance(force, status, level=1500.0)
-low = tolstat.quantile(force, status, share=0.99)
+    load = store.view().load("cross1.F")
+above, low = load.above(1500.0), load.quantile(0.99)
 print(f"P(cross1.F > 1500 N) = {above.estimate:.1%}, 95 % interval {above.lower:.1%} to {above.upper:.1%}")
 print(f"99 % of the joints stay below {low.estimate:.0f} N, 95 % interval {low.lower:.0f} to {low.upper:.0f} N")
 

@@ -1,7 +1,8 @@
-"""The tables of docs/result_format.md and docs/model.md, and the page of the present schema in docs/schemas/.
+"""The tables of docs/result_format.md, docs/model.md and docs/study.md, and the page of the present schema.
 
-They are made from `tolstat.common.tables` and `tolstat.joint.contact`. ``python -m tests.format_tables`` brings the
-documents up to date; a test compares.
+They are made from `tolstat.common.tables`, `tolstat.joint.contact` the layout in `tolstat.store`
+and the input models (`study_reference`).
+``python -m tests.format_tables`` brings the documents up to date; a test compares.
 """
 
 from __future__ import annotations
@@ -9,12 +10,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from tests import study_reference
 from tolstat.common import draw_records, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
 from tolstat.joint.contact import LAWS
+from tolstat.store import axes
+from tolstat.store.new_file import SESSION
 
 DOCS = Path(__file__).parent.parent / "docs"
-FORMAT, MODEL = DOCS / "result_format.md", DOCS / "model.md"
+FORMAT, MODEL, STUDY = DOCS / "result_format.md", DOCS / "model.md", DOCS / "study.md"
 SCHEMA = DOCS / "schemas" / f"schema{tables.SCHEMA_VERSION}.md"
 PAGE = """# Columns of a result file of schema {version}
 
@@ -37,6 +41,25 @@ def field_table(columns: tuple[Column, ...]) -> str:
         group = [c for c in columns if c.field == name]
         datasets = ", ".join(f"`{c.name}`" for c in group)
         lines.append(f"| {datasets} | {group[0].unit} | {group[0].dtype} | {group[0].description} |")
+    return "\n".join(lines)
+
+
+def session_table() -> str:
+    """Markdown table of the group of the run under way."""
+    lines = ["| dataset | unit | type | meaning |", "|---|---|---|---|"]
+    return "\n".join(lines + [f"| `{n}` | {unit} | {dtype} | {text} |" for n, (dtype, unit, text) in SESSION.items()])
+
+
+def axis_table() -> str:
+    """Markdown table of the axes of histories."""
+    lines = ["| axis | values | unit | meaning |", "|---|---|---|---|"]
+    for name, (values, text) in axes.NAMES.items():
+        held = [f"`{value}`" for value in values]
+        told = held if len(held) <= 8 else [*held[:2], "...", held[-1]]
+        lines.append(f"| `{name}` | {', '.join(told)} | 1 | {text} |")
+    for name, values in {"theta": "2 pi k / steps_per_rev", "harmonic": "0, 1, 2, ..."}.items():
+        _, unit, text = axes.scale_of(name, 4)
+        lines.append(f"| `{name}` | {values} | {unit} | {text} |")
     return "\n".join(lines)
 
 
@@ -75,11 +98,12 @@ def documents() -> dict[Path, str]:
     origin = {f"origin {method}": draw_records.columns({"method": method}) for method in draw_records.FIELDS}
     parts = {"design": DESIGN_COLUMNS, "ledger": LEDGER_COLUMNS} | origin
     content = {name: field_table(columns) for name, columns in parts.items()}
-    content |= {"status": status_table(), "motion": motion_table()}
+    content |= {"status": status_table(), "motion": motion_table(), "session": session_table(), "axes": axis_table()}
     page = {"errors": field_table(ERROR_COLUMNS), "results": field_table(RESULT_COLUMNS)}
     return {
         FORMAT: updated(FORMAT.read_text(encoding="utf-8"), content),
         MODEL: updated(MODEL.read_text(encoding="utf-8"), {"laws": law_table()}),
+        STUDY: updated(STUDY.read_text(encoding="utf-8"), study_reference.tables()),
         SCHEMA: PAGE.format(version=tables.SCHEMA_VERSION, **page),
     }
 

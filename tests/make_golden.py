@@ -12,7 +12,7 @@ import numpy as np
 
 from tests.support import fakes
 from tolstat.common.tables import SCHEMA_VERSION
-from tolstat.store import ResultStore, integrity
+from tolstat.store import Reader, ResultStore, integrity
 
 FOLDER = Path(__file__).parent / "golden"
 
@@ -30,8 +30,8 @@ def make(folder: Path) -> Path:
     with h5py.File(path, "r+") as file:
         file.attrs["git_commit"] = ""
         integrity.seal(file)
-    with ResultStore.open(path) as store:
-        store.to_pandas().to_csv(path.with_suffix(".csv"), lineterminator="\n")
+    with Reader.open(path) as store:
+        store.to_pandas(nominal=True).to_csv(path.with_suffix(".csv"), lineterminator="\n")
     return path
 
 

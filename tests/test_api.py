@@ -36,6 +36,18 @@ def test_names_are_documented_functions_and_no_modules():
         _ = tolstat.nothing
 
 
+def test_signatures_are_those_of_the_public_names():
+    assert set(dir(tolstat)) == {*tolstat.__all__, "__version__"}
+    for name in tolstat.__all__:
+        value = getattr(tolstat, name)
+        if inspect.isclass(value):
+            continue
+        assert value.__name__ == name
+        parameters = inspect.signature(value).parameters.values()
+        assert not [p for p in parameters if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD)], name
+        assert all(p.annotation is not p.empty for p in parameters), name
+
+
 @pytest.mark.parametrize("module", ON_ARRAYS)
 def test_examples_on_arrays(module):
     failed, attempted = doctest.testmod(importlib.import_module(f"tolstat.analysis.{module}"))

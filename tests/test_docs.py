@@ -99,17 +99,20 @@ def test_a_note_says_that_it_is_a_record(path: Path) -> None:
     assert path.read_text(encoding="utf-8").startswith("Record of ")
 
 
-def test_blocks_of_the_study_make_a_study(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("page", "added"), [("tolerances.md", "joint"), ("study.md", "sampling")])
+def test_blocks_of_the_study_make_a_study(tmp_path: Path, page: str, added: str) -> None:
+    """Each block of [tolerances] with all other blocks; correlation and [errors] go with the first one."""
     study = tmp_path / "study.toml"
-    joint = '[joint]\nbase = "cirelli2021"\n\n[operation]\nalpha = "15 deg"\nspeed = "500 rpm"\ntorque = "100 N*m"\n'
-    own = blocks(DOCS / "tolerances.md", "toml")
+    sections = {"joint": 'base = "cirelli2021"', "sampling": "n = 8"}
+    operation = '[operation]\nalpha = "15 deg"\nspeed = "500 rpm"\ntorque = "100 N*m"\n'
+    own = [operation, *blocks(DOCS / page, "toml"), f"[{added}]\n{sections[added]}"]
     tables = [block for block in own if block.startswith("[tolerances]")]
-    assert len(tables) >= 3
-    for table in tables:  # the first one with the correlation, the others instead of both
-        left_out = "[tolerances]" if table == tables[0] else ("[tolerances]", "[[correlation]]")
+    for table in tables:
+        left_out = "[tolerances]" if table == tables[0] else ("[tolerances]", "[[correlation]]", "[errors]")
         rest = [block for block in own if not block.startswith(left_out)]
-        study.write_text("\n".join([joint, table, *rest]), encoding="utf-8")
-        assert tolstat.load(study).limits["cross1.F"] == 1500.0
+        study.write_text("\n".join([table, *rest]), encoding="utf-8")
+        assert tolstat.load(study).sampling.n in (8, 1024)
+    assert len(tables) >= (3 if page == "tolerances.md" else 1)
 
 
 @pytest.fixture(scope="module")

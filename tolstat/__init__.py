@@ -3,6 +3,7 @@
     study = tolstat.load("studies/iso2768_f.toml")
     tolstat.run(study, "iso2768_f.h5")
     with tolstat.open("iso2768_f.h5") as store:
+        force = store.loads["cross1.F"]
         frame = store.to_pandas()
         found = tolstat.causes_of(store.view(), "cross1.F")
 
@@ -19,10 +20,10 @@ from typing import TYPE_CHECKING, Any
 from tolstat.questions import PUBLIC
 
 if TYPE_CHECKING:
-    from tolstat.analysis.capability import at as capability
-    from tolstat.analysis.exceedance import at as exceedance
-    from tolstat.analysis.quantile import at as quantile
-    from tolstat.analysis.weighted import at as weighted_exceedance
+    from tolstat.analysis.capability import capability as capability
+    from tolstat.analysis.exceedance import exceedance as exceedance
+    from tolstat.analysis.quantile import quantile as quantile
+    from tolstat.analysis.weighted import weighted_exceedance as weighted_exceedance
     from tolstat.campaign.run import run as run
     from tolstat.campaign.trace import simulate_case as simulate_case
     from tolstat.common.errors import InputError as InputError
@@ -31,17 +32,17 @@ if TYPE_CHECKING:
     from tolstat.common.tables import Status as Status
     from tolstat.joint import perturb as perturb
     from tolstat.questions import *
-    from tolstat.report import write as write_report
-    from tolstat.report.page import write as write_page
+    from tolstat.report import write_report as write_report
+    from tolstat.report.page import write_page as write_page
     from tolstat.report.summary import statistics as statistics
     from tolstat.sampling import draw as draw
     from tolstat.solver.integrate import integrate as integrate
     from tolstat.solver.simulation import simulate_rows as simulate_rows
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
     from tolstat.study import load as load
     from tolstat.study import load_case as load_case
 
-    open = ResultStore.open
+    open = Reader.open
 
 __version__ = "0.1.0"
 
@@ -50,22 +51,22 @@ _HOMES = {
     "Status": "tolstat.common.tables:Status",
     "StoreError": "tolstat.common.errors:StoreError",
     "TolstatError": "tolstat.common.errors:TolstatError",
-    "capability": "tolstat.analysis.capability:at",
+    "capability": "tolstat.analysis.capability:capability",
     "draw": "tolstat.sampling:draw",
-    "exceedance": "tolstat.analysis.exceedance:at",
+    "exceedance": "tolstat.analysis.exceedance:exceedance",
     "integrate": "tolstat.solver.integrate:integrate",
     "load": "tolstat.study:load",
     "load_case": "tolstat.study:load_case",
-    "open": "tolstat.store:ResultStore.open",
+    "open": "tolstat.store:Reader.open",
     "perturb": "tolstat.joint:perturb",
-    "quantile": "tolstat.analysis.quantile:at",
+    "quantile": "tolstat.analysis.quantile:quantile",
     "run": "tolstat.campaign.run:run",
     "simulate_case": "tolstat.campaign.trace:simulate_case",
     "simulate_rows": "tolstat.solver.simulation:simulate_rows",
     "statistics": "tolstat.report.summary:statistics",
-    "weighted_exceedance": "tolstat.analysis.weighted:at",
-    "write_page": "tolstat.report.page:write",
-    "write_report": "tolstat.report:write",
+    "weighted_exceedance": "tolstat.analysis.weighted:weighted_exceedance",
+    "write_page": "tolstat.report.page:write_page",
+    "write_report": "tolstat.report:write_report",
 } | {name: f"{module}:{name}" for name, module in PUBLIC.items()}
 
 __all__ = sorted(_HOMES)

@@ -20,7 +20,7 @@ from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.tables import Status, Variant
 from tolstat.joint import Joint, varied
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 
 Array = NDArray[np.float64]
 AS_PRINTED = 1e7
@@ -157,7 +157,7 @@ class PaperStudy:
         return paper_statics.Loads(force, torque, resisting, joint.cross.r_b)
 
 
-def matching(store: ResultStore) -> bool:
+def matching(store: Reader) -> bool:
     """Whether a file is a complete study of the paper's cases with all results and with what the page draws."""
     if store.columns != RESULT_COLUMNS or not store.case_names or not store.complete:
         return False
@@ -181,7 +181,7 @@ def _kept(design: NDArray[np.void], alpha: Array) -> NDArray[np.intp]:
     return np.concatenate(rows)
 
 
-def read(store: ResultStore) -> PaperStudy:
+def read(store: Reader) -> PaperStudy:
     """Take the study from its file; see `matching`."""
     design, results = store.design(), store.results()
     alpha = store.errors()["operation.alpha"]

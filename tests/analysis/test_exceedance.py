@@ -61,7 +61,7 @@ def test_interval_covers_over_seeds_and_the_wald_interval_does_not():
 def test_coverage_through_the_public_function():
     covered = 0
     for loads in samples()[:500]:
-        share = exceedance.at(loads, np.full(N_JOINTS, Status.OK), LEVEL)
+        share = exceedance.exceedance(loads, np.full(N_JOINTS, Status.OK), LEVEL)
         covered += share.lower <= TRUE_SHARE <= share.upper
     assert covered / 500 >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 500)
 
@@ -102,7 +102,7 @@ def test_joints_needed_are_the_first_whose_interval_tells(share, accepted):
 def test_hand_counted_case():
     values = [1.0, 2.0, 3.0, 4.0, np.nan, 9.0, 9.0]
     status = [1, 1, 1, 1, Status.NEWTON_FAILED, Status.NOT_SETTLED, Status.PENDING]
-    share = exceedance.at(values, status, 2.0)
+    share = exceedance.exceedance(values, status, 2.0)
     assert (share.n, share.n_failed, share.n_unsettled, share.count) == (6, 1, 1, 2)
     assert share.estimate == 0.5
     assert (share.bound_lower, share.bound_upper) == (2 / 6, 4 / 6)
@@ -112,16 +112,16 @@ def test_hand_counted_case():
 
 
 def test_a_load_equal_to_the_level_does_not_exceed_it():
-    assert exceedance.at([1.0, 1.0, 2.0], [1, 1, 1], 1.0).count == 1
+    assert exceedance.exceedance([1.0, 1.0, 2.0], [1, 1, 1], 1.0).count == 1
 
 
 def test_every_unresolved_joint_widens_the_bounds():
     rng = np.random.default_rng(5)
     values, status = rng.normal(size=200), np.full(200, Status.OK)
-    complete = exceedance.at(values, status, 1.0)
+    complete = exceedance.exceedance(values, status, 1.0)
     for bad in (Status.NOT_SETTLED, Status.NEWTON_FAILED, Status.NOT_FINITE, Status.OUTSIDE_MODEL):
         status[: 10 * bad] = bad
-        partial = exceedance.at(values, status, 1.0)
+        partial = exceedance.exceedance(values, status, 1.0)
         assert partial.n == 200
         assert partial.n_failed + partial.n_unsettled == 10 * bad
         assert partial.bound_lower <= complete.estimate <= partial.bound_upper
@@ -129,17 +129,17 @@ def test_every_unresolved_joint_widens_the_bounds():
 
 
 def test_value_that_is_not_finite_counts_as_failed_even_when_marked_ok():
-    assert exceedance.at([np.nan, 1.0], [Status.OK, Status.OK], 0.0).n_failed == 1
+    assert exceedance.exceedance([np.nan, 1.0], [Status.OK, Status.OK], 0.0).n_failed == 1
 
 
 def test_dependent_samples_get_no_interval_but_keep_the_bounds():
-    share = exceedance.at([1.0, 2.0, 3.0], [1, 1, Status.NOT_FINITE], 1.5, iid=False)
+    share = exceedance.exceedance([1.0, 2.0, 3.0], [1, 1, Status.NOT_FINITE], 1.5, iid=False)
     assert np.isnan([share.lower, share.upper, share.outer_lower, share.outer_upper]).all()
     assert (share.estimate, share.bound_lower, share.bound_upper) == (0.5, 1 / 3, 2 / 3)
 
 
 def test_no_joint_at_all():
-    share = exceedance.at([], [], 1.0)
+    share = exceedance.exceedance([], [], 1.0)
     assert np.isnan(share.estimate)
     assert (share.lower, share.upper, share.bound_lower, share.bound_upper) == (0.0, 1.0, 0.0, 1.0)
     assert exceedance.curve([np.nan], [Status.PENDING]).size == 0
@@ -155,7 +155,7 @@ def test_curve_agrees_with_counting_and_falls(rows, level):
     table = exceedance.curve(values, status)
     assert list(table["level"]) == sorted(set(values[status == Status.OK]))
     assert np.all(np.diff(table["count"]) < 0)
-    share = exceedance.at(values, status, level)
+    share = exceedance.exceedance(values, status, level)
     assert share.count == sum(v > level and s == Status.OK for v, s in rows)
     assert share.bound_lower <= share.bound_upper
     assert share.outer_lower <= share.bound_lower
@@ -168,11 +168,11 @@ def test_curve_agrees_with_counting_and_falls(rows, level):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: exceedance.at([1.0], [1, 1], 0.0), "one length"),
-        (lambda: exceedance.at([1.0], [1], float("nan")), "NaN"),
-        (lambda: exceedance.at([1.0], [1], 0.0, confidence=1.0), "confidence"),
+        (lambda: exceedance.exceedance([1.0], [1, 1], 0.0), "one length"),
+        (lambda: exceedance.exceedance([1.0], [1], float("nan")), "NaN"),
+        (lambda: exceedance.exceedance([1.0], [1], 0.0, confidence=1.0), "confidence"),
         (lambda: exceedance.clopper_pearson(3, 2), "between 0 and n"),
-        (lambda: quantile.at([1.0], [1], 1.0), "share"),
+        (lambda: quantile.quantile([1.0], [1], 1.0), "share"),
     ],
 )
 def test_misuse_is_refused(call, message):
@@ -183,8 +183,8 @@ def test_misuse_is_refused(call, message):
 @pytest.mark.parametrize(("share", "confidence", "n"), [(0.95, 0.9, 59), (0.99, 0.9, 299)])
 def test_quantile_upper_end_needs_the_number_of_joints_wilks_gives(share, confidence, n):
     """A two-sided 90 % interval has the one-sided 95 % upper end of Wilks' first-order formula."""
-    enough = quantile.at(np.arange(n), np.ones(n), share, confidence)
-    too_few = quantile.at(np.arange(n - 1), np.ones(n - 1), share, confidence)
+    enough = quantile.quantile(np.arange(n), np.ones(n), share, confidence)
+    too_few = quantile.quantile(np.arange(n - 1), np.ones(n - 1), share, confidence)
     assert enough.upper == n - 1
     assert too_few.upper == np.inf
 
@@ -193,7 +193,7 @@ def test_quantile_upper_end_needs_the_number_of_joints_wilks_gives(share, confid
 def test_quantile_interval_covers_over_seeds(share):
     truth, covered = norm.ppf(share), 0
     for loads in samples()[:600]:
-        q = quantile.at(loads, np.ones(N_JOINTS), share)
+        q = quantile.quantile(loads, np.ones(N_JOINTS), share)
         covered += q.lower <= truth <= q.upper
     assert covered / 600 >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 600)
 
@@ -201,15 +201,15 @@ def test_quantile_interval_covers_over_seeds(share):
 def test_quantile_is_numpys_inverted_cdf_and_unresolved_joints_bound_it():
     loads = np.random.default_rng(3).normal(size=100)
     status = np.ones(100)
-    assert quantile.at(loads, status, 0.9).estimate == np.quantile(loads, 0.9, method="inverted_cdf")
+    assert quantile.quantile(loads, status, 0.9).estimate == np.quantile(loads, 0.9, method="inverted_cdf")
     status[:5] = Status.NEWTON_FAILED
-    q = quantile.at(loads, status, 0.9)
+    q = quantile.quantile(loads, status, 0.9)
     low, high = loads.copy(), loads.copy()
     low[:5], high[:5] = -np.inf, np.inf
     assert q.bound_lower == np.quantile(low, 0.9, method="inverted_cdf")
     assert q.bound_upper == np.quantile(high, 0.9, method="inverted_cdf")
-    assert quantile.at(loads, status, 0.96).bound_upper == np.inf
-    assert np.isnan(quantile.at(loads, status, 0.9, iid=False).lower)
+    assert quantile.quantile(loads, status, 0.96).bound_upper == np.inf
+    assert np.isnan(quantile.quantile(loads, status, 0.9, iid=False).lower)
 
 
 def test_analysis_needs_no_file_and_no_figure():

@@ -23,6 +23,7 @@ def test_distribution_is_scipys(k):
     assert pareto.log_likelihood(x, k, 0.9) == pytest.approx(genpareto(k, scale=0.9).logpdf(x).sum())
 
 
+@pytest.mark.slow
 def test_estimates_agree_with_maximum_likelihood():
     x = genpareto.rvs(0.2, scale=3.0, size=(4, 2000), random_state=2)
     for row, k, sigma in zip(x, *pareto.fit(x), strict=True):
@@ -75,6 +76,7 @@ def test_level_and_probability_are_inverse_and_join_the_count_at_the_threshold()
     assert tail.shape.lower < tail.shape.estimate < tail.shape.upper
 
 
+@pytest.mark.slow
 def test_goodness_is_uniform_for_a_true_tail_and_finds_a_false_one():
     rng = np.random.default_rng(7)
     good = [fit(rng.exponential(size=600)).p for _ in range(100)]
@@ -88,6 +90,7 @@ def test_more_joints_have_a_smaller_share_in_the_tail(n, above):
     assert fit(np.random.default_rng(8).normal(size=n)).n_above == above
 
 
+@pytest.mark.slow
 def test_stability_follows_the_threshold():
     values = np.concatenate(
         [-(norm.rvs(size=3000, random_state=1) ** 2), genpareto.rvs(0.1, size=1000, random_state=1)]

@@ -43,7 +43,7 @@ def test_replicates_of_no_event_are_no_fault():
 
 def test_estimates_of_any_kind():
     status = np.ones(50)
-    shares = [exceedance.at(np.random.default_rng(s).normal(size=50), status, 1.0).estimate for s in range(5)]
+    shares = [exceedance.exceedance(np.random.default_rng(s).normal(size=50), status, 1.0).estimate for s in range(5)]
     found = replicates.interval(shares)
     assert found.lower < np.mean(shares) < found.upper
 

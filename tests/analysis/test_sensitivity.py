@@ -56,6 +56,7 @@ def test_first_order_indices_cover_and_are_not_biased(found):
     assert np.mean(np.abs(naive[:, 2] - ISHIGAMI_FIRST[2]) <= half) < LEAST
 
 
+@pytest.mark.slow
 def test_total_indices_lie_between_their_bounds_and_first_order_indices_do_not(found):
     first, bounds, _ = found
     lower, upper = (np.array([getattr(b, end) for b in bounds]) for end in ("lower", "upper"))
@@ -110,6 +111,7 @@ def test_contributions_against_shaft_angle_are_those_of_each_angle():
     assert np.isnan(sensitivity.first_order(x, np.zeros((800, 2))).estimate).all()
 
 
+@pytest.mark.slow
 def test_shares_over_the_revolution_cover_and_their_plain_mean_does_not():
     theta = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     slopes = np.stack([1.0 + 0.5 * np.sin(theta), 0.7 * np.cos(theta), 0.0 * theta])
@@ -154,6 +156,7 @@ def test_rank_coefficients_do_not_see_how_a_monotone_load_is_bent():
     assert regression.ranks(x, y**2).r2 < 0.1
 
 
+@pytest.mark.slow
 def test_probability_of_the_larger_error_covers_and_a_binomial_interval_does_not():
     rng, shift, covered, narrow = np.random.default_rng(4), 0.8, [], []
     above = np.arange(300) < 25
@@ -170,6 +173,7 @@ def test_probability_of_the_larger_error_covers_and_a_binomial_interval_does_not
     assert np.mean(narrow) < least
 
 
+@pytest.mark.slow
 def test_errors_that_play_no_part_are_rarely_blamed_and_without_holm_often():
     rng = np.random.default_rng(12)
     above = np.arange(200) < 30

@@ -97,6 +97,7 @@ def test_own_job_times_each_setting_and_keeps_what_is_measured(params):
     assert runs[0].largest[0] == runs[1].largest[0] > 500
 
 
+@pytest.mark.slow
 def test_other_job_leaves_out_what_is_tighter_than_what_took_too_long(params):
     job = OtherJob("L", Integrator("LSODA", True), (1e-2, 1e-3, 1e-4), params(alpha=0.2), Options(), 0, 2, 0.02)
     runs = job._replace(rtols=(1e-6, 1e-7)).runs()

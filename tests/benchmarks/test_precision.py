@@ -69,6 +69,7 @@ def command(monkeypatch, *arguments):
     return CliRunner().invoke(cli.app, ["bench", "precision", str(STUDY), "--quick", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_command_writes_page_table_and_figure(tmp_path, monkeypatch):
     readme = tmp_path / "README.md"
     readme.write_text("before\n<!-- precision -->old<!-- end of precision -->\nafter\n", encoding="utf-8")

@@ -22,7 +22,7 @@ from tolstat.campaign.blocks import Execution
 from tolstat.campaign.executors import Work
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
-from tolstat.store import Counts, ResultStore
+from tolstat.store import Counts, Reader
 
 pytest.importorskip("distributed")
 
@@ -81,7 +81,7 @@ def test_a_cluster_of_this_machine_finds_bad_joints(tmp_path: Path) -> None:
     bad = fakes.stages(partial(fakes.simulate_badly, kills=values[17], hangs=values[30]))
     execution = Execution("dask", workers=2, block=5, joint_timeout=1.0)
     assert campaign.run(study, path, stages=bad, execution=execution).done == 40
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
 
 

@@ -155,6 +155,7 @@ def test_leaving_early_ends_the_workers_at_once() -> None:
     assert time.monotonic() - begin < 50  # not the minute that block 0 takes
 
 
+@pytest.mark.slow
 def test_blocks_that_cannot_be_done_are_given_up_alone() -> None:
     blocks = [list(range(first, first + 5)) for first in range(0, 40, 5)]
     found: dict[int, Any] = {}
@@ -182,6 +183,7 @@ def test_the_only_block_is_given_up_too() -> None:
     assert list(map_in_processes(Work(die), [1], 1)) == [(1, Lost("crashed", "killed by SIGKILL"))]
 
 
+@pytest.mark.slow
 def test_no_block_is_blamed_when_all_workers_die() -> None:
     with pytest.raises(WorkerDied, match="6 worker processes in a row died") as caught:
         list(map_in_processes(Work(die), range(100), 1))
@@ -196,6 +198,7 @@ def test_no_block_is_blamed_when_workers_begin_to_die(tmp_path: Path) -> None:
     assert sorted(seen.values()) == list(range(5))
 
 
+@pytest.mark.slow
 def test_many_bad_blocks_in_a_row_are_given_up() -> None:
     """Since one that came through before does so again, it is the blocks and not the machine."""
     found = dict(map_in_processes(Work(die_in_the_middle), range(9), 1))

@@ -24,7 +24,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import ResultStore
+from tolstat.store import Reader, ResultStore
 from tolstat.study import Study
 
 KINDS = ("none", "full")
@@ -83,6 +83,7 @@ def test_an_extended_campaign_is_one_of_that_size(tmp_path: Path, make: Make, me
     assert not list(tmp_path.glob("*.parts"))
 
 
+@pytest.mark.slow
 def test_a_kill_while_extending_leaves_the_old_file(
     tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,12 +146,13 @@ def test_merged_slices_are_one_run(tmp_path: Path, make: Make, method: str, kind
     assert run(study, tmp_path / "c.h5").read_bytes() == (tmp_path / "c.h5").read_bytes()
 
 
+@pytest.mark.slow
 def test_equal_overlaps_are_merged_and_different_ones_refused(tmp_path: Path, make: Make) -> None:
     study = make(60)
     parts = slices(study, tmp_path, 0, 30, 61) + slices(study, tmp_path, 10, 40)
     assert extend.merge(parts, tmp_path / "c.h5").twice == 30
     assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
-    with ResultStore.open(parts[2], "r+") as store:
+    with ResultStore.open_to_write(parts[2]) as store:
         results = store.results(slice(7, 8))
         results["T_max"][0, 1] += 1e-13
         store.write(np.array([7]), Simulation(results, {}))
@@ -175,6 +177,7 @@ def test_gaps_and_strangers_are_told_together(tmp_path: Path, make: Make) -> Non
         extend.merge(parts, tmp_path / "c.h5")
 
 
+@pytest.mark.slow
 def test_pending_rows_stay_pending_and_can_be_done_later(tmp_path: Path, make: Make) -> None:
     study = make(60)
     parts = slices(study, tmp_path, 0, 30, 61)
@@ -199,7 +202,7 @@ def test_rows_of_a_slice_are_those_of_the_campaign(tmp_path: Path, make: Make) -
 
     study = make(60)
     (part,) = slices(study, tmp_path, 5, 20)
-    with ResultStore.open(part) as store:
+    with Reader.open(part) as store:
         assert (store.rows, store.n, store.campaign_rows, store.whole) == (range(5, 20), 15, 61, False)
         assert store.to_pandas().index.tolist() == list(range(5, 20))
         assert store.errors().tobytes() == sampling.draw(study)[5:20].tobytes()

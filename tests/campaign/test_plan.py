@@ -21,7 +21,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Status
-from tolstat.store import ResultStore
+from tolstat.store import Reader, ResultStore
 
 RULE = "P(cross1.F > 0.5 N) width < 0.4"
 """Nearly one in five of the fake joints is unresolved, and counts at both ends of the interval."""
@@ -69,6 +69,7 @@ def missed(p: float, width: float, planned: list[int], confidence: float, runs: 
 
 @pytest.mark.parametrize("p", [0.001, 0.01, 0.1, 0.5])
 @pytest.mark.parametrize("width", [0.1, 0.01])
+@pytest.mark.slow
 def test_the_interval_of_a_stopped_campaign_covers(p: float, width: float) -> None:
     """Misses stay below 5 %, here with three standard errors to spare."""
     planned = stop_rule.looks(width, 100_000)
@@ -95,6 +96,7 @@ def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400
     return stop_rule.run_until(made, path, stop_rule.parse(RULE), run)
 
 
+@pytest.mark.slow
 def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     outcome = stopped(path)
@@ -103,7 +105,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     assert outcome.reached
     assert outcome.looks == looks
     assert look.joints in looks[:-1]
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         status, loads = store.status(), store.results()["F_max"][:, 0]
         assert (status[: look.joints + 1] != Status.PENDING).all()
         assert (status[look.joints + 1 :] == Status.PENDING).all()
@@ -112,7 +114,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
         assert store.stop["confidence_of_a_look"] == pytest.approx(1 - 0.05 / len(looks))
     assert look.n_unresolved == (status[1 : look.joints + 1] != Status.OK).sum()
     shares = [
-        exceedance.at(loads[1 : n + 1], status[1 : n + 1], 0.5, stop_rule.look_confidence(len(looks)))
+        exceedance.exceedance(loads[1 : n + 1], status[1 : n + 1], 0.5, stop_rule.look_confidence(len(looks)))
         for n in looks[:-1]
     ]
     widths = [share.outer_upper - share.outer_lower for share in shares]
@@ -130,11 +132,12 @@ def test_workers_and_blocks_do_not_move_the_stop(tmp_path: Path) -> None:
     assert datasets(tmp_path / "a.h5") == datasets(tmp_path / "b.h5") == datasets(tmp_path / "c.h5")
 
 
+@pytest.mark.slow
 def test_too_few_joints_are_all_simulated(tmp_path: Path) -> None:
     outcome = stopped(tmp_path / "a.h5", n=30)
     assert not outcome.reached
     assert outcome.look.joints == 29
-    with ResultStore.open(tmp_path / "a.h5") as store:
+    with Reader.open(tmp_path / "a.h5") as store:
         assert store.complete
         assert store.stop == {}
 
@@ -146,10 +149,11 @@ def test_until_is_for_independent_samples(tmp_path: Path) -> None:
         stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE), lambda row: None)
 
 
+@pytest.mark.slow
 def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=40)
     look = stop_rule.Look(39, 0, 4, 0.02, 0.25)
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         store.record_stop(stop_rule.Outcome(True, look, [39, 60]).record(stop_rule.parse(RULE)))
     notes = report.build(path).notes
     assert f"stopped by {RULE} at 39 joints; 95 % interval corrected for 2 looks: 0.02000 to 0.25000" in notes
@@ -201,14 +205,30 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
     assert made.widths[0.1] == upper - lower
     campaign.run(small, tmp_path / "a.h5", 1, check=False)
     assert made.file_bytes == pytest.approx((tmp_path / "a.h5").stat().st_size, rel=0.05)
-    with ResultStore.open(tmp_path / "a.h5") as store:
+    with Reader.open(tmp_path / "a.h5") as store:
         results = store.results()[1:]
     for limit in made.limits:
-        found = exceedance.at(LOADS[limit.load].of(results), results["status"], limit.level)
+        found = exceedance.exceedance(LOADS[limit.load].of(results), results["status"], limit.level)
         assert found.upper - found.lower <= limit.width + 1e-12
     large = plan.plan(dataclasses.replace(small, sampling=small.sampling.model_copy(update={"n": 10**6})), pilot=2)
     assert large.rows == 10**6 + 1
     assert large.widths[0.1] == pytest.approx(2 * 1.96 * np.sqrt(0.09 / 1e6), rel=0.01)
+
+
+def test_a_plan_counts_joints_that_do_not_go_together(tmp_path: Path, small: study.Study) -> None:
+    assert plan.plan(small, pilot=2).assembly == plan.Assembly(0, 60, exceedance.clopper_pearson(0, 60))
+    head, tail = synthetic.STUDY.split("[tolerances]")[0], '[sampling]\nmethod = "random"\nn = 30000\nseed = 1\n'
+    entry = '"pin*.diameter" = { lower = "0.1 mm", upper = "0.3 mm", distribution = "uniform" }\n'
+    loaded = study.load(tmp_path / "tight.toml", text=f"{head}[tolerances]\n{entry}{tail}")
+    found = plan._assembly(loaded, iid=True)
+    assert found.of == plan.DRAWN
+    assert found.interval[0] < 1 - 0.5**4 < found.interval[1]  # one pin in two is larger than the hole, 0.2 mm wider
+    assert found.interval == exceedance.clopper_pearson(found.misfits, found.of)
+    (tmp_path / "few.toml").write_text(loaded.text.replace("30000", "12"), encoding="utf-8")
+    done = CliRunner().invoke(cli.app, ["plan", str(tmp_path / "few.toml"), "--pilot", "2"])
+    assert "of 12 joints have a pin larger than its hole and cannot be simulated; 95 % interval" in done.stdout
+    done = CliRunner().invoke(cli.app, ["plan", str(tmp_path / "few.toml"), "--pilot", "2", "--json"])
+    assert json.loads(done.stdout)["assembly"]["of"] == 12
 
 
 VARIANTS = (
@@ -244,7 +264,7 @@ def test_a_plan_simulates_variants_as_they_are(tmp_path: Path, monkeypatch: pyte
     found = plan.plan(loaded, workers=1)
     assert (found.rows, found.pilot, found.failed, found.unsettled) == (6, 6, 0, 0)
     campaign.run(loaded, tmp_path / "v.h5", 1, check=False)
-    with ResultStore.open(tmp_path / "v.h5") as store:
+    with Reader.open(tmp_path / "v.h5") as store:
         np.testing.assert_array_equal(made[0].results["F_max"], store.results()["F_max"])
 
 
@@ -255,7 +275,7 @@ def test_a_plan_chooses_the_fidelity_that_the_campaign_chooses(tmp_path: Path) -
     made = plan.plan(loaded, workers=1)
     assert made.fidelity.startswith("auto: ")
     campaign.run(loaded, tmp_path / "a.h5", 1, tell=told.append)
-    with ResultStore.open(tmp_path / "a.h5") as store:
+    with Reader.open(tmp_path / "a.h5") as store:
         assert store.fidelity["reason"] == made.fidelity
     assert told[0].startswith(made.fidelity)
 

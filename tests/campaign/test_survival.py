@@ -29,7 +29,7 @@ from tolstat.campaign.blocks import MAX_BLOCK, Execution, Pace, without_simulati
 from tolstat.campaign.retry import Retry, parse
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status
-from tolstat.store import Counts, ResultStore
+from tolstat.store import Counts, Reader
 from tolstat.study.model import Solver
 
 LONG = bool(os.environ.get("TOLSTAT_LONG"))
@@ -63,7 +63,7 @@ def test_a_joint_that_kills_and_one_that_hangs_are_marked(
     execution = Execution("processes", workers, block, joint_timeout=0.5)
     counts = campaign.run(study, path, stages=fakes.stages(bad), execution=execution, tell=told.append)
     assert counts.done == 40
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
         assert np.isnan(store.results()["F_max"][[17, 30]]).all()
     assert sorted(told) == ["row 17: crashed: killed by SIGKILL", "row 30: timeout: took more than 0.5 s"]
@@ -71,13 +71,14 @@ def test_a_joint_that_kills_and_one_that_hangs_are_marked(
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.slow
 def test_parameters_that_are_no_numbers_are_not_simulated(
     tmp_path: Path, expected: dict[str, bytes], workers: int
 ) -> None:
     path = tmp_path / "a.h5"
     stages = fakes.stages()._replace(perturb=perturb_badly)
     campaign.run(fakes.Study(), path, workers, 4, stages=stages)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         bad = np.flatnonzero(store.errors()["operation.alpha"] > 1.5)
         assert bad.size
         assert (store.status()[bad] == Status.INVALID_INPUT).all()
@@ -90,6 +91,7 @@ def perturb_badly(joint: object, errors: np.ndarray) -> np.ndarray:
     return params
 
 
+@pytest.mark.slow
 def test_four_workers_change_no_byte(tmp_path: Path, expected: dict[str, bytes]) -> None:
     campaign.run(fakes.Study(), tmp_path / "a.h5", workers=4, block=3, stages=fakes.stages())
     assert datasets(tmp_path / "a.h5") == expected
@@ -107,7 +109,7 @@ def test_all_processes_killed_again_and_again(tmp_path: Path, expected: dict[str
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
         kills += 1
-        with ResultStore.open(path) as store:
+        with Reader.open(path) as store:
             if not store.pending().size:
                 break
     assert kills
@@ -116,6 +118,7 @@ def test_all_processes_killed_again_and_again(tmp_path: Path, expected: dict[str
 
 
 @pytest.mark.parametrize("moment", range(5 if LONG else 1))
+@pytest.mark.slow
 def test_workers_killed_at_random_change_no_byte(tmp_path: Path, expected: dict[str, bytes], moment: int) -> None:
     chance, path = random.Random(moment), tmp_path / "a.h5"
     process = start(path, 2, 2, seconds=0.05)
@@ -152,6 +155,7 @@ def test_states_without_results_have_none(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("replaced", [False, True])
+@pytest.mark.slow
 def test_a_file_that_is_deleted_meanwhile_is_put_back(
     tmp_path: Path, expected: dict[str, bytes], replaced: bool
 ) -> None:
@@ -166,13 +170,14 @@ def test_a_file_that_is_deleted_meanwhile_is_put_back(
     with pytest.raises(StoreError, match=f"during the campaign\n  hint: {tmp_path}.* holds all finished joints"):
         campaign.run(fakes.Study(), path, 1, 5, progress=remove, stages=fakes.stages())
     kept = tmp_path / "a.saved.h5" if replaced else path
-    with ResultStore.open(kept) as store:
+    with Reader.open(kept) as store:
         assert store.counts().done == 15
     campaign.run(fakes.Study(), kept, 1, stages=fakes.stages())
     assert datasets(kept) == expected
     assert not replaced or path.read_text() == "of somebody else"
 
 
+@pytest.mark.slow
 def test_a_torn_block_is_simulated_again(tmp_path: Path, expected: dict[str, bytes]) -> None:
     """Status and checksum are on the disk and some of the values are not, as after a power cut."""
     path = tmp_path / "a.h5"
@@ -180,10 +185,10 @@ def test_a_torn_block_is_simulated_again(tmp_path: Path, expected: dict[str, byt
     with h5py.File(path, "r+") as file:
         file["results/fork2.F_mean"][5:9] = np.nan
         file["results/status"][20] = Status.OUTSIDE_MODEL
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         assert store.damaged().tolist() == [5, 6, 7, 8, 20]
         assert store.pending().tolist() == [5, 6, 7, 8, 20]
-        assert store.to_pandas()["status"].iloc[[4, 5, 20]].tolist() == ["ok", "pending", "pending"]
+        assert store.to_pandas()["status"].loc[[4, 5, 20]].tolist() == ["ok", "pending", "pending"]
         assert np.isnan(store.results()["F_max"][5:9]).all()
     campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
     assert datasets(path) == expected
@@ -195,7 +200,7 @@ def test_what_cannot_be_simulated_again_is_refused(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["errors/pin1.offset_t"][7] += 1e-9
         file["histories/mode"][3, 4, 1] += 1
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         with pytest.raises(StoreError, match="is damaged: the errors of row 7 do not match"):
             store.errors()
         with pytest.raises(StoreError, match="is damaged: the history mode of row 3 does not match"):
@@ -204,12 +209,12 @@ def test_what_cannot_be_simulated_again_is_refused(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file.attrs["created"] = "yesterday"
     with pytest.raises(StoreError, match="is damaged: its attributes do not match"):
-        ResultStore.open(path)
+        Reader.open(path)
 
 
 def everything(path: Path) -> list[tuple[str, bytes]]:
     """All that a result file says of its joints, row by row, and of itself."""
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         errors, results = store.errors(), store.results()
         histories = [store.histories(name) for name in store.history_specs]
         about = (store.study_name, store.study_text, store.identity, store.joint, store.options, store.sampling)
@@ -222,6 +227,7 @@ def everything(path: Path) -> list[tuple[str, bytes]]:
 
 
 @pytest.mark.parametrize("histories", ["none", "full"])
+@pytest.mark.slow
 def test_a_corrupted_file_gives_an_error_or_the_right_data(tmp_path: Path, histories: str) -> None:
     chance, path = random.Random(5), tmp_path / "a.h5"
     campaign.run(fakes.Study(n=12, output=fakes.Output(histories)), path, 1, stages=fakes.stages())
@@ -248,10 +254,11 @@ def test_a_corrupted_file_gives_an_error_or_the_right_data(tmp_path: Path, histo
     assert all(outcomes.values()), outcomes
 
 
+@pytest.mark.slow
 def test_a_campaign_under_way_can_be_looked_at(tmp_path: Path, expected: dict[str, bytes]) -> None:
     path = tmp_path / "a.h5"
     process = start(path, 2, 2, seconds=0.05)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         session, begun = store.session(), store.counts().done
         assert session is not None
         assert (session.done, store.damaged().size) == (0, 0)
@@ -260,7 +267,7 @@ def test_a_campaign_under_way_can_be_looked_at(tmp_path: Path, expected: dict[st
         assert store.counts().done > begun
     process.communicate(timeout=60)
     assert process.returncode == 0
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         assert store.session() is None
     assert datasets(path) == expected
 
@@ -279,12 +286,13 @@ def simulate_finely(params: np.ndarray, options: Options, histories: str, n_harm
 
 
 @pytest.mark.parametrize("histories", ["none", "full"])
+@pytest.mark.slow
 def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, histories: str) -> None:
     study, path, told = fakes.Study(output=fakes.Output(histories)), tmp_path / "a.h5", []
     stages = fakes.stages(simulate_finely)
     campaign.run(study, path, 1, stages=stages)
     before = datasets(path)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         failed = np.flatnonzero(store.status() == Status.NEWTON_FAILED)
 
     def interrupt(counts: Counts) -> None:
@@ -296,7 +304,7 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, h
     campaign.run(study, path, 2, 1, stages=stages)  # the rows to come know their settings
     assert campaign.run(study, path, 1, stages=stages, retry=AGAIN, tell=told.append).failed == 0
     assert told == [f"{failed.size} joints are simulated again", "0 joints are simulated again"]
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         assert store.retries == [json.loads(json.dumps(AGAIN.entry()))]
         assert np.flatnonzero(store.attempt() == 1).tolist() == failed.tolist()
         assert (store.results()["steps"][failed] == 60).all()
@@ -387,6 +395,7 @@ def limited(path: Path, size: int) -> str:
     return ended.stderr.rpartition("StoreError: ")[2]
 
 
+@pytest.mark.slow
 def test_files_that_cannot_grow(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     assert limited(path, 20_000).startswith(f"{path}: cannot be written: ")
@@ -428,7 +437,7 @@ def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expecte
     with pytest.raises(StoreError, match=r"a\.h5: cannot be opened: no permission\n  hint: change its permissions"):
         campaign.run(fakes.Study(), read_only / "a.h5", 1, stages=fakes.stages())
     assert [path.name for path in read_only.iterdir()] == ["a.h5"]
-    with ResultStore.open(read_only / "a.h5") as store:  # looking at it goes on
+    with Reader.open(read_only / "a.h5") as store:  # looking at it goes on
         assert store.counts().done == 20
         assert store.session() is None
     moved = tmp_path / "a.h5"
@@ -437,6 +446,7 @@ def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expecte
     assert datasets(moved) == expected
 
 
+@pytest.mark.slow
 def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
     study, path = fakes.Study(output=fakes.Output("full")), small_disk / "a.h5"
     with pytest.raises(StoreError, match=r"No space left on device\n  hint: free disk space"):
@@ -444,7 +454,7 @@ def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
     moved = tmp_path / "a.h5"
     shutil.copy(path, moved)
     shutil.copytree(f"{path}.parts", f"{moved}.parts")
-    with ResultStore.open(moved) as store:
+    with Reader.open(moved) as store:
         assert 0 < store.counts().done <= 40
     campaign.run(study, moved, 1, stages=fakes.stages())
     campaign.run(study, tmp_path / "b.h5", 1, stages=fakes.stages())

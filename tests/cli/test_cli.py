@@ -22,7 +22,7 @@ from tolstat.campaign.executors import WorkerDied
 from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 
 COMMANDS = (*(command.replace("_", "-") for command in cli.COMMANDS), *bench.INSTRUMENTS)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
@@ -177,13 +177,13 @@ def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path)
     assert (done.exit_code, done.stdout) == (0, "")
     table = pd.read_csv(out, header=[0, 1], index_col=0)
     assert list(table.columns) == [(c.name, c.unit) for c in ERROR_COLUMNS + RESULT_COLUMNS]
-    assert list(table.index) == list(range(61))
-    with ResultStore.open(path) as store:
-        errors, results = store.errors(), store.results()
+    assert list(table.index) == list(range(1, 61))
+    with Reader.open(path) as store:
+        errors, results = store.errors()[1:], store.results()[1:]
     assert np.array_equal(table["pin1.offset_t", "m"], errors["pin1.offset_t"])
-    assert np.array_equal(table["cross1.F_max", "N"][:50], results["F_max"][:50, 0], equal_nan=True)
-    assert (table["status", "1"][50:] == "pending").all()
-    assert table["cross1.F_max", "N"][50:].isna().all()
+    assert np.array_equal(table["cross1.F_max", "N"][:49], results["F_max"][:49, 0], equal_nan=True)
+    assert (table["status", "1"][49:] == "pending").all()
+    assert table["cross1.F_max", "N"][49:].isna().all()
     assert call("export", path, "--csv", "-").stdout == out.read_text(encoding="utf-8")
 
 
@@ -212,7 +212,7 @@ def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
     names = ["case", "variant", "family", "group"]
     assert list(table.columns[:5]) == [*((name, "1") for name in names), (ERROR_COLUMNS[0].name, "m")]
     assert table.columns[-1] == (RESULT_COLUMNS[-1].name, "1")
-    with ResultStore.open(tmp_path / "small.h5") as store:
+    with Reader.open(tmp_path / "small.h5") as store:
         assert list(store.to_pandas().columns[:4]) == names
         assert table[names].to_numpy().tolist() == [
             [store.case_names[joint["case"]], joint["variant"], store.variants[joint["variant"]].family, joint["group"]]
@@ -228,6 +228,7 @@ def test_export_to_a_folder_that_is_not_there(tmp_path):
     assert "hint: " in done.stderr
 
 
+@pytest.mark.slow
 def test_export_into_a_pipe_that_closes_early(tmp_path):
     path = synthetic.store(tmp_path)
     command = f"{sys.executable} -m tolstat export {path} --csv - | head -n 1"
@@ -248,6 +249,7 @@ def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
     assert f"wrote {tmp_path / 'small_exceedance.png'}" in done.stderr
 
 
+@pytest.mark.slow
 def test_report_creates_its_output_folder(tmp_path):
     folder = tmp_path / "new" / "folder"
     done = call("report", synthetic.store(tmp_path), "--out", folder)
@@ -266,7 +268,7 @@ def test_run_ends_with_the_report_and_resumes(study):
     assert done.exit_code == 0, done.stderr
     assert done.stdout.startswith("load")
     assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
-    with ResultStore.open("small.h5") as store:
+    with Reader.open("small.h5") as store:
         assert store.complete
     again = call("run", study, "--executor", "serial")
     assert (again.exit_code, again.stdout) == (0, done.stdout)
@@ -295,7 +297,7 @@ def test_run_refuses_the_file_of_another_study(study):
 
 def test_interrupted_run_says_how_to_resume(study, monkeypatch):
     path = synthetic.store(study.parent, simulated=20)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         counts = store.counts()
 
     def stopped(*_, **__):
@@ -327,8 +329,9 @@ def test_dead_worker_is_no_fault_of_the_input(study, monkeypatch):
 
 def simulated(status, load):
     """Make a stand-in for a simulated case."""
-    loads = {name: {"F": load, "T": load} for name in BUSHINGS}
-    facts = {"status": status, "settled": status == "ok", "closure": load, "max": loads}
+    change = None if load is None else 0.5
+    loads = {name: {"unit": "N", "joint": load, "without_errors": 1.0, "change": change} for name in BUSHINGS}
+    facts = {"status": status, "status_without_errors": "ok", "closure": load, "max": loads}
     trace = pd.DataFrame({"theta": [0.0, 180.0], "tau": [1.0, 0.1 + 0.2]})
     return SimpleNamespace(summary=lambda: facts, to_pandas=lambda: trace, remedy=lambda: "try more")
 
@@ -349,14 +352,14 @@ def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monke
     assert (tmp_path / "trace.csv").read_text() == "theta,tau\n0.0,1.0\n180.0,0.30000000000000004\n"
     lines = call("simulate", case).stdout.splitlines()
     assert lines[0] == "status: ok"
-    assert lines[-1].split() == ["fork4", "1.5", "1.5"]
+    assert lines[-1].split() == ["fork4", "N", "1.5", "1", "+50.0", "%"]
 
 
 def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch):
     monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("newton_failed", None))
     done = call("simulate", case)
     assert done.exit_code == 0
-    assert done.stdout.splitlines()[-1].split() == ["fork4", "-", "-"]
+    assert done.stdout.splitlines()[-1].split() == ["fork4", "N", "-", "1", "-"]
     assert "warning: newton_failed: a step failed" in done.stderr
     assert "hint: try more" in done.stderr
 
@@ -371,6 +374,7 @@ contact.stations = [
 
 
 @pytest.mark.parametrize("command", ["simulate", "plan", "run"])
+@pytest.mark.slow
 def test_probable_mistakes_are_warnings(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("ok", 1.5))

@@ -166,7 +166,7 @@ def test_samples_know_which_stations_carry_and_see_an_end_touch_beside_the_middl
         dynamics.forces(t, sample["q"], sample["v"], par[0], work)
         for j in range(3):
             bits[k] |= (work.station[:, j, FORCE] > 0).astype(int) << j
-        np.testing.assert_allclose(sample["value"][SPAN["contact"]], work.contact.ravel(), rtol=1e-5, atol=1e-2)
+        np.testing.assert_allclose(sample["loads"][SPAN["contact"]], work.contact.ravel(), rtol=1e-5, atol=1e-2)
     assert (samples["pressed"] == bits).mean() > 0.99
     rows = samples.view(np.recarray)
     alone = (samples["pressed"] ^ np.roll(samples["pressed"], 1, axis=0)) & 0b101

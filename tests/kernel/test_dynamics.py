@@ -126,6 +126,7 @@ def test_tangent_is_the_derivative_of_the_residual(params, random_errors, law):
 
 
 @pytest.mark.parametrize("law", ["mode", "sliced"])
+@pytest.mark.slow
 def test_block_elimination_is_lapack(params, random_errors, law):
     par, t, q, v = loaded(params, random_errors, law)
     work = make_work()

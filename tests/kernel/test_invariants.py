@@ -198,6 +198,7 @@ def test_action_is_reaction_at_each_step(revolution):
         assert (np.abs(loads.sum(axis=0)).max(axis=1) > 1e-12 * size).all()
 
 
+@pytest.mark.slow
 def test_momentum_of_the_cross_changes_by_the_forces_of_the_arms_at_each_step(revolution):
     """Linear and angular, about O, in ground axes; rates from second differences of the particles' positions."""
     par, points = revolution

@@ -141,7 +141,7 @@ def test_a_joint_has_the_same_bits_in_lanes_and_alone(mixed, options):
     together = simulation.simulate_rows(mixed, options, "full")
     assert_same(together.results, results)
     for i in np.flatnonzero(np.isin(results.status, simulation.SIMULATED)):
-        np.testing.assert_array_equal(together.histories["loads"][i], samples[i]["loads"].astype("f4"))
+        np.testing.assert_array_equal(together.histories["loads"][i], samples[i]["components"].astype("f4"))
         np.testing.assert_array_equal(together.histories["tau"][i], samples[i]["tau"])
     if options.newton_max_iter == 6 or options.steps_per_rev == 12:
         assert ((results.status == Status.OK) & (results.halvings > 0)).any()

@@ -19,7 +19,7 @@ from tolstat.common.tables import (
     for_kernels,
     without_results,
 )
-from tolstat.kernel.mechanics.loads import N_COURSES, N_LOADS
+from tolstat.kernel.mechanics.loads import N_AVERAGED, N_LOADS
 from tolstat.solver.simulation import simulate_rows
 
 
@@ -29,20 +29,20 @@ def test_kernels_see_the_same_bytes() -> None:
     table = np.zeros(3, RESULT)
     rows = for_kernels(table)
     rows.largest[:] = np.arange(3 * N_LOADS).reshape(3, N_LOADS)
-    rows.average[:], rows.reach[:], rows.lyapunov[:] = rows.largest[:, :N_COURSES], -1.0, 7.0
+    rows.average[:], rows.range[:], rows.lyapunov[:] = rows.largest[:, :N_AVERAGED], -1.0, 7.0
     np.testing.assert_array_equal(largest(table), rows.largest)
     for kind in LOAD_KINDS:
         expected = rows.largest[:, SPAN[kind.name]].reshape(3, *kind.shape)
         np.testing.assert_array_equal(table[f"{kind.name}_max"], expected)
-        if kind.course:
+        if kind.averaged:
             np.testing.assert_array_equal(table[f"{kind.name}_mean"], expected)
             assert (table[f"{kind.name}_range"] == -1).all()
     assert (table["lyapunov"] == 7).all()
 
 
 def test_kinds_with_mean_and_range_come_first() -> None:
-    courses = [kind.course for kind in LOAD_KINDS]
-    assert courses == sorted(courses, reverse=True)
+    averaged = [kind.averaged for kind in LOAD_KINDS]
+    assert averaged == sorted(averaged, reverse=True)
 
 
 def test_each_load_is_the_largest_of_its_columns() -> None:

@@ -122,13 +122,13 @@ def test_combined_statistics_are_those_of_all_revolutions():
     samples = rng.uniform(1, 2, (5, 36, 16))
     for r, values in zip(range(15, 20), samples, strict=True):
         row = trail.revolution[r % 10]
-        row.largest[:16], row.average[:], row.reach[:] = values.max(0), values.mean(0), np.ptp(values, axis=0)
+        row.largest[:16], row.average[:], row.range[:] = values.max(0), values.mean(0), np.ptp(values, axis=0)
         row.largest[16:], row.mode_share[:] = r, 0.25
     out = np.zeros(1, KERNEL_RESULT).view(np.recarray)[0]
     combine(19, 5, trail, out)
     whole = samples.reshape(-1, 16)
     np.testing.assert_allclose(out.largest[:16], whole.max(0))
     np.testing.assert_allclose(out.average, whole.mean(0))
-    np.testing.assert_allclose(out.reach, np.ptp(whole, axis=0))
+    np.testing.assert_allclose(out.range, np.ptp(whole, axis=0))
     assert (out.largest[16:] == 19).all()
     np.testing.assert_allclose(out.mode_share, 0.25)

@@ -21,7 +21,7 @@ from tests.support import synthetic
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.tables import RESULT, Options, Simulation, Status
-from tolstat.store import Counts, ResultStore
+from tolstat.store import Counts, Reader
 
 
 def simulate(params: np.ndarray, options: Options, **rest: object) -> Simulation:
@@ -63,7 +63,7 @@ def measure(n: int, folder: Path, block: int = 4096, results: Sequence[str] = ()
     times.append(time.perf_counter())
     campaign.run(plan, path, progress=note_begin, **small)
     times.append(time.perf_counter())
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         assert store.complete
         last = store.results(slice(n, n + 1))["F_max"][0, 0]
     expected = 600.0 + 1e6 * joint.perturb(plan.joint, sampling.draw(plan, range(n, n + 1)))["pin_point"][0, 0, 1]

@@ -16,7 +16,7 @@ from tolstat.display.asked import Asked
 from tolstat.questions.causes.angles import against_angle
 from tolstat.questions.causes.section import sections
 from tolstat.questions.causes.tail import worst_joints
-from tolstat.store import ResultStore, revolutions
+from tolstat.store import Reader, revolutions
 from tolstat.store.revolutions import Revolutions
 
 TEXT = synthetic.STUDY.replace("n = 60", "n = 900").replace("offset_t", "offset_[tz]")
@@ -41,7 +41,7 @@ def test_loads_are_the_same_wherever_they_are_from(stores):
     rows = np.array([0, 2, 4])
     found = {}
     for kind, path in stores.items():
-        with ResultStore.open(path) as store:
+        with Reader.open(path) as store:
             found[kind] = revolutions.read(store, rows, 180)
             largest = store.results()["F_max"][rows]
     assert [found[kind].origin for kind in stores] == ["stored", "harmonics", "simulated again"]
@@ -51,7 +51,7 @@ def test_loads_are_the_same_wherever_they_are_from(stores):
     assert np.array_equal(found["full"].T, found["none"].T)
     np.testing.assert_allclose(found["harmonics"].F, found["full"].F, rtol=0.02)
     assert found["full"].angles[1] == pytest.approx(np.radians(2.0))
-    with ResultStore.open(stores["none"]) as store:
+    with Reader.open(stores["none"]) as store:
         coarse = revolutions.read(store, rows, 60)
     assert np.array_equal(coarse.T, found["none"].T[:, ::3])
 
@@ -73,7 +73,7 @@ def known(tmp_path, monkeypatch):
 
 
 def test_each_error_has_its_share_where_it_acts(known):
-    with ResultStore.open(known) as store:
+    with Reader.open(known) as store:
         found = against_angle(store.view(), ["cross2.F"], 800)[0]
     assert (found.joints, found.names[:2]) == (800, ("pin1.offset_t", "pin3.offset_z"))
     assert found.nominal == pytest.approx(np.full(12, 600.0))
@@ -102,7 +102,7 @@ def test_command_writes_shares_and_picture(known, tmp_path):
 
 def test_page_draws_loads_over_the_revolution(known):
     asked = Asked(known, replay=800)
-    with ResultStore.open(known) as store:
+    with Reader.open(known) as store:
         view = store.view()
         found = sections(view, asked)
         bushings = [name for name in view.leading if name in BUSHING_LOADS]
@@ -131,8 +131,8 @@ def test_page_draws_loads_over_the_revolution(known):
 
 def test_what_has_no_shares_is_refused(known, tmp_path):
     few, sweep = synthetic.store(tmp_path), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
-    with ResultStore.open(known) as store, pytest.raises(InputError, match="is not a load over the shaft angle"):
+    with Reader.open(known) as store, pytest.raises(InputError, match="is not a load over the shaft angle"):
         against_angle(store.view(), ["pin1.contact"])
     for path, text in ((few, "100 are needed"), (sweep, "not drawn from tolerances")):
-        with ResultStore.open(path) as store, pytest.raises(StoreError, match=text):
+        with Reader.open(path) as store, pytest.raises(StoreError, match=text):
             against_angle(store.view(), ["cross1.F"])

@@ -15,7 +15,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status
 from tolstat.questions.compare import query as compare
-from tolstat.store import ResultStore
+from tolstat.store import Reader, ResultStore
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
@@ -33,6 +33,7 @@ def truth(share=None, level=None):
     return norm.sf(np.log(level / 1.1)) - norm.sf(np.log(level))
 
 
+@pytest.mark.slow
 def test_paired_differences_cover_over_seeds_and_a_walds_interval_of_rare_shares_does_not(monkeypatch):
     monkeypatch.setattr(difference, "RESAMPLES", 200)
     level, covered, wald = 16.0, [], []  # one in some 300 joints
@@ -95,7 +96,7 @@ def test_joints_without_a_load_are_bounds_and_dependent_samples_have_no_interval
 def campaign(folder, name, text=synthetic.STUDY, n=400, factor=1.0):
     """Campaign whose load cross1.F follows one error; its last joint has failed."""
     path = synthetic.store(folder, text.replace("n = 60", f"n = {n}"), name, simulated=0)
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         results = synthetic.results(store.n, failed=1)
         results["F_max"][:-1, 0] = 640.0 + factor * 1e6 * np.abs(store.errors()["pin1.offset_t"][:-1])
         store.write(np.arange(store.n), Simulation(results, None))
@@ -109,7 +110,7 @@ def run(*arguments):
 def test_joints_of_one_seed_are_paired_by_sample_and_changes_are_put_together(tmp_path):
     wide = synthetic.STUDY.replace("0.1 mm", "0.12 mm").replace("n = 60", "n = 60\nnominal_first = false")
     a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", wide, n=300)
-    with ResultStore.open(a) as one, ResultStore.open(b) as other:
+    with Reader.open(a) as one, Reader.open(b) as other:
         found = compare.compared(one.view(), other.view(), ["cross1.F"])
         loads = [source_of(store)[k : k + 299] for store, k in ((one, 1), (other, 0))]
     assert found.sides.paired
@@ -136,7 +137,7 @@ def test_other_seeds_are_not_paired(tmp_path):
         campaign(tmp_path, "a"),
         campaign(tmp_path, "b", synthetic.STUDY.replace("seed = 2021", "seed = 5"), factor=1.2),
     )
-    with ResultStore.open(a) as one, ResultStore.open(b) as other:
+    with Reader.open(a) as one, Reader.open(b) as other:
         found = compare.compared(one.view(), other.view())
     assert not found.sides.paired
     assert found.switched.empty
@@ -145,6 +146,7 @@ def test_other_seeds_are_not_paired(tmp_path):
     assert np.isnan(row["p"])
 
 
+@pytest.mark.slow
 def test_command_prints_tables_and_writes_files(tmp_path):
     a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", factor=1.1)
     done = run("compare", a, b, "--by", "cross1.F", "--out", tmp_path / "out")
@@ -161,6 +163,7 @@ def test_command_prints_tables_and_writes_files(tmp_path):
     assert found["loads"][0]["estimate"] == pytest.approx(found["loads"][0]["b"] - found["loads"][0]["a"])
 
 
+@pytest.mark.slow
 def test_what_cannot_be_compared_is_refused(tmp_path):
     a, sweep = campaign(tmp_path, "a"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
     done = run("compare", a, sweep)
@@ -171,14 +174,14 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
     done = run("compare", a, a)
     assert done.exit_code == 2
     assert "hint: give another folder" in done.stderr
-    with ResultStore.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:
+    with Reader.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:
         compare.compared(one.view(), one.view(), ["cros1.F", "nothing"])
     assert len(refused.value.faults) == 2
 
 
 def test_pending_joints_are_not_compared(tmp_path):
     a, b = campaign(tmp_path, "a", n=60), synthetic.store(tmp_path, simulated=31, name="b")
-    with ResultStore.open(a) as one, ResultStore.open(b) as other:
+    with Reader.open(a) as one, Reader.open(b) as other:
         found = compare.compared(one.view(), other.view())
     assert len(found.sides.rows) == 30
     assert (found.sides.b.load("cross1.F").status == Status.OK).all()

@@ -25,7 +25,7 @@ from tolstat.questions.fatigue import query as fatigue
 from tolstat.questions.fatigue.counting import channels, cycles_of
 from tolstat.questions.fatigue.section import sections
 from tolstat.solver import rainflow
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 from tolstat.study.fatigue import Fatigue, read
 
 STUDY = """
@@ -72,20 +72,20 @@ def campaign(tmp_path_factory):
 
 def cycles(path):
     """Cycles of all joints of a file, the nominal joint included, and their status."""
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         return cycles_of(store, np.arange(store.n)), store.status()
 
 
 def load_cycles(files, shares=(1.0,), names=None, samples=None):
     with ExitStack() as stack:
-        views = [stack.enter_context(ResultStore.open(file)).view() for file in files]
+        views = [stack.enter_context(Reader.open(file)).view() for file in files]
         return fatigue.load_cycles(views, shares, names, samples)
 
 
 @pytest.mark.slow
 def test_the_same_cycles_from_worker_and_histories(campaign):
     counted, status = cycles(campaign("cycles"))
-    with ResultStore.open(campaign("cycles")) as store:
+    with Reader.open(campaign("cycles")) as store:
         assert set(store.history_specs) == set(rainflow.SPECS)
     assert (status != tolstat.Status.OK).any()
     assert np.isnan(counted.number[status != tolstat.Status.OK]).all()
@@ -104,6 +104,7 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
             assert difference.max() > 1e-6  # truncation shows: the comparison sees a difference
 
 
+@pytest.mark.slow
 def test_a_duty_cycle_of_two_campaigns(campaign):
     files = [campaign("cycles", alpha) for alpha in (15.0, 5.0)]
     both = load_cycles(files, [0.25, 0.75])
@@ -186,14 +187,16 @@ def test_every_fault_of_the_section_is_told():
 
 
 def test_pylife_series_holds_every_cycle_and_survives_a_file(campaign, tmp_path):
-    with ResultStore.open(campaign()) as store:
-        series = tolstat.pylife_series(store.view(), revolutions=10.0)
+    with Reader.open(campaign()) as store:
+        series = tolstat.pylife_series(store.view(), revolutions=10.0, nominal=True)
+        samples = tolstat.pylife_series(store.view())
         counted = cycles_of(store, np.arange(store.n))
     assert series.index.names == ["range", "mean", "joint", "channel"]
     assert isinstance(series.index.levels[0], pd.IntervalIndex)
     assert series.groupby("joint").sum().to_dict() == {
         i: n for i, n in enumerate(10.0 * counted.number.sum(axis=1)) if n > 0
     }
+    assert set(samples.index.get_level_values("joint")) == set(series.index.get_level_values("joint")) - {0}
     one = series.xs((3, "fork1.F_z"), level=["joint", "channel"])
     here = counted.of("fork1.F_z")
     for size, mean in zip(here.ranges[3, 0], here.means[3, 0], strict=True):
@@ -214,7 +217,7 @@ def test_the_lines_of_the_document_read_the_export(campaign, tmp_path, monkeypat
     code = next(code for code in found if "cycles.csv" in code).split("# with pyLife")[0]
     names: dict[str, object] = {}
     exec(code, names)
-    with ResultStore.open(campaign()) as store:
+    with Reader.open(campaign()) as store:
         pd.testing.assert_series_equal(names["series"], tolstat.pylife_series(store.view()))
 
 
@@ -223,8 +226,8 @@ def test_pylifes_own_damage(campaign):
     import pylife.strength.fatigue
     import pylife.stress.collective  # noqa: F401
 
-    with ResultStore.open(campaign()) as store:
-        series = tolstat.pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7)
+    with Reader.open(campaign()) as store:
+        series = tolstat.pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7, nominal=True)
         sums = damage.damage(cycles_of(store, np.arange(store.n), ["cross1.F_t"]), LINE, 1e7)[:, 0]
     curve = pd.Series({"k_1": LINE.m, "ND": LINE.N0, "SD": LINE.S0 / 2})  # amplitudes
     theirs = curve.fatigue.miner_elementary().damage(series.load_collective).groupby("joint").sum()
@@ -272,7 +275,7 @@ def test_spectra_fall_and_the_figure_shows_four_panels(campaign):
 
 def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
     asked = Asked(tmp_path / "c.h5")
-    with ResultStore.open(campaign()) as store:
+    with Reader.open(campaign()) as store:
         found = sections(store.view(), asked)
         store.study_text = store.study_text.replace("exponents = [4]", "exponents = [0]")
         assert sections(store.view(), asked) == []
@@ -294,7 +297,7 @@ def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
     assert note == Text(f"{rendering.notes(loading, table)}.", small=True)
     assert [text.split(":")[0] for text in asked.notes] == ["load cycles are left out"]
     for path in (campaign("none"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):
-        with ResultStore.open(path) as store:
+        with Reader.open(path) as store:
             assert sections(store.view(), asked) == []
     assert len(asked.notes) == 1
 
@@ -305,7 +308,7 @@ def test_a_slice_of_a_campaign_has_the_rows_of_the_campaign(campaign, tmp_path):
     assert load_cycles([part]).status.tolist() == load_cycles([campaign()]).status[3:8].tolist()
     joints = []
     for path in (campaign(), part):
-        with ResultStore.open(path) as store:
+        with Reader.open(path) as store:
             joints.append(set(tolstat.pylife_series(store.view()).index.get_level_values("joint")))
     assert joints[1] == joints[0] & set(range(4, 9))
     assert joints[1]

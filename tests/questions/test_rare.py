@@ -23,7 +23,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
 from tolstat.questions.rare import query as rare
-from tolstat.store import ResultStore
+from tolstat.store import Reader, ResultStore
 from tolstat.store.recall import recall
 
 SEEDS = 500
@@ -61,6 +61,7 @@ def four_branches(z):
     ("load", "limit", "truth"),
     [(linear, 4.75, norm.sf(4.75)), (four_branches, 4.0, 4 * norm.sf(4.0) - 4 * norm.sf(4.0) ** 2)],
 )
+@pytest.mark.slow
 def test_intervals_cover_over_seeds_and_those_of_independent_states_do_not(load, limit, truth):
     covered, naive, estimates = [], [], []
     for seed in range(SEEDS):
@@ -160,7 +161,7 @@ def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
     assert found.estimate.lower < norm.sf(2.5) < found.estimate.upper
     assert found.reached
     assert found.joints == sum(level.joints for level in found.levels)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         errors, origin, loads = store.errors(), store.origin(), store.results()["F_max"][:, 0]
         assert recall(store).identity() == rare._sized(plan, store.n).identity()
     assert origin["level"][:101].tolist() == [-1, *[0] * 100]
@@ -171,16 +172,18 @@ def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
     assert 0.3 < moved < 0.95
 
 
+@pytest.mark.slow
 def test_the_example_of_the_function_is_right(tmp_path):
     found = doctest.DocTestFinder().find(rare.rare_event, "rare_event", globs={"tolstat": tolstat})[0]
     found.globs |= {"study": load(tmp_path), "path": tmp_path / "example.h5"}
     assert doctest.DocTestRunner().run(found) == (0, 2)
 
 
+@pytest.mark.slow
 def test_level_0_is_the_random_campaign(whole):
     plan, _, path = whole
     drawn = load(plan.path.parent, PLAN.replace("n = 60", "n = 100"), "random")
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         np.testing.assert_array_equal(store.errors(slice(0, 101)), sampling.draw(drawn))
 
 
@@ -215,6 +218,7 @@ def test_stopped_and_gone_on_with_it_is_the_same_in_any_blocks(tmp_path, whole, 
                 np.testing.assert_array_equal(a[group][name][:], b[group][name][:], err_msg=name)
 
 
+@pytest.mark.slow
 def test_joints_without_a_load_are_counted_on_the_side_asked_for(tmp_path, whole):
     _, below, _ = whole
     above = rare.run(asked(load(tmp_path), unresolved="above"), tmp_path / "above.h5", tell=lambda _: None)
@@ -224,11 +228,12 @@ def test_joints_without_a_load_are_counted_on_the_side_asked_for(tmp_path, whole
     assert above.estimate.lower > below.estimate.probability
 
 
+@pytest.mark.slow
 def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
     plan, _, path = whole
     with pytest.raises(StoreError, match=r"sampling.above: 950.0 in the file, 960.0 in the study"):
         rare.run(asked(load(tmp_path), 2.6), path)
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         results = store.results()
         results["F_max"][:, 0] *= -1.0
         store.write(np.arange(store.n), Simulation(results, {}))
@@ -236,6 +241,7 @@ def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
         rare.run(plan, path)
 
 
+@pytest.mark.slow
 def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, whole):
     _, found, path = whole
     done = CliRunner().invoke(app, ["rare", str(path), "--json"])
@@ -252,6 +258,20 @@ def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, 
         assert "tolstat rare" in refused.stderr
     assert json.loads(CliRunner().invoke(app, ["status", "--json", str(path)]).stdout)["exceedance"] == []
     assert CliRunner().invoke(app, ["rare", str(path), "--n", "300"]).exit_code == 2
+
+
+def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
+    plan, found, path = whole
+    monkeypatch.setattr(campaign, "versions", lambda: dict.fromkeys(("tolstat", "sources"), "other"))
+    again = rare.run(plan, path, tell=lambda _: None)
+    assert again.estimate == found.estimate
+    done = CliRunner().invoke(app, ["rare", str(path)])
+    assert done.exit_code == 0, done.stderr
+    with h5py.File(path, "r+") as file:
+        file["results/status"][3] = Status.PENDING
+    done = CliRunner().invoke(app, ["rare", str(path)])
+    assert done.exit_code == 2
+    assert "run the study into another file (--out OTHER.h5), or resume with" in done.stderr
 
 
 def test_every_fault_of_a_question_is_told(tmp_path):

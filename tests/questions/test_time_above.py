@@ -13,9 +13,10 @@ from tolstat import cli, sampling, study
 from tolstat.analysis import exceedance
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import CHANNELS, Options, Simulation
+from tolstat.questions.time_above import rendering
 from tolstat.questions.time_above.query import time_above
 from tolstat.solver.simulation import history_specs
-from tolstat.store import ResultStore, revolutions
+from tolstat.store import Reader, ResultStore, revolutions
 
 SEEDS = 500
 SAMPLES = 720
@@ -57,7 +58,7 @@ def run(*arguments):
 
 
 def test_times_of_known_waves_and_joints_told_apart_from_them(path):
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         found = time_above(store.view(), ["cross1.F", "cross1.F_t"], ["0.75 kN"])
     own = tops(201)[1:-2]  # row 0 is the nominal joint, the last two have failed
     expected = time_of(750.0, own)
@@ -93,6 +94,7 @@ def test_channels_are_components_and_moduli():
     np.testing.assert_allclose(revolutions.channel(loads, "cross3.T") ** 2, (loads[:, :, 2, 3:] ** 2).sum(axis=-1))
 
 
+@pytest.mark.slow
 def test_command_prints_limits_and_writes_curves(path, tmp_path):
     done = run(path, "--by", "cross1.F", "--out", tmp_path / "out")
     assert done.exit_code == 0
@@ -111,8 +113,19 @@ def test_command_prints_limits_and_writes_curves(path, tmp_path):
     }
 
 
-def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_path):
+def test_shares_have_their_unit_with_intervals_and_without(path):
     with ResultStore.open(path) as store:
+        table = time_above(store.view(), ["cross1.F"], ["700 N"]).table
+    without = table.assign(**{name: np.nan for name in table if name.endswith(("_lower", "_upper"))})
+    cells = []
+    for shown in (table, without):
+        cells = [cell(row) for row in shown.to_dict("records") for _, cell, *_ in rendering.LEVELS[1:]]
+        assert all(cell.endswith(" %") for cell in cells), cells
+    assert "(" not in "".join(cells)
+
+
+def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_path):
+    with Reader.open(path) as store:
         with pytest.raises(InputError) as found:
             time_above(store.view(), ["psi", "fork1.F"], ["700 mm"])
         for words in ("'psi' is no load of a bushing", "'700 mm' cannot be a value in N"):
@@ -125,7 +138,7 @@ def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_
             ("cross1.F", 1.0),
             ("cross1.T", 1.0),
         ]
-    with ResultStore.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
+    with Reader.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
         time_above(store.view())
     done = run(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"))
     assert done.exit_code == 2

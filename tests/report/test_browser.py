@@ -12,7 +12,7 @@ from tests.report.test_page import TEXT
 from tests.support import synthetic
 from tolstat.analysis import exceedance
 from tolstat.report import page
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 
 BROWSER = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
@@ -73,8 +73,8 @@ def probe(text, asked, folder, width=1280):
 def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("browser")
     path = synthetic.store(folder, TEXT, failed=15, unsettled=12)
-    page.write(path, folder / "page.html", accepted=0.05, replay=0)
-    with ResultStore.open(path) as store:
+    page.write_page(path, folder / "page.html", accepted=0.05, replay=0)
+    with Reader.open(path) as store:
         view = store.view()
         view.loads(view.shown_loads)  # read while the file is open
     return folder / "page.html", view
@@ -92,7 +92,7 @@ def test_reader_reads_what_is_counted_and_the_page_keeps_its_width(made, tmp_pat
     for name, wanted in asked:
         x, said = found["readings"][name]
         load = view.load(name)
-        share = exceedance.at(load.values, status, x)
+        share = exceedance.exceedance(load.values, status, x)
         assert abs(x - wanted) < 5 or wanted == 0
         assert said.startswith(
             f"{100 * share.estimate:.3g} % of the joints exceed {x:g} {load.unit.replace('*', ' ')} on {name}"
@@ -101,7 +101,7 @@ def test_reader_reads_what_is_counted_and_the_page_keeps_its_width(made, tmp_pat
         assert f"95 % interval {100 * share.lower:.3g} % to {100 * share.upper:.3g} %" in said
         assert f"below and above: {100 * share.outer_lower:.3g} % to {100 * share.outer_upper:.3g} %" in said
     assert found["start"].startswith(
-        f"{100 * exceedance.at(view.load('cross1.F').values, status, 700.0).estimate:.3g} %"
+        f"{100 * exceedance.exceedance(view.load('cross1.F').values, status, 700.0).estimate:.3g} %"
     )
     assert found["first"].startswith("100 % ")
     assert found["cursors"] == 1

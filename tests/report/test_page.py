@@ -20,8 +20,7 @@ from tolstat.questions.exceedance import query
 from tolstat.questions.joints import query as joints
 from tolstat.report import html as writer
 from tolstat.report import page, verdict
-from tolstat.store import ResultStore, revolutions
-from tolstat.store.reader import Reader
+from tolstat.store import Reader, revolutions
 from tolstat.store.recall import recall
 from tolstat.store.view import MAX_LISTED
 
@@ -39,13 +38,13 @@ def path(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def view(path):
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         yield store.view()
 
 
 @pytest.fixture(scope="module")
 def html(path):
-    page.write(path, path.with_suffix(".html"), accepted=0.05, replay=0)
+    page.write_page(path, path.with_suffix(".html"), accepted=0.05, replay=0)
     return path.with_suffix(".html").read_text(encoding="utf-8")
 
 
@@ -111,11 +110,11 @@ def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypa
 
     monkeypatch.setattr(Reader, "column", counting)
     monkeypatch.setattr(revolutions, "read", drawn)
-    opened = mock.Mock(side_effect=ResultStore.open)
-    monkeypatch.setattr(ResultStore, "open", opened)
+    opened = mock.Mock(side_effect=Reader.open)
+    monkeypatch.setattr(Reader, "open", opened)
     recalled = mock.Mock(side_effect=recall)
     monkeypatch.setattr("tolstat.store.view.recall", recalled)
-    page.write(path, tmp_path / "page.html", accepted=0.05, replay=replay)
+    page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=replay)
     tables = {name: rows for name, rows in read.items() if name.startswith(("results/", "errors/"))}
     assert len(tables) > 150
     assert {name: rows for name, rows in tables.items() if rows != (400 if name.startswith("errors/") else 401)} == {}
@@ -138,7 +137,7 @@ def test_text_of_the_study_is_shown_and_not_run(html):
 def test_same_file_same_bytes(path, tmp_path):
     contents = []
     for k in (0, 1):
-        with ResultStore.open(path) as store:
+        with Reader.open(path) as store:
             made = page.compose(store.view(), Asked(path, 0.05))
         some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
         writer.write(replace(made, sections=some), tmp_path / f"{k}.html")
@@ -148,7 +147,7 @@ def test_same_file_same_bytes(path, tmp_path):
 
 def test_limits_and_their_verdicts_stand_on_the_page(view, html):
     for name, level in view.limits.items():
-        share = exceedance.at(view.load(name).values, view.status, level)
+        share = exceedance.exceedance(view.load(name).values, view.status, level)
         assert f"{share.count} of {share.n - share.n_failed - share.n_unsettled}" in html
         assert f"{100 * share.estimate:.3g} %" in html
         if share.outer_lower > 0.05:
@@ -174,7 +173,7 @@ def test_reader_holds_the_shares_that_are_counted(view):
         assert 100 < len(curve["x"]) <= 3 * query.READER_LEVELS
         assert curve["x"][curve["start"]] == view.limits.get(name, curve["x"][curve["start"]])
         for i in (0, 7, curve["start"], -1):
-            share = exceedance.at(values, status, curve["x"][i])
+            share = exceedance.exceedance(values, status, curve["x"][i])
             assert curve["count"][i] == share.count
             assert curve["lower"][i] == pytest.approx(share.lower, rel=5e-3, abs=1e-12)
             assert curve["outer_upper"][i] == pytest.approx(share.outer_upper, rel=5e-3)
@@ -200,7 +199,7 @@ def test_leading_load_is_the_one_whose_limit_most_joints_exceed(view):
 
 def words(path, accepted=np.nan):
     """Sections of a page, and its paragraphs and cells, without drawing it."""
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         made = page.compose(store.view(), Asked(path, accepted))
     found = [made.subtitle]
     for block in (block for section in made.sections for block in section.blocks):
@@ -215,12 +214,12 @@ def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
     said = words(path)[1][0]
     assert f"{60 - max(0, simulated - 1)} still pending" in said
     if not simulated:
-        assert page.write(path, tmp_path / "page.html", replay=0) == tmp_path / "page.html"
+        assert page.write_page(path, tmp_path / "page.html", replay=0) == tmp_path / "page.html"
         assert said in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
-    page.write(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, replay=0)
+    page.write_page(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, replay=0)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert Reading(text).sections == ["verdict", "failed", "provenance"]
     assert text.count(">open<") == 7
@@ -234,7 +233,7 @@ def test_dependent_samples_have_no_interval_on_the_page(tmp_path):
 
 
 def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
-    page.write(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"), tmp_path / "page.html")
+    page.write_page(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"), tmp_path / "page.html")
     read = Reading((tmp_path / "page.html").read_text(encoding="utf-8"))
     assert read.sections[:2] == ["verdict", "sweep"]
 
@@ -249,7 +248,7 @@ def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
 def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     calls = []
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(page, "write", lambda *given: calls.append(given) or tmp_path / "written")
+    monkeypatch.setattr(page, "write_page", lambda *given: calls.append(given) or tmp_path / "written")
     monkeypatch.setattr("tolstat.cli.report.announce_compilation", lambda: None)
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
@@ -277,16 +276,17 @@ def test_wrong_options_write_nothing(path, tmp_path, monkeypatch, arguments, sai
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
     proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
     text = synthetic.STUDY.replace("n = 60", 'method = "importance"\nn = 300') + proposal
     path = synthetic.store(tmp_path, text, failed=3)
-    page.write(path, tmp_path / "page.html", accepted=0.05, replay=0)
+    page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=0)
     html = (tmp_path / "page.html").read_text(encoding="utf-8")
     sections = Reading(html).sections
     assert among(sections, ["verdict", "exceedance", "worst", "modes", "failed", "provenance"])
     assert not {"capability", "causes"} & set(sections)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         weights, results = store.origin()["weight"][1:], store.results()[1:]
     valid = results["status"] == Status.OK
     above = (results["F_max"][:, 0] > 700.0) & valid
@@ -310,5 +310,5 @@ def test_what_is_no_sample_has_no_page(tmp_path):
     cases += '[sampling]\nmethod = "cases"\n\n[[case]]\nname = "one"\nerrors = { pin1.offset_t = "0.1 mm" }\n'
     path = synthetic.store(tmp_path, cases)
     with pytest.raises(StoreError, match="lists its joints one by one"):
-        page.write(path, tmp_path / "page.html")
+        page.write_page(path, tmp_path / "page.html")
     assert not (tmp_path / "page.html").exists()

@@ -204,6 +204,7 @@ def test_report_of_a_random_view(tmp_path):
     assert (tmp_path / "small_exceedance.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_report_of_a_campaign_under_way_counts_what_is_pending(tmp_path):
     made = report.build(synthetic.store(tmp_path, simulated=31))
     assert "30 joints (random sampling), 0 failed, 0 not settled, 30 still pending" in made.notes
@@ -215,6 +216,7 @@ def test_report_of_a_file_that_has_just_been_made(tmp_path):
     assert len(made.files) == 5
 
 
+@pytest.mark.slow
 def test_report_without_limits_prints_quantiles(tmp_path):
     plain = synthetic.STUDY.partition("[limits]")[0]
     made = report.build(synthetic.store(tmp_path, plain))
@@ -226,7 +228,7 @@ def test_report_without_limits_prints_quantiles(tmp_path):
 def test_report_of_a_sweep_into_another_folder(tmp_path):
     elsewhere = tmp_path / "pictures"
     elsewhere.mkdir()
-    files = report.write(synthetic.store(tmp_path, synthetic.SWEEP, "clearance"), elsewhere)
+    files = report.write_report(synthetic.store(tmp_path, synthetic.SWEEP, "clearance"), elsewhere)
     assert [f.name for f in files] == [f"clearance_sweep.{kind}" for kind in ("png", "svg", "csv")]
     table = pd.read_csv(elsewhere / "clearance_sweep.csv")
     assert table["pin*.diameter [mm]"].iloc[[0, -1]].tolist() == pytest.approx([-0.1, 0.1])
@@ -234,8 +236,8 @@ def test_report_of_a_sweep_into_another_folder(tmp_path):
 
 def test_same_file_same_bytes(tmp_path):
     path = synthetic.store(tmp_path)
-    first = [file.read_bytes() for file in report.write(path)]
-    assert [file.read_bytes() for file in report.write(path)] == first
+    first = [file.read_bytes() for file in report.write_report(path)]
+    assert [file.read_bytes() for file in report.write_report(path)] == first
 
 
 def test_folder_that_is_not_there_and_file_that_is_not_ours(tmp_path):
@@ -247,6 +249,7 @@ def test_folder_that_is_not_there_and_file_that_is_not_ours(tmp_path):
         report.build(tmp_path / "other.h5")
 
 
+@pytest.mark.slow
 def test_drawing_leaves_the_callers_settings_alone_and_needs_no_pyplot():
     code = (
         "import sys, matplotlib as m; before = m.rcParams.copy();"

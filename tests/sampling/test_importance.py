@@ -17,7 +17,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Simulation, Status
 from tolstat.questions.reweight import query as reweighting
-from tolstat.store import ResultStore
+from tolstat.store import Reader, ResultStore
 from tolstat.study.proposal import Proposal, component, weights
 
 SEEDS = 500
@@ -108,10 +108,10 @@ def test_one_in_a_million_is_covered_over_seeds_and_unweighted_it_is_not():
     truth, covered, naive, estimates = norm.sf(BETA), [], [], []
     for seed in range(SEEDS):
         g, w = linear_limit_state(seed, 500)
-        found = weighted.at(g, np.full(500, Status.OK), w, BETA)
+        found = weighted.weighted_exceedance(g, np.full(500, Status.OK), w, BETA)
         covered.append(found.lower <= truth <= found.upper)
         estimates.append(found.estimate)
-        plain = exceedance.at(g, np.full(500, Status.OK), BETA)
+        plain = exceedance.exceedance(g, np.full(500, Status.OK), BETA)
         naive.append(plain.lower <= truth <= plain.upper)
     least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
     assert np.mean(covered) >= least
@@ -129,7 +129,7 @@ def test_equal_weights_give_what_joints_that_count_alike_give():
         np.testing.assert_allclose(own[name], theirs[name], atol=1e-12, err_msg=name)
     # a level that no joint is above: a joint as heavy as the heaviest could have been
     heavy = np.where(np.arange(300) == 0, 20.0, 1.0)
-    assert weighted.at(values, status, heavy, 30.0).upper > 15 * theirs["upper"][-1]
+    assert weighted.weighted_exceedance(values, status, heavy, 30.0).upper > 15 * theirs["upper"][-1]
     assert not weighted.trust(values, status, heavy, 30.0).usable
     assert weighted.trust(values, status, np.ones(300), 1.0).usable
 
@@ -138,7 +138,7 @@ def campaign(folder, text=PLAN, name="plan", n=None):
     """Campaign whose load cross1.F is a sum of its errors, in sigma."""
     plan, path = load(folder, text, name, n=n), folder / f"{name}.h5"
     invented_campaign()(plan, path, workers=1, check=False)
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         results = synthetic.results(store.n)
         results["F_max"][:, 0] = 700.0 + 100.0 * (3e4 * (store.errors()["pin1.offset_t"]) - 3.0)
         store.write(np.arange(store.n), Simulation(results, None))
@@ -151,7 +151,7 @@ def stored(tmp_path_factory):
 
 
 def test_the_file_keeps_weights_and_reports_go_by_them(stored):
-    with ResultStore.open(stored) as store:
+    with Reader.open(stored) as store:
         view = store.view()
         found = view.load("cross1.F").above(700.0)
         frame = store.to_pandas()
@@ -175,18 +175,18 @@ def test_statistics_that_count_joints_alike_are_refused(stored):
 def test_slices_and_extensions_have_the_weights_of_one_run(tmp_path, stored):
     few = campaign(tmp_path, name="few", n=1000)
     extend.extend(few, 1200)
-    with ResultStore.open(stored) as whole, ResultStore.open(few) as grown:
+    with Reader.open(stored) as whole, Reader.open(few) as grown:
         np.testing.assert_array_equal(grown.origin(), whole.origin(slice(0, 1201)))
     parts = []
     for rows in (range(600), range(600, 1201)):
         parts.append(tmp_path / f"part{rows.start}.h5")
         invented_campaign()(load(tmp_path, n=1200), parts[-1], workers=1, rows=rows, check=False)
     extend.merge(parts, tmp_path / "merged.h5")
-    with ResultStore.open(stored) as whole, ResultStore.open(tmp_path / "merged.h5") as merged:
+    with Reader.open(stored) as whole, Reader.open(tmp_path / "merged.h5") as merged:
         np.testing.assert_array_equal(merged.origin(), whole.origin(slice(0, 1201)))
     with h5py.File(parts[0], "r+") as file:
         file["origin/weight"][7] *= 2.0
-    with ResultStore.open(parts[0]) as store, pytest.raises(StoreError, match="errors of row 7 do not match"):
+    with Reader.open(parts[0]) as store, pytest.raises(StoreError, match="errors of row 7 do not match"):
         store.origin()
 
 

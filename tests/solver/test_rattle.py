@@ -53,6 +53,7 @@ def test_an_independent_solution() -> None:
     ("point", "rows", "within"),
     [((30, 1500, 100), [3, 10], 0.02), ((15, 3000, 100), [0, 13], 0.02), ((15, 500, 10), [112, 451], 0.01)],
 )
+@pytest.mark.slow
 def test_largest_loads_are_those_of_fine_uniform_steps(
     point: tuple[float, float, float], rows: list[int], within: float
 ) -> None:
@@ -66,6 +67,7 @@ def test_largest_loads_are_those_of_fine_uniform_steps(
         assert (np.abs(found[name] - fine[name]) < within * size).all()
 
 
+@pytest.mark.slow
 def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order() -> None:
     params = np.concatenate([joints(15, 3000, 100, [0, 7, 10, 13, 19]), joints(30, 1500, 100, [10, 13])])
     options = FOLLOWING._replace(max_revs=24)
@@ -96,6 +98,7 @@ def with_explicit_steps(params: np.ndarray, steps: np.ndarray) -> tuple[np.ndarr
     return results.view(np.ndarray), blocks.view(np.ndarray)
 
 
+@pytest.mark.slow
 def test_with_explicit_steps_a_joint_has_the_same_bits_beside_any_others() -> None:
     params = np.concatenate([joints(15, 3000, 100, [0, 7, 10]), joints(30, 1500, 100, [10, 13, 5])])
     steps = simulation.explicit_steps(params, EXPLICIT)
@@ -211,11 +214,11 @@ def test_a_stationary_joint_counts_on_both_sides_of_a_limit_inside_its_interval(
     values, status = [5.0, 7.0, 9.0, 8.0], [Status.OK, Status.STATIONARY, Status.OK, Status.STATIONARY]
     ends = [5.0, 6.0, 9.0, 7.9], [5.0, 8.0, 9.0, 8.1]
     for level, least, count, most in ((5.5, 3, 3, 3), (6.5, 2, 3, 3), (7.5, 2, 2, 3), (8.0, 1, 1, 2), (8.5, 1, 1, 1)):
-        found = exceedance.at(values, status, level, ends=ends)
+        found = exceedance.exceedance(values, status, level, ends=ends)
         assert (found.bound_lower, found.estimate, found.bound_upper) == (least / 4, count / 4, most / 4)
         row = weighted.curve(values, status, np.ones(4), [level], ends=ends)[0]
         assert (row["bound_lower"], row["bound_upper"]) == pytest.approx((least / 4, most / 4))
-    assert exceedance.at(values, status, 6.5).bound_lower == 0.75
+    assert exceedance.exceedance(values, status, 6.5).bound_lower == 0.75
 
 
 def test_torque_reverses_where_the_inertia_of_the_output_shaft_says() -> None:

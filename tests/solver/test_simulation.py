@@ -332,6 +332,7 @@ print(out.tolist())
 """
 
 
+@pytest.mark.slow
 def test_the_kernel_is_the_same_without_compilation():
     plain = eval(python(ACCELERATION, NUMBA_DISABLE_JIT="1"))
     np.testing.assert_allclose(eval(python(ACCELERATION)), plain, rtol=1e-9, atol=1e-9 * np.abs(plain).max())
@@ -356,6 +357,7 @@ print(counts)
     assert two == four
 
 
+@pytest.mark.slow
 def test_a_second_process_finds_the_compiled_kernel():
     code = """
 from tolstat.kernel.lanes.lockstep import lockstep

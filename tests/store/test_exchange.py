@@ -15,7 +15,7 @@ from tolstat.common.loads import BUSHING_LOADS
 from tolstat.questions.capability import query as capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import summary
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 
 
 def export(*arguments):
@@ -27,7 +27,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
     done = export(path, "--json", out, "--by", "cross1.F")
     assert done.exit_code == 0
     found = json.loads(out.read_text(encoding="utf-8"))
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         view = store.view()
         tables = (("limits", exceedance.limits(view)), ("capability", capability.limits(view)))
         assert found["provenance"]["versions"] == store.versions
@@ -43,7 +43,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
 
 def test_statistics_are_of_a_sample(tmp_path):
     path = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
-    with ResultStore.open(path) as store, pytest.raises(StoreError, match="no sample of a production"):
+    with Reader.open(path) as store, pytest.raises(StoreError, match="no sample of a production"):
         summary.statistics(store.view())
     done = export(synthetic.store(tmp_path), "--csv", "x.csv", "--by", "cross1.F")
     assert done.exit_code == 2
@@ -58,7 +58,7 @@ def test_what_is_not_installed_is_said_before_anything_is_written(tmp_path, monk
     assert done.exit_code == 2
     assert "pip install pyarrow" in done.stderr
     assert not out.exists()
-    with ResultStore.open(path) as store, pytest.raises(InputError, match="pip install xarray"):
+    with Reader.open(path) as store, pytest.raises(InputError, match="pip install xarray"):
         store.to_xarray()
 
 
@@ -67,16 +67,61 @@ def test_parquet_has_columns_units_and_rows(tmp_path):
     path, out = synthetic.store(tmp_path, failed=2), tmp_path / "x.parquet"
     assert export(path, "--parquet", out).exit_code == 0
     frame = pd.read_parquet(out)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         pd.testing.assert_frame_equal(frame, store.to_pandas(), check_like=False, check_index_type=False)
     assert frame.attrs["units"]["cross1.T_max"] == "N*m"
 
 
+def test_excel_has_sheets_for_joints_limits_and_units(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    path, out = synthetic.store(tmp_path, failed=2), tmp_path / "x.xlsx"
+    assert export(path, "--xlsx", out).exit_code == 0
+    book = openpyxl.load_workbook(out)
+    assert book.sheetnames == ["joints", "limits", "units"]
+    joints = pd.read_excel(out, sheet_name="joints", index_col="row")
+    with Reader.open(path) as store:
+        view, frame = store.view(), store.to_pandas()
+        share = view.load("cross1.F").above(700.0)
+        nominal = store.nominal["cross1.F"]
+    pd.testing.assert_frame_equal(joints, frame, check_dtype=False, check_index_type=False, check_exact=False)
+    limits = pd.read_excel(out, sheet_name="limits", index_col="load").loc["cross1.F"]
+    assert limits[["limit", "unit", "above", "joints"]].tolist() == [700.0, "N", share.count, 58]
+    assert limits[["share", "lower", "upper", "nominal"]].tolist() == pytest.approx(
+        [share.estimate, share.lower, share.upper, nominal]
+    )
+    units = pd.read_excel(out, sheet_name="units", index_col="column")
+    assert units["unit"].astype(str).to_dict() == frame.attrs["units"]
+    assert units.loc["pin1.offset_e", "meaning"] == ERROR_COLUMNS[0].description
+    assert export(path, "--xlsx", out, "--nominal").exit_code == 0
+    marked = pd.read_excel(out, sheet_name="joints", index_col="row")
+    assert marked["nominal"].tolist() == [True] + [False] * 60
+
+
+def test_excel_of_a_sweep_has_limits_without_shares(tmp_path):
+    pytest.importorskip("openpyxl")
+    path, out = synthetic.store(tmp_path, f'{synthetic.SWEEP}[limits]\n"psi" = 0.01\n', "sweep"), tmp_path / "x.xlsx"
+    assert export(path, "--xlsx", out).exit_code == 0
+    limits = pd.read_excel(out, sheet_name="limits")
+    assert limits.iloc[0, :3].tolist() == ["psi", 0.01, 1]
+    assert limits.iloc[0, 3:].isna().all()
+
+
+def test_the_nominal_joint_is_exported_if_asked_for(tmp_path):
+    path = synthetic.store(tmp_path)
+    for options, rows in (((), range(1, 61)), (("--nominal",), range(61))):
+        lines = export(path, "--csv", "-", *options).stdout.splitlines()
+        assert [int(line.split(",")[0]) for line in lines[2:]] == list(rows)
+        assert ("nominal" in lines[0].split(",")) == bool(options)
+    refused = export(path, "--json", "-", "--nominal")
+    assert refused.exit_code == 2
+    assert "--nominal is used with --csv" in refused.stderr
+
+
 def test_xarray_has_units_and_descriptions(tmp_path):
     pytest.importorskip("xarray")
-    with ResultStore.open(synthetic.store(tmp_path, failed=2)) as store:
+    with Reader.open(synthetic.store(tmp_path, failed=2)) as store:
         data, frame = store.to_xarray(), store.to_pandas()
-    assert data.sizes == {"row": 61}
+    assert data.sizes == {"row": 60}
     assert data["cross1.F_max"].attrs["units"] == "N"
     assert data[ERROR_COLUMNS[0].name].attrs["description"] == ERROR_COLUMNS[0].description
     assert (data["status"].to_numpy() == frame["status"].to_numpy()).all()

@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,8 +22,8 @@ from tests.store.test_store import new_store, simulation
 from tests.support import fakes
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
-from tolstat.common.tables import SCHEMA_VERSION
-from tolstat.store import ResultStore, integrity, result_file
+from tolstat.common.tables import SCHEMA_VERSION, Mode, Motion, Status
+from tolstat.store import Reader, ResultStore, axes, histories, integrity, meanings, result_file, verification
 
 GOLDEN = make_golden.FOLDER / f"schema{SCHEMA_VERSION}.h5"
 OLDER = sorted(set(make_golden.FOLDER.glob("schema*.h5")) - {GOLDEN})
@@ -30,7 +31,7 @@ OLDER = sorted(set(make_golden.FOLDER.glob("schema*.h5")) - {GOLDEN})
 
 def read_all(path: Path) -> int:
     """Read everything that a result file holds; number of its joints."""
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         store.counts()
         store.errors()
         store.results()
@@ -43,8 +44,8 @@ def read_all(path: Path) -> int:
 
 def test_a_released_file_is_read() -> None:
     expected = pd.read_csv(GOLDEN.with_suffix(".csv"), index_col="row")
-    with ResultStore.open(GOLDEN) as store:
-        frame = store.to_pandas()
+    with Reader.open(GOLDEN) as store:
+        frame = store.to_pandas(nominal=True)
         assert (store.n, store.rows, store.campaign_rows, store.whole) == (3, range(3), 3, True)
         assert store.limits == {"cross1.F": 700.0}
         assert (store.study_name, store.sampling["seed"], store.options["steps_per_rev"]) == ("fake", 7, 30)
@@ -75,10 +76,82 @@ def whole(tmp_path: Path) -> Path:
     return path
 
 
-def test_xarray_opens_each_group(whole: Path) -> None:
+def groups(path: Path) -> list[str]:
+    """All groups of a file, the root among them."""
+    found = ["/"]
+    with h5py.File(path) as file:
+        file.visititems(lambda name, item: found.append(f"/{name}") if isinstance(item, h5py.Group) else None)
+    return found
+
+
+def test_every_group_is_described_and_opens_in_xarray_without_a_warning(whole: Path) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
-    with ResultStore.open(whole) as store:
+    verify(whole)
+    names = groups(whole)
+    assert {"/", "/errors", "/results", "/ledger", "/session", "/histories", "/verify", "/verify/newton"} == {*names}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for name in names:
+            with xarray.open_dataset(whole, engine="h5netcdf", group=name) as opened:
+                opened.load()
+                assert len(opened.attrs["description"]) > 10
+                assert set(opened.dims) == set(opened.coords)
+                if "nominal" in opened:
+                    assert opened["nominal"].to_numpy().tolist() == [1, 0, 0, 0, 0, 0]
+                    assert opened["row"].to_numpy().tolist() == list(range(6))
+
+
+def verify(path: Path) -> None:
+    with ResultStore.open_to_write(path) as store:
+        check = verification.Check("finer Newton", {}, store.results()[1:3])
+        verification.write(store, verification.Verification(1, np.arange(1, 3), check.results, {"newton": check}))
+
+
+def test_codes_carry_their_meanings(whole: Path) -> None:
+    with h5py.File(whole) as file:
+        for name, codes in (("results/status", Status), ("results/motion", Motion), ("histories/mode", Mode)):
+            held = file[name]
+            assert held.attrs["flag_values"].dtype == held.dtype
+            assert held.attrs["flag_values"].tolist() == [code.value for code in codes]
+            assert result_file.text(held.attrs, "flag_meanings").split() == [code.name.lower() for code in codes]
+        assert result_file.text(file["nominal"].attrs, "flag_meanings") == "joint_with_errors nominal_joint"
+
+
+def test_meanings_of_cases_families_and_proposals_are_words(tmp_path: Path) -> None:
+    design = {"cases": ["ideal", "tilted by 1°"], "variants": [{"family": f} for f in ("a b", "a b", "c")]}
+    attrs = {"design": json.dumps(design), "identity": json.dumps({"proposal": [[0.5, {}]]})}
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, codes in meanings.of_file(attrs).items():
+            meanings.put(file.create_dataset(name, (2,), "i4"), codes)
+        told = {name: result_file.text(held.attrs, "flag_meanings") for name, held in file.items()}
+    assert told["case"] == "ideal tilted_by_1_"
+    assert told["variant"] == "a_b_0 a_b_1 c"
+    assert told["component"] == "nominal_joint tolerances proposal_1"
+
+
+def test_axes_of_histories_have_names(tmp_path: Path) -> None:
+    from tolstat.solver.simulation import history_specs
+
+    specs = history_specs(fakes.Options(steps_per_rev=36), "full", 0) | history_specs(
+        fakes.Options(steps_per_rev=36), "harmonics+cycles", 4
+    )
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        row = file.create_dataset("row", data=np.arange(2))
+        row.make_scale("row")
+        for name, spec in specs.items():
+            axes.attach_scales(histories.create_dataset(file, name, 2, spec), row, spec)
+        held = {name: file[name].asstr()[:].tolist() for name in axes.NAMES}
+        assert held == {name: list(names) for name, (names, _) in axes.NAMES.items()}
+        np.testing.assert_allclose(file["theta"][:], np.radians(np.arange(0, 360, 10)))
+        assert file["harmonic"][:].tolist() == [0, 1, 2, 3, 4]
+        assert all(len(dim) == 1 for name in specs for dim in file[name].dims)
+
+
+def test_xarray_reads_values_as_the_store_does(whole: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    with Reader.open(whole) as store:
         results, loads = store.results(), store.histories("loads")
     with xarray.open_dataset(whole, engine="h5netcdf", group="results") as opened:
         assert opened.sizes == {"row": 6}
@@ -122,7 +195,7 @@ def test_texts_have_a_fixed_length(whole: Path) -> None:
 def test_histories_name_their_axes(tmp_path: Path) -> None:
     from tolstat.solver.simulation import history_specs
 
-    for kind in ("full", "harmonics"):
+    for kind in ("full", "harmonics+cycles"):
         for spec in history_specs(fakes.Options(), kind, 4).values():
             assert len(spec.axes) == len(spec.shape)
 
@@ -282,14 +355,14 @@ def test_no_pickle_anywhere() -> None:
 
 
 def test_a_released_file_lacks_nothing_that_is_asked_for() -> None:
-    with ResultStore.open(GOLDEN) as store:
+    with Reader.open(GOLDEN) as store:
         assert set(store.to_pandas().columns) >= {c.name for c in ERROR_COLUMNS + RESULT_COLUMNS}
 
 
 def test_files_of_older_schemas_are_refused() -> None:
     for path in OLDER:
         with pytest.raises(StoreError, match=rf"this tolstat reads {SCHEMA_VERSION}\n.*run its study again"):
-            ResultStore.open(path)
+            Reader.open(path)
 
 
 @pytest.mark.parametrize(("further", "remedy"), [(-1, "run its study again"), (1, "use a newer tolstat")])
@@ -301,7 +374,7 @@ def test_another_schema_is_refused_in_one_sentence(tmp_path: Path, further: int,
         file.attrs["schema_version"] = version
         integrity.seal(file)
     with pytest.raises(StoreError, match=rf"schema version {version}, this tolstat reads {SCHEMA_VERSION}\n.*{remedy}"):
-        ResultStore.open(path)
+        Reader.open(path)
 
 
 def test_a_copy_of_a_file_is_not_changed_by_reading(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from tests.questions.test_causes import TEXT, made
 from tolstat.cli import app
 from tolstat.common.loads import LOAD_FIELDS
-from tolstat.store import ResultStore, reader, view
+from tolstat.store import Reader, checked_tables, view
 
 BLOCK = 256
 
@@ -21,7 +21,7 @@ def path(tmp_path_factory):
 def read(monkeypatch):
     """Rows of each whole table that is read."""
     rows = []
-    for module in (reader, view):
+    for module in (checked_tables, view):
         monkeypatch.setattr(module, "BLOCK", BLOCK)
 
     def recording(method):
@@ -33,7 +33,7 @@ def read(monkeypatch):
         return wrapper
 
     for name in ("_errors", "_results"):
-        monkeypatch.setattr(reader.Reader, name, recording(getattr(reader.Reader, name)))
+        monkeypatch.setattr(Reader, name, recording(getattr(Reader, name)))
     return rows
 
 
@@ -48,6 +48,7 @@ def read(monkeypatch):
         ("export", "--json", "all.json"),
     ],
 )
+@pytest.mark.slow
 def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     name, *options = command
@@ -59,7 +60,7 @@ def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, comma
 
 def test_only_loads_and_the_first_errors_are_held(path, monkeypatch):
     monkeypatch.setattr(view, "BLOCK", BLOCK)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         whole, part = store.results()[1:], store.view()
         assert part.results.dtype.names == LOAD_FIELDS
         for field in LOAD_FIELDS:
@@ -70,7 +71,7 @@ def test_only_loads_and_the_first_errors_are_held(path, monkeypatch):
 def test_errors_of_some_joints_are_those_rows(path, monkeypatch):
     monkeypatch.setattr(view, "BLOCK", BLOCK)
     samples = np.array([0, 3, 254, 255, 256, 1499])
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         errors, made = store.errors()[1:], store.view()
         found = made.errors(samples, ["pin2.offset_z"])
         assert found.dtype.names == ("pin2.offset_z",)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 
 import tolstat
@@ -21,8 +22,8 @@ from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
-from tolstat.common.tables import Simulation, Status
-from tolstat.store import Counts, ResultStore, provenance
+from tolstat.common.tables import Motion, Simulation, Status
+from tolstat.store import Counts, Reader, ResultStore, provenance
 from tolstat.store.result_file import text
 
 
@@ -47,7 +48,7 @@ def test_what_is_written_is_read(tmp_path: Path, study: fakes.Study) -> None:
     with new_store(path, study) as store:
         assert store.pending().tolist() == list(range(12))
         store.write(rows, simulation(study, rows))
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         assert store.pending().tolist() == [0, 4, 5, 6, 10, 11]
         assert store.errors().tobytes() == fakes.draw(study).tobytes()
         written, expected = store.results(), simulation(study, rows)
@@ -77,7 +78,7 @@ def test_attributes_tell_where_the_numbers_come_from(tmp_path: Path, study: fake
 def test_long_study_text_fits(tmp_path: Path) -> None:
     study = fakes.Study(n=2, text="# ü\n" * 100_000)
     new_store(tmp_path / "a.h5", study).close()
-    with ResultStore.open(tmp_path / "a.h5") as store:
+    with Reader.open(tmp_path / "a.h5") as store:
         assert store.study_text == study.text
 
 
@@ -87,7 +88,7 @@ def test_every_dataset_has_unit_and_description(tmp_path: Path, study: fakes.Stu
         assert file.attrs["filetype"] == b"tolstat campaign"
         assert file.attrs["schema_version"] == tables.SCHEMA_VERSION
         for group, columns in (("errors", ERROR_COLUMNS), ("results", RESULT_COLUMNS)):
-            assert set(file[group]) == {c.name for c in columns}
+            assert set(file[group]) == {c.name for c in columns} | {"row", "nominal"}
             for c in columns:
                 dataset = file[group][c.name]
                 assert text(dataset.attrs, "units") == c.unit
@@ -101,11 +102,15 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
     rows = np.arange(5)
     with new_store(tmp_path / "a.h5", study) as store:
         store.write(rows, simulation(study, rows))
-        frame, with_units = store.to_pandas(), store.to_pandas(units=True)
+        frame, without = store.to_pandas(nominal=True), store.to_pandas()
         results = store.results()
     columns = ERROR_COLUMNS + RESULT_COLUMNS
-    assert list(frame.columns) == [c.name for c in columns]
-    assert list(with_units.columns) == [(c.name, c.unit) for c in columns]
+    assert list(frame.columns) == ["nominal", *(c.name for c in columns)]
+    assert frame.attrs["units"] == {"nominal": "1"} | {c.name: c.unit for c in columns}
+    assert frame["nominal"].tolist() == [True] + [False] * (study.n - 1)
+    pd.testing.assert_frame_equal(without, frame.iloc[1:].drop(columns="nominal"), check_index_type=False)
+    assert without.index.tolist() == list(range(1, study.n))
+    assert frame["motion"].tolist() == [Motion(m).label for m in results["motion"]]
     assert frame.index.name == "row"
     assert len(frame) == study.n
     assert frame["status"].tolist() == [Status(s).label for s in results["status"]]
@@ -121,7 +126,7 @@ def test_counts(tmp_path: Path, study: fakes.Study) -> None:
     part.results["status"] = [Status.NOT_PERIODIC, Status.NOT_SETTLED, Status.NOT_FINITE, Status.NOT_RESOLVED]
     with new_store(tmp_path / "a.h5", study) as store:
         store.write(rows, part)
-        assert store.counts() == Counts(total=12, done=4, not_settled=2, failed=1, not_resolved=1)
+        assert store.counts() == Counts(total=12, done=4, unsettled=3, failed=1, not_resolved=1)
 
 
 @pytest.mark.slow
@@ -130,7 +135,7 @@ def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
     study, path = fakes.Study(n=500), tmp_path / "a.h5"
     new_store(path, study).close()
     before = np.fromfile(path, np.uint8)
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         for rows in np.array_split(np.random.default_rng(1).permutation(study.n), 9):
             store.write(rows, simulation(study, rows))
         assert store.complete
@@ -148,8 +153,8 @@ def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
 def in_another_process(path: Path, code: str) -> str:
     """Run code on a result file opened for writing as `store`; gives what it prints, or why it cannot be opened."""
     program = (
-        "from tolstat.common.errors import StoreError\nfrom tolstat.store import ResultStore\n"
-        f"try:\n    with ResultStore.open({str(path)!r}, 'r+') as store: {code}\n"
+        "from tolstat.common.errors import StoreError\nfrom tolstat.store import Reader, ResultStore\n"
+        f"try:\n    with ResultStore.open_to_write({str(path)!r}) as store: {code}\n"
         "except StoreError as error: print(error)"
     )
     python, environment = [sys.executable, "-c", program], fakes.environment()
@@ -168,17 +173,17 @@ def test_limits_are_replaced_whole_or_not_at_all(
     def full(*args: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    with ResultStore.open(path, "r+") as store, monkeypatch.context() as patch:
+    with ResultStore.open_to_write(path) as store, monkeypatch.context() as patch:
         patch.setattr("os.replace", full)
         store.update_study(study)
         with pytest.raises(StoreError, match=r"cannot be replaced: No space left on device\n  hint: free disk space"):
             store.update_study(other)
         assert store.limits == study.limits
     assert path.read_bytes() == before
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         store.update_study(other)
         assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
         assert store.identity == study.identity()
         assert store.errors().tobytes() == fakes.draw(study).tobytes()
@@ -201,45 +206,46 @@ def test_other_files_are_refused(tmp_path: Path, study: fakes.Study, change: dic
     new_store(path, study).close()
     with h5py.File(path, "r+") as file:
         file.attrs.update(change)
-    for mode in ("r", "r+"):
+    for opened in (Reader.open, ResultStore.open_to_write):
         with pytest.raises(StoreError, match=message):
-            ResultStore.open(path, mode)
+            opened(path)
 
 
 def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> None:
     plain = tmp_path / "text.h5"
     plain.write_text("not HDF5")
     with pytest.raises(StoreError, match=r"text.h5: is not an HDF5 file\n  hint: give a result file"):
-        ResultStore.open(plain)
+        Reader.open(plain)
     with pytest.raises(StoreError, match=r"none.h5: does not exist"):
-        ResultStore.open(tmp_path / "none.h5")
+        Reader.open(tmp_path / "none.h5")
     with pytest.raises(StoreError, match="is a folder"):
-        ResultStore.open(tmp_path)
+        Reader.open(tmp_path)
     empty = tmp_path / "empty.h5"
     empty.touch()
     with pytest.raises(StoreError, match=r"empty.h5: is not an HDF5 file"):
-        ResultStore.open(empty, "r+")
+        ResultStore.open_to_write(empty)
     assert empty.stat().st_size == 0
     foreign = tmp_path / "foreign.h5"
     h5py.File(foreign, "w").close()
     with pytest.raises(StoreError, match="of type None"):
-        ResultStore.open(foreign)
+        Reader.open(foreign)
     cut = tmp_path / "cut.h5"
     new_store(cut, study).close()
     cut.write_bytes(cut.read_bytes()[:5000])
     with pytest.raises(StoreError, match="is damaged"):
-        ResultStore.open(cut)
+        Reader.open(cut)
     poor = tmp_path / "poor.h5"
     new_store(poor, study).close()
     with h5py.File(poor, "r+") as file:
         del file["results"]
     with pytest.raises(StoreError, match="is damaged"):
-        ResultStore.open(poor)
+        Reader.open(poor)
 
 
+@pytest.mark.slow
 def test_one_writer_and_any_readers(tmp_path: Path, study: fakes.Study) -> None:
     path = tmp_path / "a.h5"
-    code = f"from tolstat.store import ResultStore\nprint(ResultStore.open({str(path)!r}).counts().done)"
+    code = f"from tolstat.store import Reader, ResultStore\nprint(Reader.open({str(path)!r}).counts().done)"
     with new_store(path, study) as store:
         store.write(np.arange(5), simulation(study, np.arange(5)))
         python, environment = [sys.executable, "-c", code], fakes.environment()
@@ -272,6 +278,7 @@ def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monk
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
     code = (
         "import os, signal, pathlib, tolstat.store.result_store\n"

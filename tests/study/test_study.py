@@ -5,20 +5,19 @@ from __future__ import annotations
 import copy
 import json
 import math
+import re
 import tomllib
+from collections.abc import Callable
 from datetime import date
 from pathlib import Path
 
 import pytest
-from pydantic_core import PydanticCustomError
 
 from tests.support.environment import ROOT
 from tests.support.synthetic import HEAD
 from tolstat import study
 from tolstat.common import tables
-from tolstat.common.errors import InputError
-from tolstat.common.notation import DIAMETER, PLUS_MINUS
-from tolstat.common.units import diameter, is_diameter, to_si, written
+from tolstat.common.errors import Fault, InputError
 from tolstat.study import Study, load_case
 from tolstat.study import file as study_file
 from tolstat.study.model import Solver
@@ -257,6 +256,36 @@ def test_a_malformed_file_gives_a_clear_message(name: str, tmp_path: Path) -> No
         assert len(messages) == 1, messages
 
 
+def test_a_fault_names_the_line_of_its_key(tmp_path: Path) -> None:
+    changes = {
+        ('speed = "500 rpm"', "speed = 1200"): "speed = 1200",
+        ('"0.1 deg"', '"0.1 mm"'): '"0.1 mm"',
+        ('plus_minus = "0.1 mm"', 'plus_minus = "⌀0.1 mm"'): "⌀",
+        ("steps_per_rev", "steps_per_rve"): "steps_per_rve",
+        ("rho = 0.6", "rho = nan"): "nan",
+        ("n = 8", ""): "[sampling]",
+    }
+    for change, part in changes.items():
+        (message,) = faults(tmp_path, change)
+        line = int(re.match(r"study\.toml:(\d+): ", message)[1])
+        assert part in (tmp_path / "study.toml").read_text(encoding="utf-8").splitlines()[line - 1]
+        (tmp_path / "study.toml").unlink()
+    assert [fault.place for fault in caught_by(lambda: study.load(write(tmp_path), n=0))] == [
+        f"{tmp_path / 'study.toml'}: sampling.n"
+    ]
+    (tmp_path / "own.toml").write_text("[pin]\n\nl = 3\n", encoding="utf-8")
+    places = [fault.place for fault in caught_by(lambda: read(tmp_path, ('"cirelli2021"', '"own.toml"')))]
+    assert f"{tmp_path / 'own.toml'}:3: pin.l" in places
+    assert f"{tmp_path / 'own.toml'}:1: pin.A" in places
+    assert f"{tmp_path / 'own.toml'}: hub" in places
+
+
+def caught_by(act: Callable[[], object]) -> tuple[Fault, ...]:
+    with pytest.raises(InputError) as caught:
+        act()
+    return caught.value.faults
+
+
 def test_remedies_name_the_right_word(tmp_path: Path) -> None:
     for change, remedy in [
         (("steps_per_rev", "steps_per_rve"), "did you mean 'steps_per_rev'?"),
@@ -264,6 +293,10 @@ def test_remedies_name_the_right_word(tmp_path: Path) -> None:
         (('"hole*.tilt_z"', '"hloe2.tilt_z"'), "did you mean 'hole2'?"),
         (('"hole*.tilt_z"', '"hole*.tilt_y"'), "did you mean 'tilt_"),
         (("rho = 0.6", "roh = 0.6"), "did you mean 'rho'?"),
+        (("seed = 7", "Seed = 7"), "did you mean 'seed'?"),
+        (('speed = "500 rpm"', "speed = 1200"), 'write "1200 rpm" or "1200 rad/s"'),
+        (('"0.1 mm"', '"0,25 mm"'), 'write a decimal point: "0.25 mm"'),
+        (('plus_minus = "0.1 mm"', 'plus_minus = "⌀0.25 mm"'), 'write half of it: "0.125 mm"'),
         (('"0.1 mm"', "0.1"), 'write "0.1 mm"'),
     ]:
         assert remedy in "\n".join(faults(tmp_path, change))
@@ -376,116 +409,6 @@ def test_no_value_anywhere_gives_anything_but_faults(
             assert accepted, keys
     assert faults
     assert all(fault.place.startswith(str(path)) and fault.remedy for fault in faults)
-
-
-@pytest.mark.parametrize("text", ["0,1 mm", "1,5 mm", "1 000 N", "10**10**10 mm", "1_000 mm", "mm", "", "0.1 mm;"])
-def test_what_is_no_number_with_a_unit_is_not_guessed(text: str) -> None:
-    with pytest.raises(PydanticCustomError, match="is not a number with a unit"):
-        to_si(text, "m")
-
-
-@pytest.mark.parametrize(
-    ("text", "unit", "value"),
-    [
-        ("0.1 mm", "m", 1e-4),
-        (" -.5mm ", "m", -5e-4),
-        ("1.2e+06 N/mm", "N/m", 1.2e9),
-        ("7.5e7 N/mm^2", "N/m^2", 7.5e13),
-        *[("100 N·m", "N*m", 100.0), ("100 Nm", "N*m", 100.0), ("0.1 kNm", "N*m", 100.0), ("1e5 Nmm", "N*m", 100.0)],
-        *[("1 MNm", "N*m", 1e6), ("1 Ncm", "N*m", 0.01), ("1 Nm/rad", "N*m/rad", 1.0), ("1 N/mm", "N/m", 1e3)],
-        *[("1 nm", "m", 1e-9), ("1 mN", "N", 1e-3), ("1 m N", "N*m", 1.0)],
-        ("1 um", "m", 1e-6),
-        ("5 µm", "m", 5e-6),
-        ("0.5 °", "rad", math.radians(0.5)),
-        ("30 kg*m^2", "kg*m^2", 30.0),
-        ("5 %", "1", 0.05),
-        ("0.5", "1", 0.5),
-    ],
-)
-def test_quantities_are_read(text: str, unit: str, value: float) -> None:
-    assert to_si(text, unit) == pytest.approx(value, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *("1200 rpm", "1200 rev/min", "1200 turn/min", "20 rps", "20 rev/s", "7200 deg/s", "125.66370614359172 rad/s"),
-        *("1200 min^-1", "1200 min**-1", "1200 min⁻¹", "1200 1/min", "1200/min", "1200 / min", "1200 1/minute"),
-        *("1200 U/min", "1200 r/min", "1200 tr/min", "1200 RPM", "20 U/s", "1.2 krpm", "20 turn/s", "432000 deg/min"),
-    ],
-)
-def test_a_speed_is_in_revolutions_however_it_is_spelt(text: str) -> None:
-    assert to_si(text, "rad/s") == pytest.approx(40.0 * math.pi, rel=1e-14)
-    assert to_si(str(written(80.0 * math.pi, "rad/s", text)), "rad/s") == pytest.approx(80.0 * math.pi, rel=1e-11)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *("20 Hz", "0.02 kHz", "20 Bq", "20 cps", "20 1/s", "20/s", "20 s^-1", "20 s⁻¹", "72000 1/h", "0.02 1/ms"),
-        *("1200 count/min", "2000 %/s", "20 sr/s"),
-    ],
-)
-def test_what_may_be_revolutions_or_radians_is_no_speed(text: str) -> None:
-    with pytest.raises(PydanticCustomError, match="ambiguous") as caught:
-        to_si(text, "rad/s")
-    assert caught.value.context
-    assert caught.value.context["remedy"] == 'write "20 rev/s" or "20 rad/s"'
-
-
-@pytest.mark.parametrize(
-    "text", ["20 rev*Hz", "20 rad^2/s", "20 rad*Hz", "20 rpm*rad", "20 rad", "20 min", "20 rev/min^2"]
-)
-def test_what_is_no_speed(text: str) -> None:
-    with pytest.raises(PydanticCustomError, match="cannot be a value in rad/s"):
-        to_si(text, "rad/s")
-
-
-@pytest.mark.parametrize(
-    "text", ["⌀0.1 mm", "Ø 0.1 mm", "ø0.1mm", "φ0.1 mm", "dia 0.1 mm", "Dia. 100 um", "0.1 mm dia"]
-)
-def test_a_diameter_is_read_where_one_is_meant_and_refused_elsewhere(text: str) -> None:
-    assert is_diameter(text)
-    assert diameter(text) == to_si(text, "m", DIAMETER) == pytest.approx(1e-4)
-    half = "50 um" if "um" in text else "0.05 mm"
-    for mark, remedy in ((PLUS_MINUS, f'half of it: "{half}"'), ("", f'or "{half}" where a radius is meant')):
-        with pytest.raises(PydanticCustomError, match="is a diameter where") as caught:
-            to_si(text, "m", mark)
-        assert caught.value.context
-        assert remedy in caught.value.context["remedy"]
-
-
-@pytest.mark.parametrize("text", ["±0.1 mm", "+-0.1 mm", "+/- 100 um"])
-def test_a_band_is_read_where_a_half_width_is_meant(text: str) -> None:
-    assert to_si(text, "m", PLUS_MINUS) == pytest.approx(1e-4)
-    for mark in ("", DIAMETER):
-        with pytest.raises(PydanticCustomError, match="is a band where another quantity is meant"):
-            to_si(text, "m", mark)
-    assert to_si(str(written(2e-4, "m", text)), "m", PLUS_MINUS) == pytest.approx(2e-4)
-
-
-@pytest.mark.parametrize("text", ["0.1 mm", "0.1 mm diam", "⌀-0.1 mm", "⌀", "dia", "±-0.1 mm", "⌀0.1 N", "⌀0.1"])
-def test_what_is_not_marked_as_a_diameter_is_none(text: str) -> None:
-    with pytest.raises(PydanticCustomError):
-        diameter(text)
-
-
-@pytest.mark.parametrize(
-    ("text", "degrees"),
-    [
-        *[("0°30'", 0.5), ("0° 30′", 0.5), ("30'", 0.5), ("-1°30'", -1.5), ("1°30.6'", 1.51), ("0°0'36\"", 0.01)],
-        *[("0°30'36\"", 0.51), ("0°30′36″", 0.51), ("0°30'36''", 0.51), ('36"', 0.01), ("1°0'3.6\"", 1.001)],
-    ],
-)
-def test_angles_in_minutes_and_seconds(text: str, degrees: float) -> None:
-    assert to_si(text, "rad") == pytest.approx(math.radians(degrees), rel=1e-14)
-    assert to_si(str(written(0.1, "rad", text)), "rad") == pytest.approx(0.1)
-
-
-@pytest.mark.parametrize("text", ["0°75'", "0°0'60\"", "1.5°30'", "0°30.5'10\"", "0°-30'", "°30'", "30'0.5 deg"])
-def test_what_is_no_angle_in_minutes(text: str) -> None:
-    with pytest.raises(PydanticCustomError, match="is not a number with a unit"):
-        to_si(text, "rad")
 
 
 def test_a_study_is_not_a_case_and_says_so(tmp_path: Path) -> None:

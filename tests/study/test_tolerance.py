@@ -244,7 +244,10 @@ def test_measured_entry_reads_a_column(tmp_path: Path) -> None:
         ({"distribution": "normal", "lower": "1 mm", "upper": "0 mm"}, "lower is not below upper"),
         ({"distribution": "uniform", "plus_minus": "0.1 mm", "cpk": 1.0}, "offset_t.cpk: unknown key"),
         ({"distribution": "uniform", "iso2768": "f"}, "iso2768 without nominal"),
-        ({"distribution": "uniform", "iso2768": "f", "nominal": "3 m"}, "3000 mm is outside the table"),
+        (
+            {"distribution": "uniform", "iso2768": "f", "nominal": "3 m"},
+            "nominal = 3 m: outside the table (0.5 mm to 2000 mm)",
+        ),
         ({"distribution": "uniform", "iso2768": "v", "nominal": "3 mm"}, "write one of 'f' or 'm'"),
         ({"distribution": "triangular", "plus_minus": "1 mm", "peak": "2 mm"}, "peak is outside"),
         ({"distribution": "lognormal", "plus_minus": "1 mm"}, "not above threshold"),

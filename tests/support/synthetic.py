@@ -39,7 +39,7 @@ def results(n, seed=8, failed=0, unsettled=0):
         own = scatter[:, : len(kind.places or (1,))].reshape(n, *kind.shape[:1], *(1 for _ in kind.parts[:1]))
         own = own * RISE.get(kind.name, 1.0)
         table[f"{kind.name}_max"] = np.array(BASE.get(kind.name, 100.0)) * (1.0 + own)
-        if kind.course:
+        if kind.averaged:
             table[f"{kind.name}_mean"] = 0.9 * table[f"{kind.name}_max"]
             table[f"{kind.name}_range"] = 0.2 * table[f"{kind.name}_max"]
     table["mode_share"][:, :, 1] = 1.0

@@ -1,8 +1,8 @@
 """How large is the numerical error of a campaign? Compare its joints with the same joints under other settings.
 
-Errors are relative to the largest load of the kind in the joint: a force to the largest |F| of its eight bushings, a
-torque to the largest |T|, a contact force to the largest one of the four pins, Psi to itself. Loads that a campaign
-does not store are NaN in all of its joints and are left out of these maxima.
+Errors are relative to the largest load of the kind in the joint: a force to the largest ``|F|`` of its eight bushings,
+a torque to the largest ``|T|``, a contact force to the largest one of the four pins, Psi to itself. Loads that a
+campaign does not store are NaN in all of its joints and are left out of these maxima.
 """
 
 from __future__ import annotations

@@ -15,11 +15,13 @@ from numpy.typing import ArrayLike
 
 from tolstat.analysis import exceedance, quantile
 from tolstat.analysis.exceedance import Ends, Exceedance, FloatArray, Sample
+from tolstat.common.shown import shown
 
 REFERENCE = 0.9986501019683699
 """Share of a normal distribution below mean + 3 sigma."""
 
 
+@shown
 @dataclass(frozen=True)
 class Capability:
     """Capability of a load against its upper limit.
@@ -64,7 +66,7 @@ class Capability:
         return 1e6 * self.above.estimate, 1e6 * self.above.outer_lower, 1e6 * self.above.outer_upper
 
 
-def at(
+def capability(
     values: ArrayLike,
     status: ArrayLike,
     limit: float,
@@ -95,13 +97,13 @@ def at(
     Raises
     ------
     ValueError
-        As `exceedance.at`.
+        As `exceedance.exceedance`.
 
     Examples
     --------
     >>> import numpy as np
     >>> load = np.random.default_rng(1).normal(650.0, 10.0, 5000)  # N
-    >>> found = at(load, [1] * 5000, limit=690.0)
+    >>> found = capability(load, [1] * 5000, limit=690.0)
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
@@ -109,7 +111,7 @@ def at(
 
 
 def of_sample(sample: Sample, limit: float, confidence: float = 0.95, iid: bool = True) -> Capability:
-    """Capability of one load from loads that are sorted already; other parameters as in `at`."""
+    """Capability of one load from loads that are sorted already; other parameters as in `capability`."""
     valid = sample.valid
     above = Exceedance(*exceedance.curve_of(sample, [limit], confidence, iid)[0].tolist())
     blank = (np.nan, np.nan, np.nan)

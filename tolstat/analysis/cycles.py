@@ -13,9 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.common.shown import shown
+
 FloatArray = NDArray[np.float64]
 
 
+@shown
 class Cycles(NamedTuple):
     """Rainflow cycles of joints, one revolution or a mixture of revolutions under several operating points.
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import quantile
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.common.shown import shown
 
 RESAMPLES = 500
 """Number of resamples in the bootstrap of paired quantiles."""
@@ -25,6 +26,7 @@ _REACH = 6.0
 _SEED = 20
 
 
+@shown
 class ShareDifference(NamedTuple):
     """Share of the joints above levels in two studies; arrays of shape (m,), one value a level.
 
@@ -61,6 +63,7 @@ class ShareDifference(NamedTuple):
     outer_upper: FloatArray
 
 
+@shown
 class Difference(NamedTuple):
     """A statistic in two studies: its values `a` and `b`, `estimate` = b - a, and the interval of that."""
 
@@ -146,7 +149,7 @@ def quantiles(
         As `shares`.
     """
     x, y = _valid(*_sides(a, b, paired), paired)
-    of_a, of_b = (quantile.at(side, np.ones(side.size, int), share, confidence) for side in (x, y))
+    of_a, of_b = (quantile.quantile(side, np.ones(side.size, int), share, confidence) for side in (x, y))
     estimate = of_b.estimate - of_a.estimate
     lower, upper = np.nan, np.nan
     if iid and paired and min(share, 1.0 - share) * x.size >= BEYOND:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.common.shown import shown
 from tolstat.common.tables import UNSETTLED, VALID, Status
 
 FloatArray = NDArray[np.float64]
@@ -21,6 +22,7 @@ Table = NDArray[np.void]
 Mask = NDArray[np.bool_]
 
 
+@shown
 @dataclass(frozen=True)
 class Exceedance:
     """Share of the joints whose load is above a level.
@@ -179,7 +181,7 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) ->
 def simultaneous(n: int, confidence: float = 0.95) -> float:
     """Half width of the simultaneous band of the exceedance curve (Dvoretzky, Kiefer and Wolfowitz 1956).
 
-    With the constant of Massart (1990): P(sup |estimate - truth| > e) <= 2 exp(-2 n e^2), for every distribution.
+    With the constant of Massart (1990): ``P(sup |estimate - truth| > e) <= 2 exp(-2 n e^2)``, for every distribution.
 
     Parameters
     ----------
@@ -255,7 +257,7 @@ def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
     return float(high)
 
 
-def at(
+def exceedance(
     values: ArrayLike,
     status: ArrayLike,
     level: float,
@@ -287,7 +289,7 @@ def at(
     Examples
     --------
     >>> load = [640.0, 655.0, 720.0, 690.0]  # N, the largest of each joint
-    >>> found = at(load, status=[1, 1, 1, 2], level=700.0)  # the last joint has not settled
+    >>> found = exceedance(load, status=[1, 1, 1, 2], level=700.0)  # the last joint has not settled
     >>> found.count, round(found.estimate, 3), round(found.lower, 4), round(found.upper, 3)
     (1, 0.333, 0.0084, 0.906)
     >>> found.bound_lower, found.bound_upper
@@ -310,7 +312,7 @@ def curve(
     Parameters
     ----------
     values, status, confidence, iid
-        As in `at`.
+        As in `exceedance`.
     levels : array_like, shape (m,), optional
         Levels in the unit of the values. By default every value that a valid joint has, ascending; between
         two of them the share does not change, so that the table is the whole step curve.

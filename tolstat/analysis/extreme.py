@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from tolstat.analysis import exceedance, pareto
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.shown import shown
 
 MIN_EXCESSES = 50
 """Minimum number of excesses for a fit."""
@@ -36,6 +37,7 @@ class TooThinError(ValueError):
         )
 
 
+@shown
 class Estimate(NamedTuple):
     """A number and its interval; NaN ends for dependent samples."""
 
@@ -44,6 +46,7 @@ class Estimate(NamedTuple):
     upper: float
 
 
+@shown
 @dataclass(frozen=True)
 class Tail:
     """Generalised Pareto tail of a load.

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.common.shown import shown
 
 GRID, NEAR = 400, 0.1
 """Low-fidelity loads among which a quantile is searched, and half width of the shares that they span."""
@@ -25,6 +26,7 @@ LEAST_LEFT = 1e-3
 pairs than means."""
 
 
+@shown
 class Allocation(NamedTuple):
     """Gain of two fidelities, and optimal split of the work between them.
 
@@ -48,6 +50,7 @@ class Allocation(NamedTuple):
         return high, max(high, int((budget - high * cost_high) / cost_low))
 
 
+@shown
 class Estimate(NamedTuple):
     """A statistic of the high fidelity.
 

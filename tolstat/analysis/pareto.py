@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis.exceedance import FloatArray
 
 STRAIGHT = 1e-8
-"""|k| below which the tail counts as exponential."""
+"""``|k|`` below which the tail counts as exponential."""
 
 
 def fit(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -13,11 +13,13 @@ from numpy.typing import ArrayLike
 
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.sensitivity import normal_half
+from tolstat.common.shown import shown
 
 FEWEST = 50
 """Minimum number of points for an index."""
 
 
+@shown
 class Index(NamedTuple):
     """An index of each group, shape (d,), with its interval."""
 
@@ -26,6 +28,7 @@ class Index(NamedTuple):
     upper: FloatArray
 
 
+@shown
 class Indices(NamedTuple):
     """Sobol' indices.
 

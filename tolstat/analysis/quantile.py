@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis.exceedance import FloatArray, Sample, sort_out
+from tolstat.common.shown import shown
 
 
+@shown
 class Quantile(NamedTuple):
     """Load that a share of the joints stays at or below.
 
@@ -43,7 +45,9 @@ class Quantile(NamedTuple):
     bound_upper: float
 
 
-def at(values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0.95, iid: bool = True) -> Quantile:
+def quantile(
+    values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0.95, iid: bool = True
+) -> Quantile:
     """Quantile of a load over the joints.
 
     Parameters
@@ -69,7 +73,7 @@ def at(values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0
 
     Examples
     --------
-    >>> found = at(range(1, 101), [1] * 100, share=0.9)
+    >>> found = quantile(range(1, 101), [1] * 100, share=0.9)
     >>> found.estimate, found.lower, found.upper
     (90.0, 84.0, 96.0)
     """
@@ -77,7 +81,7 @@ def at(values: ArrayLike, status: ArrayLike, share: float, confidence: float = 0
 
 
 def of_sample(sample: Sample, share: float, confidence: float = 0.95, iid: bool = True) -> Quantile:
-    """Quantile of a load from loads that are sorted already; other parameters and errors raised as in `at`."""
+    """Quantile of a load from loads that are sorted already; other parameters and errors raised as in `quantile`."""
     if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
         raise ValueError(f"share {share} and confidence {confidence} must lie between 0 and 1")
     x, missing = sample.valid, sample.n_unresolved

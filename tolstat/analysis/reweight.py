@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import pareto
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.common.shown import shown
 
 LEAST_ESS = 50
 """Minimum effective number of joints for usable weights."""
@@ -46,6 +47,7 @@ class Weights(NamedTuple):
         return self.k < self.allowed and self.ess >= LEAST_ESS
 
 
+@shown
 class Share(NamedTuple):
     """Share of the joints above a level, under the new tolerances.
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.shown import shown
 
 FEWEST = 50
 """Minimum number of joints for an index."""
@@ -23,6 +24,7 @@ MOST = 20_000
 """Maximum number of joints used for interactions: memory is some 3 kB a joint and error, and more joints add little."""
 
 
+@shown
 class FirstOrder(NamedTuple):
     """Shares of a load's variance that each error explains on its own.
 
@@ -41,6 +43,7 @@ class FirstOrder(NamedTuple):
     variance: FloatArray
 
 
+@shown
 class Total(NamedTuple):
     """Shares of a load's variance in which each error takes part.
 

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.common.shown import shown
 
 Noise = Callable[[int, int, int], FloatArray]
 FIRST_STEP = 0.6
@@ -38,6 +39,7 @@ LEAST = 1e-12
 """Probability below which no further level starts: normal scores reach the end of double precision not far from it."""
 
 
+@shown
 class Settings(NamedTuple):
     """Limit, and number of joints, of a subset simulation.
 
@@ -74,6 +76,7 @@ class Candidates(NamedTuple):
     parent: NDArray[np.intp]
 
 
+@shown
 class Level(NamedTuple):
     """Statistics of a completed level.
 
@@ -101,6 +104,7 @@ class Level(NamedTuple):
     step: float
 
 
+@shown
 class Estimate(NamedTuple):
     """Estimated probability of a load above the limit.
 

@@ -18,11 +18,13 @@ from scipy.special import betaincinv
 from tolstat.analysis.exceedance import CURVE, Ends, Exceedance, FloatArray, Table, clopper_pearson, split
 from tolstat.analysis.quantile import Quantile
 from tolstat.analysis.reweight import smooth
+from tolstat.common.shown import shown
 
 LEAST_EFFECTIVE = 20.0
 """Minimum effective number of joints above a level for a trusted share."""
 
 
+@shown
 class Trust(NamedTuple):
     """Diagnostics of the weights above a level.
 
@@ -164,7 +166,9 @@ def curve_of(sample: Sample, levels: ArrayLike | None = None, confidence: float 
     return table
 
 
-def at(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, confidence: float = 0.95) -> Exceedance:
+def weighted_exceedance(
+    values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, confidence: float = 0.95
+) -> Exceedance:
     """Share of the joints above one level; parameters and errors raised as in `curve`.
 
     Returns
@@ -179,7 +183,7 @@ def at(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, c
     >>> rng = np.random.default_rng(1)
     >>> loads = rng.standard_normal(4000) + 4.0 * (np.arange(4000) % 2)
     >>> weights = 1.0 / (0.5 + 0.5 * np.exp(4.0 * loads - 8.0))
-    >>> found = at(loads, np.ones(4000, int), weights, 4.0)
+    >>> found = weighted_exceedance(loads, np.ones(4000, int), weights, 4.0)
     >>> found.lower < 3.167e-5 < found.upper, f"{found.estimate:.1e}"
     (True, '3.2e-05')
     """
@@ -187,7 +191,7 @@ def at(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, c
 
 
 def trust(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float) -> Trust:
-    """Diagnose whether the share above a level can be trusted; parameters as in `at`."""
+    """Diagnose whether the share above a level can be trusted; parameters as in `weighted_exceedance`."""
     return trust_of(sort_out(values, status, weights), level)
 
 
@@ -215,7 +219,7 @@ def quantile(
     Returns
     -------
     Quantile
-        As from `quantile.at`, which is for equal weights.
+        As from `quantile.quantile`, which is for equal weights.
     """
     return quantile_of(sort_out(values, status, weights), share, confidence)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tolstat.campaign import executors
 from tolstat.campaign.executors import Lost
 from tolstat.common.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 from tolstat.store.provenance import versions
 from tolstat.store.recorded import perturbed, settings, variants
 
@@ -156,8 +156,8 @@ class Finished(NamedTuple):
     trouble: str
 
 
-def pending(store: ResultStore, stop_slot: int) -> Iterator[NDArray[np.intp]]:
-    """Yield the pending file slots below `stop_slot`, in arrays as from `ResultStore.pending_blocks`."""
+def pending(store: Reader, stop_slot: int) -> Iterator[NDArray[np.intp]]:
+    """Yield the pending file slots below `stop_slot`, in arrays as from `Reader.pending_blocks`."""
     for slots in store.pending_blocks():
         if slots[0] >= stop_slot:
             return
@@ -165,7 +165,7 @@ def pending(store: ResultStore, stop_slot: int) -> Iterator[NDArray[np.intp]]:
 
 
 def simulate_pending(
-    study: Study, store: ResultStore, stop_slot: int, stages: Stages, execution: Execution, stop: Callable[[], bool]
+    study: Study, store: Reader, stop_slot: int, stages: Stages, execution: Execution, stop: Callable[[], bool]
 ) -> Generator[Finished, None, None]:
     """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true.
 
@@ -223,7 +223,7 @@ def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec])
 
 
 def _blocks(
-    study: Study, store: ResultStore, stop_slot: int, pace: Pace, perturb: Callable[..., NDArray[np.void]]
+    study: Study, store: Reader, stop_slot: int, pace: Pace, perturb: Callable[..., NDArray[np.void]]
 ) -> Iterator[Block]:
     """Yield the pending file slots below `stop_slot` as blocks whose joints have the same solver options."""
     variant_options = [settings(solver, store.fidelity) for solver in study.solvers]

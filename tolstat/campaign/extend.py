@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
-from tolstat.store import Counts, ResultStore
+from tolstat.store import Counts, Reader, ResultStore
 from tolstat.store.assembly import DifferingResults, assemble, check_free
 from tolstat.store.recall import differing_keys, recall
 from tolstat.store.result_file import BLOCK
@@ -74,7 +74,7 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
     StoreError
         When the file cannot be used or replaced.
     """
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         _check_extendable(store, n)
         study = recall(store, n, study_path)
         more = range(store.n, study.rows)
@@ -140,7 +140,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
     """
     check_free(out)
     with ExitStack() as opened:
-        stores = [opened.enter_context(ResultStore.open(path)) for path in paths]
+        stores = [opened.enter_context(Reader.open(path)) for path in paths]
         stores.sort(key=lambda store: (store.rows[0], store.rows.stop))
         _check_one_campaign(stores)
         attrs = stores[0].attributes()
@@ -156,11 +156,11 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
             found = f"hold different results of row {error.row}: {error.column} differs"
             remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {error.row}"
             raise InputError([Fault(" and ".join(holding), found, remedy)]) from None
-    with ResultStore.open(out) as store:
+    with Reader.open(out) as store:
         return Merged(store.counts(), sum(len(s.rows) for s in stores) - store.n)
 
 
-def _check_extendable(store: ResultStore, n: int) -> None:
+def _check_extendable(store: Reader, n: int) -> None:
     place, held = str(store.path), store.sampling["n"]
     faults = []
     reason = NOT_EXTENDABLE.get(store.sampling["method"])
@@ -178,7 +178,7 @@ def _check_extendable(store: ResultStore, n: int) -> None:
         raise InputError(faults)
 
 
-def _check_one_campaign(stores: Sequence[ResultStore]) -> None:
+def _check_one_campaign(stores: Sequence[Reader]) -> None:
     first = stores[0]
     faults = []
     for store in stores[1:]:
@@ -205,13 +205,13 @@ def _check_one_campaign(stores: Sequence[ResultStore]) -> None:
         raise InputError(faults)
 
 
-def _unfinished(store: ResultStore) -> Fault:
+def _unfinished(store: Reader) -> Fault:
     """Return the fault of a campaign with histories that has pending joints."""
     remedy = f"simulate them first: tolstat run STUDY --out {store.path}"
     return Fault(str(store.path), "has pending joints, whose load histories are missing", remedy)
 
 
-def _missing(stores: Sequence[ResultStore]) -> list[range]:
+def _missing(stores: Sequence[Reader]) -> list[range]:
     """Rows of the campaign that no file holds."""
     missing, covered = [], 0
     for store in stores:
@@ -223,7 +223,7 @@ def _missing(stores: Sequence[ResultStore]) -> list[range]:
     return missing
 
 
-def _shares(stores: Sequence[ResultStore]) -> Iterator[tuple[ResultStore, int]]:
+def _shares(stores: Sequence[Reader]) -> Iterator[tuple[Reader, int]]:
     """Yield each file that adds rows to those of the files before it, and the first file slot that does."""
     covered = 0
     for store in stores:
@@ -232,8 +232,6 @@ def _shares(stores: Sequence[ResultStore]) -> Iterator[tuple[ResultStore, int]]:
             covered = store.rows.stop
 
 
-def _blocks(
-    store: ResultStore, read: Callable[[slice], NDArray[np.void]], begin: int = 0
-) -> Iterator[NDArray[np.void]]:
+def _blocks(store: Reader, read: Callable[[slice], NDArray[np.void]], begin: int = 0) -> Iterator[NDArray[np.void]]:
     for first in range(begin, store.n, BLOCK):
         yield read(slice(first, first + BLOCK))

@@ -21,9 +21,10 @@ from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, origin_blocks, streams
 from tolstat.solver import refinement
 from tolstat.solver.simulation import history_specs, simulate_rows
-from tolstat.store.histories import attach_scales, create_dataset
+from tolstat.store.axes import attach_scales
+from tolstat.store.histories import create_dataset, create_group
+from tolstat.store.new_file import attributes, fill
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.store.result_file import attributes, fill
 from tolstat.study.tolerances import meaning
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ QUANTILES = (0.95, 0.99, 0.999)
 ORDINARY = 680.0
 """Work of a joint that does not rattle, from `studies/iso2768_f.toml` with the default settings, Newton iterations."""
 CONFIDENCE = 0.95
+DRAWN = 1 << 14
+"""Largest number of joints whose clearances are computed."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,23 @@ class Reversals:
 
 
 @dataclass(frozen=True)
+class Assembly:
+    """Joints that do not go together, because a pin is larger than its hole: they have no result.
+
+    Attributes
+    ----------
+    misfits, of : int
+        Number of such joints, and of joints whose clearances were computed: the first `DRAWN` of the campaign.
+    interval : tuple of float, optional
+        Clopper-Pearson interval of their share; None if samples are not independent.
+    """
+
+    misfits: int
+    of: int
+    interval: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
 class Plan:
     """Predicted cost and precision of a campaign.
 
@@ -115,6 +135,10 @@ class Plan:
         Predictions for the study's limits; empty if samples are not independent.
     reversals : Reversals
         Joints that rattle.
+    assembly : Assembly
+        Joints that do not go together.
+    fit : list of str
+        What the fit of the study means, as lines of text; empty without one.
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
     wilks : dict of float to int
@@ -136,6 +160,8 @@ class Plan:
     limits: list[LimitPlan]
     wilks: dict[float, int]
     reversals: Reversals
+    assembly: Assembly
+    fit: list[str]
     tolerances: list[dict[str, Any]]
 
 
@@ -182,8 +208,18 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT) -> Plan:
         limits=_limits(study, simulation.results[valid]) if iid else [],
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(params, simulation.results),
+        assembly=_assembly(study, iid),
+        fit=[] if study.fit is None else study.fit.meaning,
         tolerances=text.records(meaning.table(study.entries)),
     )
+
+
+def _assembly(study: Study, iid: bool) -> Assembly:
+    rows = np.arange(study.first_sample, min(study.rows, study.first_sample + DRAWN))
+    errors = draw(study, range(rows[0], rows[-1] + 1))
+    misfits = int((perturbed(study, rows, errors, perturb)["clearance"] < 0.0).any(axis=1).sum())
+    lower, upper = exceedance.clopper_pearson(misfits, rows.size, CONFIDENCE)
+    return Assembly(misfits, rows.size, (float(lower), float(upper)) if iid else None)
 
 
 def _reversals(params: NDArray[np.void], results: NDArray[np.void]) -> Reversals:
@@ -228,7 +264,7 @@ def _width(share: float, n: int) -> float:
 def _limits(study: Study, results: NDArray[np.void]) -> list[LimitPlan]:
     plans = []
     for name, level in study.limits.items():
-        found = exceedance.at(
+        found = exceedance.exceedance(
             LOADS[name].of(results), results["status"], level, CONFIDENCE, ends=LOADS[name].ends(results)
         )
         valid = found.n - found.n_failed - found.n_unsettled
@@ -247,15 +283,20 @@ def _file_bytes(
     origin = origin_blocks(study, range(n))
     with h5py.File("pilot", "w", driver="core", backing_store=False, block_size=512) as file:
         fill(file, attributes(study, specs, dimensions(), options, choice), range(n), [errors], design, origin)
-        groups = [group for group in file.values() if isinstance(group, h5py.Group)]
-        datasets = [file["row"], *(dataset for group in groups for dataset in group.values())]
-        group = file.create_group("histories") if specs else file
+        group = create_group(file) if specs else file
         for name, spec in specs.items():
-            datasets.append(create_dataset(group, name, n, spec))
-            datasets[-1][...] = simulation.histories[name]
-            attach_scales(datasets[-1], file["row"], spec)
+            dataset = create_dataset(group, name, n, spec)
+            dataset[...] = simulation.histories[name]
+            attach_scales(dataset, file["row"], spec)
         file.flush()
-        by_row = sum(dataset.id.get_storage_size() for dataset in datasets) / n
+        sizes: list[int] = []
+
+        def add(_: str, item: h5py.HLObject) -> None:  # called once for each dataset, also where groups share it
+            if isinstance(item, h5py.Dataset) and item.shape[:1] == (n,):
+                sizes.append(item.id.get_storage_size())
+
+        file.visititems(add)
+        by_row = sum(sizes) / n
         return int(file.id.get_filesize() + by_row * (study.rows - n))
 
 

@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from tolstat.campaign.trace import CaseResult
 from tolstat.common.columns import Column
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.shown import shown
 from tolstat.common.tables import Options, Status
 from tolstat.solver.simulation import simulate_rows, warm_up
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 from tolstat.store.provenance import versions
 from tolstat.store.recorded import options_of, parameters
 
 
+@shown
 class Difference(NamedTuple):
     """A value that differs from the stored one.
 
@@ -41,6 +43,7 @@ class Difference(NamedTuple):
         return abs(self.now - self.stored) / max(abs(self.now), abs(self.stored))
 
 
+@shown
 class Replay(NamedTuple):
     """A joint simulated again.
 
@@ -65,12 +68,12 @@ class Replay(NamedTuple):
     code: list[str]
 
 
-def replay(store: ResultStore, row: int) -> Replay:
+def replay(store: Reader, row: int) -> Replay:
     """Simulate a joint of a campaign again and compare with the stored results.
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         The result file.
     row : int
         Row of the campaign.
@@ -118,7 +121,7 @@ def _different_results(
     return found
 
 
-def _different_histories(store: ResultStore, row: int, params: NDArray[np.void], options: Options) -> list[Difference]:
+def _different_histories(store: Reader, row: int, params: NDArray[np.void], options: Options) -> list[Difference]:
     kind: Any = store.identity["output.histories"]
     now = simulate_rows(params, options, kind, store.identity["output.harmonics"]).histories
     found = []

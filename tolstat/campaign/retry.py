@@ -11,6 +11,7 @@ import numpy as np
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.solver_options import to_names
 from tolstat.common.tables import HistorySpec, Options, Status
 from tolstat.solver import fidelity
 from tolstat.store import ResultStore
@@ -46,7 +47,7 @@ class Retry(NamedTuple):
     def entry(self) -> dict[str, Any]:
         """Return the entry for `retries` of the result file."""
         status = [state.label for state in self.status]
-        return {"status": status, "settings": self.settings, "options": self.options._asdict()}
+        return {"status": status, "settings": self.settings, "options": to_names(self.options)}
 
 
 def parse(statuses: str, settings: Sequence[str], study: Study) -> Retry:

@@ -21,7 +21,7 @@ from tolstat.campaign.retry import Retry, begin
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
 from tolstat.solver import fidelity, rainflow
-from tolstat.store import Counts, ResultStore
+from tolstat.store import Counts, Reader, ResultStore
 from tolstat.store.provenance import versions
 from tolstat.store.recall import differing_keys
 from tolstat.store.recorded import perturbed, settings
@@ -183,7 +183,7 @@ def _create_or_resume(
         errors = stages.draw(study, rows)
         origin = stages.origins(study, rows)
         return ResultStore.create(path, study, errors, histories, stages.dimensions(), rows, options, choice, origin)
-    store = ResultStore.open(path, "r+")
+    store = ResultStore.open_to_write(path)
     try:
         _check_same(store, study, rows)
         store.update_study(study)
@@ -200,7 +200,7 @@ def _check_part(part: range, n: int) -> None:
         raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {n}")])
 
 
-def _rows_of(study: Study, store: ResultStore, stages: Stages, rows: NDArray[np.intp]) -> NDArray[np.void]:
+def _rows_of(study: Study, store: Reader, stages: Stages, rows: NDArray[np.intp]) -> NDArray[np.void]:
     """Return the parameters of the joints in file slots `rows`, (m,) table PARAM."""
     errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
     return perturbed(study, store.row(rows), errors, stages.perturb)
@@ -230,13 +230,13 @@ def _min_steps(histories: str, n_harmonics: int) -> int:
     return max(harmonics, rainflow.MIN_SAMPLES if "cycles" in histories else 0)
 
 
-def _check_same(store: ResultStore, study: Study, rows: range) -> None:
+def _check_same(store: Reader, study: Study, rows: range) -> None:
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     found, remedy = "is the result file of another study", "give another file: --out OTHER.h5"
     if not differing:
         code = f"commit {store.git_commit}" if store.git_commit else "the version that began it"
         found = "was begun by another version of the code"
-        remedy = f"give another file: --out OTHER.h5, or resume with {code}"
+        remedy = f"run the study into another file (--out OTHER.h5), or resume with {code}"
     now = versions()
     for name, noun in (("tolstat", "version"), ("sources", "hash")):
         held = store.versions.get(name, "unknown")

@@ -19,7 +19,7 @@ from tolstat.analysis import exceedance
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import LOADS
-from tolstat.store import ResultStore
+from tolstat.store import Reader, ResultStore
 from tolstat.store.result_file import BLOCK
 from tolstat.study import rule as rules
 
@@ -176,30 +176,28 @@ def run_until(study: Study, out: Path, rule: Rule, run: Callable[[int], object])
         raise InputError([Fault("--until", found, 'write sampling.method = "random" in the study')])
     if not selected_results.holds(study.output.columns, rule.load):
         remedy = f"add {', '.join(LOADS[rule.load].columns)}"
-        raise InputError(
-            [Fault(f"{study.path}: output.results", f"leaves out {rule.load}, which --until needs", remedy)]
-        )
+        raise InputError([study.fault("output.results", f"leaves out {rule.load}, which --until needs", remedy)])
     planned = looks(rule.width, study.samples)
     first = study.first_sample
     for joints in planned:
         run(first + joints)
-        with ResultStore.open(out) as store:
+        with Reader.open(out) as store:
             look = _look(store, rule, range(first, first + joints), len(planned))
         if look.upper - look.lower < rule.width:
             break
     outcome = Outcome(look.upper - look.lower < rule.width, look, planned)
     if outcome.reached:
-        with ResultStore.open(out, "r+") as store:
+        with ResultStore.open_to_write(out) as store:
             store.record_stop(outcome.record(rule))
     return outcome
 
 
-def _look(store: ResultStore, rule: Rule, rows: range, n_looks: int) -> Look:
+def _look(store: Reader, rule: Rule, rows: range, n_looks: int) -> Look:
     count = unresolved = 0
     for begin in range(0, len(rows), BLOCK):
         block = rows[begin : begin + BLOCK]
         results = store.results(slice(block.start, block.stop))
-        part = exceedance.at(LOADS[rule.load].of(results), results["status"], rule.level, iid=False)
+        part = exceedance.exceedance(LOADS[rule.load].of(results), results["status"], rule.level, iid=False)
         count += part.count
         unresolved += part.n_failed + part.n_unsettled
     return Look(len(rows), unresolved, count, *interval(count, unresolved, len(rows), n_looks))

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from tolstat.campaign.executors import Lost, Work, map_in_processes, map_serially
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.solver_options import to_names
 from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
-from tolstat.store import Counts, ResultStore, recorded, verification
+from tolstat.store import Counts, Reader, ResultStore, recorded, verification
 from tolstat.store.provenance import versions
 from tolstat.store.verification import Check, Verification
 
@@ -117,7 +118,7 @@ def run_checks(
             results = _references(params, own, workers, progress)
         else:
             results = solve_by_options(partial(_plain, simulate), params, own)
-        checks[name] = Check(DESCRIPTION[name], own[0]._asdict(), results)
+        checks[name] = Check(DESCRIPTION[name], to_names(own[0]), results)
     return checks
 
 
@@ -172,7 +173,7 @@ def solve_by_options(
 
 
 def check_campaign(
-    store: ResultStore,
+    store: Reader,
     parameters: Callable[[NDArray[np.intp]], NDArray[np.void]],
     names: Iterable[str],
     joints: int | None,
@@ -185,7 +186,7 @@ def check_campaign(
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         Result file of the campaign.
     parameters : callable
         File slots (m,) -> their parameters, (m,) table PARAM.
@@ -290,7 +291,7 @@ def check_file(
         When `joints` is neither a positive integer nor ``"all"``.
     """
     number = parse_joints(joints)
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         if any(store.versions.get(key) != value for key, value in versions().items() if key in ("tolstat", "sources")):
             remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
             raise StoreError(str(Fault(str(path), "was made by another version of the code", remedy)))
@@ -324,7 +325,7 @@ def check_study(
     number = parse_joints(joints)
     if plan.solver.fidelity == "auto":
         found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
-        raise InputError([Fault(f"{plan.path}: solver.fidelity", found, remedy)])
+        raise InputError([plan.fault("solver.fidelity", found, remedy)])
     seed = plan.sampling.seed if seed is None else seed
     first = 0 if number is None else plan.first_sample
     rows = choose(np.arange(first, plan.rows), number, seed)

@@ -58,12 +58,12 @@ def allocate(
     from tolstat.common.files import check_target
     from tolstat.display import text
     from tolstat.questions.allocate.query import allocated
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
     from tolstat.study.scaling import line
 
     if out is not None:
         check_target(out, file)
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         found = allocated(store.view(study_file), limit, costs, keep or ())
     if out is not None:
         content = found.text

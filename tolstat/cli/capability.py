@@ -32,9 +32,9 @@ def capability(
     from tolstat.display import text
     from tolstat.display.table import as_text as aligned
     from tolstat.questions.capability import query, rendering
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         view = store.view()
         if not view.limits or view.method in ("sweep", "cases"):
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'

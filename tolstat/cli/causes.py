@@ -83,13 +83,13 @@ def causes(
         return
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
     if points is not None:
         file = _run_design(file, points, groups, out, workers)
     elif out is not None:
         raise InputError([Fault("--out", "is used with --pick-freeze only", "add --pick-freeze 1024")])
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         found = causes_of(store.view(study_file), by, log=log)
     if as_json:
         typer.echo(as_text(rendering.values(found)))
@@ -116,12 +116,12 @@ def _against_angle(file: Path, by: str, n: int, log: bool, out: Path, joints: in
     from tolstat.common.files import check_target
     from tolstat.questions.causes import angles_figure
     from tolstat.questions.causes.angles import against_angle
-    from tolstat.store import ResultStore, revolutions
+    from tolstat.store import Reader, revolutions
 
     figure = out.with_suffix(".png")
     for path in (out, figure):
         check_target(path, file)
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         view = store.view(study_file)
         if not revolutions.held(store):
             announce_compilation()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
     from tolstat.store.view import View
 
 
@@ -35,6 +35,10 @@ def export(
         str | None,
         typer.Option("--parquet", metavar="OUT", help="Write errors and results as Parquet (needs pyarrow)."),
     ] = None,
+    workbook: Annotated[
+        str | None,
+        typer.Option("--xlsx", metavar="OUT", help="Write joints, limits and units as Excel file (needs openpyxl)."),
+    ] = None,
     statistics: Annotated[
         str | None,
         typer.Option("--json", metavar="OUT", help="Write all statistics as JSON; - for standard output."),
@@ -43,14 +47,21 @@ def export(
         list[str] | None,
         typer.Option("--by", metavar="LOAD", help="With --json: load whose causes are included; repeatable."),
     ] = None,
+    nominal: Annotated[
+        bool,
+        typer.Option("--nominal", help="Include the joint without errors, marked by a column."),
+    ] = False,
 ) -> None:
     """Export joints, load cycles or statistics to files.
 
     --csv writes one row per joint: its errors, then its results, in SI units. If the study lists its joints, case and
     variant come first. Pending and failed joints are included; unknown values are empty. The first line has the names
-    of the columns, the second their units: read it with pandas.read_csv(OUT, header=[0, 1]).
+    of the columns, the second their units: read it with pandas.read_csv(OUT, header=[0, 1], index_col=0). The joint
+    without errors is left out unless --nominal is given.
 
     --parquet writes the same columns; pandas has their units in frame.attrs["units"].
+
+    --xlsx writes three sheets: the same columns, the share above each limit, the unit and meaning of each column.
 
     --json writes the share above each limit, quantiles, capability, the numerical error and the software versions.
 
@@ -60,16 +71,19 @@ def export(
     Example: tolstat export iso2768_f.h5 --csv joints.csv
     """
     from tolstat.common.files import check_target
-    from tolstat.store import ResultStore
+    from tolstat.report import workbook as excel
+    from tolstat.store import Reader
 
-    given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--json": statistics}
+    given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--xlsx": workbook, "--json": statistics}
     targets = [target for target in given.values() if target is not None]
     if not targets or len(set(targets)) < len(targets):
         raise typer.BadParameter(
-            "give one or more of --csv OUT, --parquet OUT, --json OUT and --pylife OUT, each with its own file"
+            "give one or more of --csv, --parquet, --xlsx, --json and --pylife, each with its own file OUT"
         )
     if by and statistics is None:
         raise typer.BadParameter("--by is used with --json only: add --json OUT")
+    if nominal and (out, parquet, workbook, cycles) == (None, None, None, None):
+        raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
     if parquet is not None and find_spec("pyarrow") is None:
         raise InputError(
             [Fault("--parquet", "pyarrow is not installed", "install it with: pip install pyarrow, or use --csv OUT")]
@@ -77,14 +91,20 @@ def export(
     for target in targets:
         if target != "-":
             check_target(Path(target), file)
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
+        if workbook is not None:
+            excel.check(store, "--xlsx")
         if cycles is not None:
-            _write(cycles, *_collectives(store.view()))
+            _write(cycles, *_collectives(store.view(), nominal))
         if statistics is not None:
             _write(statistics, *_statistics(store, by or ()))
-        if out is None and parquet is None:
+        if out is None and parquet is None and workbook is None:
             return
-        frame = store.to_pandas(units=True)
+        frame = store.to_pandas(nominal)
+        if workbook is not None:
+            with output_file(Path(workbook)) as temporary:
+                excel.write(store, frame, temporary)
+            say(f"wrote {workbook}: {len(frame)} joints")
     if out is not None:
         _write(out, lambda stream: _write_table(frame, stream), f"{len(frame)} joints")
     if parquet is not None:
@@ -103,15 +123,15 @@ def _write(out: str, write: Callable[[TextIO], object], what: str) -> None:
     say(f"wrote {out}: {what}")
 
 
-def _collectives(view: View) -> tuple[Callable[[TextIO], None], str]:
+def _collectives(view: View, nominal: bool) -> tuple[Callable[[TextIO], None], str]:
     from tolstat.questions.fatigue import pylife
 
-    table = pylife.table(pylife.pylife_series(view))
+    table = pylife.table(pylife.pylife_series(view, nominal=nominal))
     what = f"cycles of {table['joint'].nunique()} joints"
     return lambda stream: table.to_csv(stream, index=False, lineterminator="\n"), what
 
 
-def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
+def _statistics(store: Reader, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
     from tolstat.report import summary
@@ -123,17 +143,14 @@ def _statistics(store: ResultStore, by: Sequence[str]) -> tuple[Callable[[TextIO
 
 
 def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
-    plain = frame.droplevel(1, axis=1)
-    plain.attrs["units"] = dict(zip(*(frame.columns.get_level_values(k) for k in (0, 1)), strict=True))
     with output_file(path) as temporary:
-        plain.to_parquet(temporary, engine="pyarrow")
+        frame.to_parquet(temporary, engine="pyarrow")
 
 
 def _write_table(frame: pd.DataFrame, stream: TextIO) -> None:
     import csv
 
     heads = csv.writer(stream, lineterminator="\n")
-    names, units = zip(*frame.columns, strict=True)
-    heads.writerow(["row", *names])
-    heads.writerow(["1", *units])
+    heads.writerow(["row", *frame.columns])
+    heads.writerow(["1", *frame.attrs["units"].values()])
     frame.to_csv(stream, header=False, lineterminator="\n")

@@ -53,13 +53,13 @@ def fatigue(
     from tolstat.display.table import as_text
     from tolstat.questions.fatigue import query, rendering
     from tolstat.questions.fatigue.counting import channels
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
     if csv:
         check_target(csv, *files)
     names = channels(channel) if channel else None
     with ExitStack() as stack:
-        views = [stack.enter_context(ResultStore.open(file)).view() for file in files]
+        views = [stack.enter_context(Reader.open(file)).view() for file in files]
         loading = query.load_cycles(views, share or [1.0], names)
     loads, damages = query.equivalent_loads(loading), query.damages(loading)
     shown = [] if channel else query.most_loaded(loads)

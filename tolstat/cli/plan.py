@@ -53,10 +53,12 @@ def _lines(made: Plan) -> str:
         f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
         *([made.fidelity] if made.fidelity else []),
         *_rattle_warning(made),
+        *_misfit_warning(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
         f"time: {_duration(made.seconds)} on {made.workers} cores",
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",
+        *made.fit,
     ]
     lines += [f"width of the 95 % interval at P = {share:g}: {width:.2g}" for share, width in made.widths.items()]
     lines += [
@@ -93,6 +95,18 @@ def _rattle_warning(made: Plan) -> list[str]:
         return []
     reason = f"warning: the torque reverses in {found.joints} of {made.pilot} joints: inertia torque up to"
     return [f"{reason} {found.torque:.3g} N*m; these joints rattle and cost {found.cost:.2g} times as much as others"]
+
+
+def _misfit_warning(made: Plan) -> list[str]:
+    """Warning about joints that do not go together, if there are any."""
+    found = made.assembly
+    if not found.misfits:
+        return []
+    reason = "have a pin larger than its hole and cannot be simulated"
+    share = ""
+    if found.interval is not None:
+        share = "; 95 % interval of their share {:.2g} to {:.2g} %".format(*(100.0 * end for end in found.interval))
+    return [f"warning: {found.misfits} of {found.of} joints {reason}{share}"]
 
 
 def _duration(seconds: float) -> str:

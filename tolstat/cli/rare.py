@@ -117,9 +117,9 @@ def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study
 
 def _recall(source: Path, study_file: Path | None, given: list[Any]) -> Study:
     from tolstat.common.errors import StoreError
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
-    with ResultStore.open(source) as store:
+    with Reader.open(source) as store:
         if store.sampling["method"] != "subset":
             found = "is not a result file of tolstat rare"
             remedy = 'give the study: tolstat rare STUDY --limit "cross1.F > 900 N" --out FILE'

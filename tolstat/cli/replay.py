@@ -25,20 +25,20 @@ def replay(
 ) -> None:
     """Simulate one joint again and compare with the file.
 
-    Uses the joint, errors and settings stored in FILE. Prints the largest force and torque of each bushing, and whether
-    all stored values are identical to the last bit, as they must be on the same machine with the same versions. If they
+    Uses the joint, errors and settings stored in FILE. Prints the largest value of each load, and whether all stored
+    values are identical to the last bit, as they must be on the same machine with the same versions. If they
     differ, prints the versions that differ and ends with exit code 1.
 
     Example: tolstat replay iso2768_f.h5 --row 17 --out trace.csv
     """
     from tolstat.campaign import replay as replays
     from tolstat.common.files import check_target
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
     if out is not None:
         check_target(out, file)
     announce_compilation()
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         again = replays.replay(store, row)
     summary = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     summary |= again.result.summary()

@@ -57,12 +57,12 @@ def report(
         _page(file, out, accept, again)
         return
     from tolstat.report import build
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
     if accept is not None:
         raise InputError([Fault("--accept", "is used with an HTML page only", "add --out page.html")])
     if out is not None:
-        ResultStore.open(file).close()  # check the file before the folder is created
+        Reader.open(file).close()  # check the file before the folder is created
         make_folder(out)
     tell(build(file, out))
 
@@ -74,7 +74,7 @@ def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
         os.environ.setdefault(name, "1")
     from tolstat.common.files import check_target
     from tolstat.report import page
-    from tolstat.store import ResultStore, revolutions
+    from tolstat.store import Reader, revolutions
     from tolstat.store.view import DRAWN
 
     faults: list[Fault] = []
@@ -85,10 +85,10 @@ def _page(file: Path, out: Path, accept: str | None, again: int) -> None:
         accepted = parse_share(accept) if accept is not None else accepted
     if faults:
         raise InputError(faults)
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         if again and store.sampling["method"] in DRAWN and not revolutions.held(store):
             announce_compilation()
-    say(f"wrote {page.write(file, out, accepted, again)}")
+    say(f"wrote {page.write_page(file, out, accepted, again)}")
 
 
 def parse_share(text: str) -> float:

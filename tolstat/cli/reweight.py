@@ -32,9 +32,9 @@ def reweight(
     """
     from tolstat.display import text
     from tolstat.questions.reweight.query import reweighted
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         found = reweighted(store.view(study_file), settings)
     if as_json:
         w = found.weights

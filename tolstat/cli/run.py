@@ -196,7 +196,7 @@ def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:
 def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Counts:
     from tolstat.campaign import progress, stop_rule
     from tolstat.campaign import run as campaign
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
     rule = stop_rule.parse(text)
     announce_compilation()
@@ -212,5 +212,5 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
         "(failed and unsettled joints: below at its lower end, above at its upper end), "
         f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; the intervals in the report are not corrected"
     )
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         return store.counts()

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
 
 def status(
@@ -27,9 +27,9 @@ def status(
 
     Example: tolstat status iso2768_f.h5
     """
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         summary = _summary(store)
     lines = [f"{name}: {value}" for name, value in summary.items() if name != "exceedance"]
     lines += [
@@ -38,7 +38,7 @@ def status(
     typer.echo(as_text(summary) if as_json else "\n".join(lines))
 
 
-def _summary(store: ResultStore) -> dict[str, Any]:
+def _summary(store: Reader) -> dict[str, Any]:
     """Collect the counts and shares, some rows at a time; blocks of pending rows are skipped."""
     import numpy as np
 
@@ -68,7 +68,7 @@ def _summary(store: ResultStore) -> dict[str, Any]:
     return summary
 
 
-def _pace(store: ResultStore, pending: int) -> dict[str, Any]:
+def _pace(store: Reader, pending: int) -> dict[str, Any]:
     """Return rate and remaining time of the run in progress, once it has finished joints."""
     session = store.session()
     if session is None:
@@ -80,9 +80,7 @@ def _pace(store: ResultStore, pending: int) -> dict[str, Any]:
     return {"running": True, "joints_per_s": float(f"{rate:.3g}"), "s_to_go": round(pending / rate)}
 
 
-def _exceedance(
-    store: ResultStore, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]
-) -> dict[str, Any]:
+def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]) -> dict[str, Any]:
     """Share of the joints above a limit so far, from loads and their ends, (3, n); None without an estimate."""
     from tolstat.common.loads import UNIT_OF_LOAD
     from tolstat.store.sample_load import SampleLoad

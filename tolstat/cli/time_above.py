@@ -40,9 +40,9 @@ def time_above(
     """
     from tolstat.display import table, text
     from tolstat.questions.time_above import query, rendering
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         found = query.time_above(store.view(), by or (), level or (), curves=out is not None)
     if as_json:
         summary = {"joints": found.joints, "left_out": found.left_out, "loads": text.records(found.table)}

@@ -27,9 +27,9 @@ def worst(
     """
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.tail import worst_joints
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
-    with ResultStore.open(file) as store:
+    with Reader.open(file) as store:
         found = worst_joints(store.view(study_file), by, n)
     if as_json:
         typer.echo(as_text(rendering.worst_values(found)))

@@ -14,7 +14,7 @@ class Fault:
     Attributes
     ----------
     place : str
-        Where: the file, and the key path in it (``"study.toml: tolerances.pin1.offset_t"``).
+        Where: the file, its line, and the key path in it (``"study.toml:12: tolerances.pin1.offset_t"``).
     found : str
         What is wrong, with the value found.
     remedy : str

@@ -53,7 +53,7 @@ class Kind(NamedTuple):
         Bushings or pins that have such a load each; empty for a load of the whole joint.
     parts : tuple of str
         Values at each place, the largest of which is the load; empty if there is one.
-    course : bool
+    averaged : bool
         Whether results hold mean and range, too. The kinds that have them come first in the registry.
     interpolated : bool
         Whether a largest value between two samples is interpolated by a parabola.
@@ -65,7 +65,7 @@ class Kind(NamedTuple):
     meaning: str
     places: tuple[str, ...] = ()
     parts: tuple[str, ...] = ()
-    course: bool = False
+    averaged: bool = False
     interpolated: bool = True
 
     @property
@@ -86,7 +86,7 @@ class Kind(NamedTuple):
 
     def statistics(self) -> dict[str, Field]:
         """Fields of the results with its statistics over the revolutions that count, by statistic."""
-        texts = {"max": "largest"} | ({"mean": "mean", "range": "largest less smallest"} if self.course else {})
+        texts = {"max": "largest"} | ({"mean": "mean", "range": "largest less smallest"} if self.averaged else {})
         return {
             name: Field(
                 f"{self.name}_{name}",

@@ -6,6 +6,7 @@ numerical error, selection of results and export read them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -81,6 +82,14 @@ def _entries() -> list[Load]:
                 name = f"{place}.{kind.name}" if place else kind.name
                 found.append(Load(name, kind.name, kind.unit, i, columns[i * step : (i + 1) * step]))
     return found
+
+
+def limits_in_words(limits: Mapping[str, float]) -> str:
+    """Limits by name, SI, as one text: loads of the same limit together."""
+    loads: dict[str, list[str]] = {}
+    for name, limit in limits.items():
+        loads.setdefault(f"{limit:g} {UNIT_OF_LOAD[name]}".removesuffix(" 1"), []).append(name)
+    return "; ".join(f"{', '.join(names)}: {limit}" for limit, names in loads.items()) or "none"
 
 
 KINDS = tuple(kind.name for kind in LOAD_KINDS)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
+from pydantic_core import CoreSchema, PydanticCustomError
 
+from tolstat.common import json_schema, toml_lines, units
 from tolstat.common.errors import Fault, InputError
 
 
@@ -19,6 +22,13 @@ class Strict(BaseModel):
     """Base of all input models: unknown keys are faults, values are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the JSON schema with bounds of quantities, see `json_schema.complete`."""
+        schema = handler(core)
+        json_schema.complete(handler.resolve_ref_schema(schema), cls.model_fields, units.SIGNS)
+        return schema
 
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -33,7 +43,8 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
         When the file cannot be read or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8") if text is None else text)
+        text = path.read_text(encoding="utf-8") if text is None else text
+        return tomllib.loads(text)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
@@ -42,7 +53,50 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
     except tomllib.TOMLDecodeError as error:
-        raise InputError([Fault(str(path), f"is not TOML: {error}", "correct the syntax there")]) from error
+        line, said, remedy = toml_lines.of_syntax(error, text or "")
+        raise InputError([Fault(f"{path}:{line}", f"is not TOML: {said}", remedy)]) from error
+
+
+def with_lines(faults: Sequence[Fault], place: str, text: str) -> list[Fault]:
+    """Add the line to the place of each fault of a file.
+
+    Parameters
+    ----------
+    faults : sequence of Fault
+        Faults of this file and of others, which stay as they are.
+    place : str
+        What stands before the key path in the places of this file's faults.
+    text : str
+        The file's text, which is TOML.
+
+    Returns
+    -------
+    list of Fault
+        ``study.toml:12: sampling.n`` for ``study.toml: sampling.n``. A missing key has the line of the innermost table
+        around it that the file has; a fault without key path has no line.
+    """
+    lines = {dotted(path): line for path, line in toml_lines.of_keys(text).items()}
+    return [_with_line(fault, place, lines) for fault in faults]
+
+
+def _with_line(fault: Fault, place: str, lines: Mapping[str, int]) -> Fault:
+    path = fault.place.removeprefix(f"{place}: ")
+    if path == fault.place:
+        return fault
+    above = path
+    while above and above not in lines:
+        above = above[: max(above.rfind("."), above.rfind("["), 0)]
+    return replace(fault, place=f"{place}:{lines[above]}: {path}") if above else fault
+
+
+@contextmanager
+def lines_of(path: Path) -> Iterator[None]:
+    """Add lines to the faults of a TOML file that are raised inside, see `with_lines`."""
+    try:
+        yield
+    except InputError as error:
+        text = path.read_text(encoding="utf-8")
+        raise InputError(with_lines(error.faults, str(path), text)) from error
 
 
 def dotted(location: Sequence[int | str]) -> str:
@@ -89,14 +143,14 @@ def validate(
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
-        raise InputError(faults(error, model, place, prefix)) from error
+        raise InputError(faults(error, model, data, place, prefix)) from error
 
 
 def faults(
-    error: ValidationError, model: type[BaseModel], place: str, prefix: tuple[int | str, ...] = ()
+    error: ValidationError, model: type[BaseModel], data: object, place: str, prefix: tuple[int | str, ...] = ()
 ) -> list[Fault]:
-    """Translate pydantic's errors to faults with remedies."""
-    return [_fault(e, model, place, prefix) for e in error.errors(include_url=False)]
+    """Translate pydantic's errors of `data` to faults with remedies."""
+    return [_fault(e, model, data, place, prefix) for e in error.errors(include_url=False)]
 
 
 _REMEDIES = {
@@ -116,12 +170,16 @@ _REMEDIES = {
 """Remedy for a kind of pydantic error, filled from the error's context."""
 
 
-def _fault(e: Any, model: type[BaseModel], place: str, prefix: tuple[int | str, ...]) -> Fault:
+def _fault(e: Any, model: type[BaseModel], data: object, place: str, prefix: tuple[int | str, ...]) -> Fault:
     path = dotted((*prefix, *e["loc"]))
     where = f"{place}: {path}" if path else place
     context = e.get("ctx", {})
     if "remedy" in context:
-        return Fault(where, context["found"].replace("{input}", repr(e["input"])), context["remedy"])
+        found, remedy = context["found"].replace("{input}", repr(e["input"])), context["remedy"]
+        for key in context.get("keys", ()):
+            written = _written(data, e["loc"], key.split("."))
+            found, remedy = (text.replace(f"{{{key}}}", written) for text in (found, remedy))
+        return Fault(where, found, remedy)
     if e["type"] == "extra_forbidden":
         return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), _keys_at(model, e["loc"][:-1])))
     if e["type"] == "missing":
@@ -132,10 +190,28 @@ def _fault(e: Any, model: type[BaseModel], place: str, prefix: tuple[int | str, 
     return Fault(where, f"{e['input']!r}: {e['msg'].removeprefix('Input ')}", remedy)
 
 
+def _written(data: object, location: Sequence[int | str], key: Sequence[str]) -> str:
+    """Value of a key as it is written, from the innermost table around a place that has the key."""
+    tables = [data]
+    for part in location:
+        try:
+            tables.append(tables[-1][part])  # type: ignore[index]
+        except (LookupError, TypeError):
+            break
+    for table in reversed(tables):
+        value: Any = table
+        for part in key:
+            value = value.get(part) if isinstance(value, Mapping) else None
+        if value is not None:
+            return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+    return ".".join(key)
+
+
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:
     """Remedy for an unknown word: the closest of the allowed ones, else all of them."""
-    close = difflib.get_close_matches(word, allowed, n=1)
-    return f"did you mean {close[0]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
+    spelt = {name.lower(): name for name in allowed}
+    close = difflib.get_close_matches(word.lower(), spelt, n=1)
+    return f"did you mean {spelt[close[0]]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
 
 
 def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
@@ -155,6 +231,10 @@ def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]
     return [f.alias or name for name, f in fields.items()]
 
 
-def refuse(found: str, remedy: str) -> PydanticCustomError:
-    """Error for a validator to raise, which becomes a `Fault` with this text."""
-    return PydanticCustomError("refused", "{found}", {"found": found, "remedy": remedy})
+def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:
+    """Error for a validator to raise, which becomes a `Fault` with this text.
+
+    Each of `keys`, such as ``"D_H"`` or ``"cross.R"``, is replaced where it stands in braces by the value as the file
+    has it: faults show the numbers and units of the user.
+    """
+    return PydanticCustomError("refused", "{found}", {"found": found, "remedy": remedy, "keys": keys})

@@ -249,8 +249,8 @@ ERROR_FIELDS = _error_fields()
 
 OVER = "over the revolutions that count"
 LOAD_KINDS = (
-    Kind("F", "bushing force", "N", f"modulus of the bushing force {OVER}", BUSHINGS, course=True),
-    Kind("T", "bushing torque", "N*m", f"modulus of the bushing torque {OVER}", BUSHINGS, course=True),
+    Kind("F", "bushing force", "N", f"modulus of the bushing force {OVER}", BUSHINGS, averaged=True),
+    Kind("T", "bushing torque", "N*m", f"modulus of the bushing torque {OVER}", BUSHINGS, averaged=True),
     Kind(
         "contact",
         "contact force",
@@ -324,7 +324,7 @@ PARAM = dtype_of(PARAM_FIELDS)
 
 def _layouts() -> tuple[np.dtype[np.void], np.dtype[np.void]]:
     """RESULT, and the same bytes with one array for each statistic of all loads."""
-    arrays = {"max": "largest", "mean": "average", "range": "reach"}
+    arrays = {"max": "largest", "mean": "average", "range": "range"}
     of_loads = {
         array: [kind.statistics()[of] for kind in LOAD_KINDS if of in kind.statistics()] for of, array in arrays.items()
     }
@@ -335,7 +335,7 @@ def _layouts() -> tuple[np.dtype[np.void], np.dtype[np.void]]:
 
 
 RESULT, KERNEL_RESULT = _layouts()
-"""Results of one joint, and how kernels see them: in ``largest``, ``average`` and ``reach`` the statistics of all
+"""Results of one joint, and how kernels see them: in ``largest``, ``average`` and ``range`` the statistics of all
 loads, kind after kind as in `SPAN`, in place of ``F_max``, ``F_mean``, ``F_range`` and so on."""
 
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from tolstat.common import notation
+from tolstat.common import json_schema, notation
 from tolstat.common.notation import DIAMETER, PLUS_MINUS, Written
 
 if TYPE_CHECKING:
@@ -112,20 +112,29 @@ def to_si(value: object, unit: str, mark: str = "") -> float:
         raise _fault(f"{value!r} is not a quantity", unit)
     if isinstance(value, (int, float)):
         if unit != "1":
-            raise _fault(f"{value!r} has no unit", unit)
+            raise _without_unit(value, unit)
         if not abs(value) <= sys.float_info.max:  # also an integer too long for a float
             raise _fault(f"{value!r} is not a finite number", unit)
         return float(value)
     read = notation.read(value)
     if read is None:
-        comma = ", with a decimal point" if "," in value else ""
-        raise _fault(f"{value!r} is not a number with a unit{comma}", unit)
+        point = value.replace(",", ".")
+        remedy = f'write a decimal point: "{point}"' if point != value and notation.read(point) else ""
+        raise _fault(f"{value!r} is not a number with a unit", unit, remedy)
+    if unit != "1" and not read.unit:
+        raise _without_unit(value, unit)
     si = _value(read, unit, value)
     if not math.isfinite(si):
         raise _fault(f"{value!r} is not a finite number", unit)
     if read.mark not in ("", mark):
         raise _marked(read, value, unit, mark)
     return si
+
+
+def _without_unit(value: object, unit: str) -> PydanticCustomError:
+    usual = EXAMPLES.get(unit, f"1 {unit}").partition(" ")[2]
+    remedy = " or ".join(f'"{str(value).strip()} {name}"' for name in dict.fromkeys((usual, unit)))
+    return _fault(f"{value!r} has no unit", unit, f"write {remedy}")
 
 
 def is_diameter(value: object) -> bool:
@@ -259,10 +268,11 @@ class Quantity:
 
     ``Annotated[float, Quantity("m")]`` accepts ``"0.1 mm"`` and holds ``1e-4``. SI floats are written back
     as ``"0.0001 m"`` by ``model_dump(mode="json")``, so that a dump can be read again. With the validation context
-    ``{"si": True}`` values are SI floats already.
+    ``{"si": True}`` values are SI floats already. `mark`: the sign that may stand before the number, see `to_si`.
     """
 
     unit: str
+    mark: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return the schema: parse on validation, write value and unit on JSON dump."""
@@ -272,12 +282,16 @@ class Quantity:
 
         def read(value: object, info: core_schema.ValidationInfo) -> float:
             si = isinstance(value, float) and bool(info.context and info.context.get("si"))
-            return to_si(value, "1" if si else self.unit)
+            return to_si(value, "1" if si else self.unit, self.mark)
 
         return core_schema.with_info_plain_validator_function(
             read,
             serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
         )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the JSON schema of the quantity as a file writes it."""
+        return json_schema.quantity(self.unit, EXAMPLES[self.unit])
 
 
 def _sign(must: str, remedy: str) -> PydanticCustomError:
@@ -306,7 +320,11 @@ def not_zero(value: float) -> float:
     return value
 
 
+SIGNS = {positive: "exclusiveMinimum", not_negative: "minimum"}
+"""Keyword of JSON schema for each validator of a sign."""
+
 Length = Annotated[float, Quantity("m")]
+Diameter = Annotated[float, Quantity("m", DIAMETER)]
 Area = Annotated[float, Quantity("m^2")]
 AreaMoment = Annotated[float, Quantity("m^4")]
 Angle = Annotated[float, Quantity("rad")]

@@ -90,6 +90,8 @@ class Panel:
         Room for the labels of the y axis, inches.
     reads : tuple of str
         Loads whose exceedance the picture shows, for the cursor.
+    bare : bool
+        Whether the axes fill the picture: a drawing without scales beside it.
     """
 
     key: str
@@ -99,6 +101,7 @@ class Panel:
     size: tuple[float, float] = (5.0, 3.5)
     left: float = 0.72
     reads: tuple[str, ...] = ()
+    bare: bool = False
 
 
 @dataclass(frozen=True)

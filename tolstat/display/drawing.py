@@ -58,6 +58,8 @@ def settings() -> Iterator[None]:
 
 def _place(panel: Panel) -> tuple[float, float, float, float]:
     """Position of the axes as fractions of the panel's size: left, bottom, width, height."""
+    if panel.bare:
+        return (0.0, 0.0, 1.0, 1.0)
     width, height = panel.size
     return (
         panel.left / width,

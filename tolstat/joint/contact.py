@@ -21,6 +21,7 @@ from tolstat.joint.sections import (
     NOT_NEGATIVE,
     POSITIVE,
     Array,
+    Diameter,
     Length,
     Material,
     Number,
@@ -33,8 +34,6 @@ from tolstat.joint.sections import (
 QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
 Damping = Annotated[units.Damping, NOT_NEGATIVE]
 Force = Annotated[float, units.Quantity("N"), POSITIVE]
-OPTIONAL = Field(default=None, validate_default=True)
-"""Default of a key that is optional unless another key requires it."""
 
 
 class Stations(NamedTuple):
@@ -63,12 +62,20 @@ def _check_position(ratio: float) -> float:
 
 
 class Station(Strict):
-    """One contact station of the law ``"stations"``."""
+    """A contact station of one's own, for law `stations`."""
 
-    s_over_z: Annotated[units.Number, AfterValidator(_check_position)]
-    k1: QuadraticStiffness
-    k2: Annotated[units.Stiffness, NOT_NEGATIVE]
-    weight: Ratio
+    s_over_z: Annotated[
+        Annotated[units.Number, AfterValidator(_check_position)],
+        Field(description="place along the contact, from -0.5 (inner end) to 0.5 (outer end)", examples=[0.5]),
+    ]
+    k1: Annotated[
+        QuadraticStiffness, Field(description="quadratic coefficient of the force", examples=["1.6e6 N/mm^2"])
+    ]
+    k2: Annotated[
+        Annotated[units.Stiffness, NOT_NEGATIVE],
+        Field(description="linear coefficient of the force", examples=["1.8e5 N/mm"]),
+    ]
+    weight: Annotated[Ratio, Field(description="weight of damping `c_d` and film `c_t`", examples=[1.0])]
 
 
 def _check_stations(stations: tuple[Station, ...] | None) -> tuple[Station, ...] | None:
@@ -204,36 +211,70 @@ def _has_middle(info: ValidationInfo) -> bool:
 
 
 class Contact(Strict):
-    """Contact of the pins in their holes.
+    """Contact of the pins in their holes."""
 
-    Validators require keys that may be ``None`` where they are needed; methods assert it for the type checker.
-    """
-
-    law: LawName
-    n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = OPTIONAL
-    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = OPTIONAL
-    D_H: Length
-    D_P: Length
-    z: Length
-    coefficients: Literal["printed", "fitted"] | None = OPTIONAL
-    k1u: QuadraticStiffness | None = OPTIONAL
-    k2u: Stiffness | None = OPTIONAL
-    k1p: QuadraticStiffness | None = None
-    k2p: Stiffness | None = None
-    H: Number | None = OPTIONAL
-    fit_load: Force | None = OPTIONAL
-    damping: Literal["given", "beam"]
-    c_d: Damping | None = OPTIONAL
-    xi: Ratio | None = OPTIONAL
-    c_t: Damping
-    delta_d: Length
+    # validators require keys that may be None where they are needed; methods assert it for the type checker
+    law: Annotated[LawName, Field(description="set of contact stations, see the contact laws of the joint model")]
+    n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = Field(
+        default=None, validate_default=True, description="stations of a pin, for law `sliced`"
+    )
+    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = Field(
+        default=None,
+        validate_default=True,
+        description="stations of one's own, for law `stations`",
+        examples=[[{"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0}]],
+    )
+    D_H: Annotated[Diameter, Field(description="diameter of the hole")]
+    D_P: Annotated[
+        Diameter, Field(description="diameter of the pin, not above `D_H`; the radial clearance is (D_H - D_P)/2")
+    ]
+    z: Annotated[Length, Field(description="length of the contact")]
+    coefficients: Literal["printed", "fitted"] | None = Field(
+        default=None,
+        validate_default=True,
+        description="`printed`: k1u to k2p as given here; `fitted`: force fitted to eq. (3) for material and "
+        "diameters over loads up to `fit_load`, point contact by `H`",
+    )
+    k1u: QuadraticStiffness | None = Field(
+        default=None, validate_default=True, description="quadratic coefficient of uniform contact, for `printed`"
+    )
+    k2u: Stiffness | None = Field(
+        default=None, validate_default=True, description="linear coefficient of uniform contact, for `printed`"
+    )
+    k1p: QuadraticStiffness | None = Field(
+        default=None, description="quadratic coefficient of point contact; when left out: k1u/H^2"
+    )
+    k2p: Stiffness | None = Field(default=None, description="linear coefficient of point contact; when left out: k2u/H")
+    H: Number | None = Field(
+        default=None,
+        validate_default=True,
+        description="displacement in point contact over that in uniform contact at the same force",
+    )
+    fit_load: Force | None = Field(
+        default=None, validate_default=True, description="largest load of the fit, for `fitted`"
+    )
+    damping: Annotated[
+        Literal["given", "beam"],
+        Field(
+            description="`given`: by `c_d`; `beam`: 2 xi m omega with omega the pin's first frequency as a "
+            "cantilever, eqs. (6)-(7)"
+        ),
+    ]
+    c_d: Damping | None = Field(default=None, validate_default=True, description="damping of a station, for `given`")
+    xi: Ratio | None = Field(
+        default=None, validate_default=True, description="damping ratio of the contact, for `beam`"
+    )
+    c_t: Annotated[
+        Damping, Field(description="damping by the lubricant across the clearance; without it a pin whirls for ever")
+    ]
+    delta_d: Annotated[Length, Field(description="penetration over which contact damping rises to its full value")]
 
     @field_validator("D_P")
     @classmethod
     def _fits(cls, value: float, info: ValidationInfo) -> float:
         hole = info.data.get("D_H")
         if hole is not None and value > hole:
-            raise refuse(f"a pin of {value:g} m does not fit into a hole of {hole:g} m", "give D_P <= D_H")
+            raise refuse("a pin of {D_P} does not fit into a hole of {D_H}", "give D_P <= D_H", "D_P", "D_H")
         return value
 
     @field_validator(*COEFFICIENTS)
@@ -274,8 +315,9 @@ class Contact(Strict):
         uniform = info.data.get(name.replace("p", "u"))
         in_use = _has_middle(info) and info.data.get("coefficients") == "printed"
         if in_use and value is not None and uniform is not None and 2.0 * value > uniform:
-            found = f"2 {name} exceeds {name[:2]}u = {uniform:g}: the middle station would be negative"
-            raise refuse(found, f"give {name} <= {name[:2]}u / 2, or another law")
+            of = f"{name[:2]}u"
+            found = f"2 {name} exceeds {of} = {{{of}}}: the middle station would be negative"
+            raise refuse(found, f"give {name} <= {of} / 2, or another law", of)
         return value
 
     @field_validator("H")

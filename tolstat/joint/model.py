@@ -5,10 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
@@ -24,7 +24,9 @@ class Joint(Strict):
     Arrays of three or six values that the properties return refer to the local axes (e, t, z) of a pin or arm.
     """
 
-    description: str = ""
+    description: Annotated[
+        str, Field(description="text about the joint, copied to result files", examples=["gearbox A, drawing 4711"])
+    ] = ""
     material: Material
     pin: Pin
     arm: Arm
@@ -39,7 +41,9 @@ class Joint(Strict):
     def _beside_the_centre(cls, value: Contact, info: ValidationInfo) -> Contact:
         cross = info.data.get("cross")
         if cross is not None and value.z >= 2.0 * cross.R:
-            raise refuse(f"z = {value.z:g} m reaches past the joint centre", "give contact.z < 2 cross.R")
+            keys = ("contact.z", "cross.R")
+            remedy = "give contact.z < 2 cross.R, where cross.R = {cross.R}"
+            raise refuse("z = {contact.z} reaches past the joint centre", remedy, *keys)
         return value
 
     @field_validator("contact")
@@ -106,10 +110,11 @@ def load(
     """
     path = _find(base, f"{place}: {section}", relative_to)
     data = strict.read_toml(path)
-    try:
-        return strict.validate(Joint, overridden(data, overrides), place)
-    except InputError as error:
-        raise InputError(_attributed(error.faults, data, path, place, section)) from error
+    with strict.lines_of(path):
+        try:
+            return strict.validate(Joint, overridden(data, overrides), place)
+        except InputError as error:
+            raise InputError(_attributed(error.faults, data, path, place, section)) from error
 
 
 def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
 from tolstat.common import units
 from tolstat.common.parameters import MAX_STATIONS
@@ -30,19 +30,29 @@ ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
 
 def _check_misalignment(alpha: float) -> float:
     if not abs(alpha) < np.pi / 2:
-        raise refuse(f"a Cardan joint cannot turn at {np.degrees(alpha):g} deg", "give less than 90 deg")
+        raise refuse("a Cardan joint cannot turn at {alpha}", "give less than 90 deg", "alpha")
     return alpha
 
 
 class Operation(Strict):
-    """Operating point: misalignment (rad), speed of the input shaft (rad/s), resisting torque (N*m).
+    """Operating point of the joint."""
 
-    Speed and torque may be negative: the joint then turns the other way, the torque drives the output shaft.
-    """
-
-    alpha: Annotated[units.Angle, AfterValidator(_check_misalignment)]
-    speed: Annotated[units.Speed, AfterValidator(units.not_zero)]
-    torque: units.Torque
+    alpha: Annotated[
+        units.Angle,
+        AfterValidator(_check_misalignment),
+        Field(description="misalignment of the shafts, below 90 deg", examples=["15 deg"]),
+    ]
+    speed: Annotated[
+        units.Speed,
+        AfterValidator(units.not_zero),
+        Field(description="speed of the input shaft; negative: turns the other way", examples=["500 rpm"]),
+    ]
+    torque: Annotated[
+        units.Torque,
+        Field(
+            description="resisting torque on the output shaft; negative: drives the output shaft", examples=["100 N*m"]
+        ),
+    ]
 
 
 def nominal_errors(n: int, operation: Operation) -> Table:

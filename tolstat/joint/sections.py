@@ -1,6 +1,6 @@
 """The sections of a joint file for its bodies and bushings, and the quantities derived from a single section.
 
-`data/joints/cirelli2021.toml` says what each key means and where its value comes from. An optional key that is left
+`data/joints/cirelli2021.toml` says where the value of each key comes from. An optional key that is left
 out is ``None``; the section's methods give the resolved value.
 """
 
@@ -22,6 +22,7 @@ POSITIVE = AfterValidator(units.positive)
 NOT_NEGATIVE = AfterValidator(units.not_negative)
 
 Length = Annotated[units.Length, POSITIVE]
+Diameter = Annotated[units.Diameter, POSITIVE]
 Area = Annotated[units.Area, POSITIVE]
 AreaMoment = Annotated[units.AreaMoment, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
@@ -43,7 +44,8 @@ def _poisson(nu: float) -> float:
 def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
     """Refuse moments of inertia that no body has: one exceeds the sum of the two others."""
     if 2.0 * max(inertia) > sum(inertia) * (1.0 + 1e-9):
-        raise refuse(f"no body has the moments of inertia {inertia}", "give none above the sum of the others")
+        found = "no body has the moments of inertia {inertia}"
+        raise refuse(found, "give none above the sum of the others", "inertia")
     return inertia
 
 
@@ -61,23 +63,34 @@ def require(value: object, info: ValidationInfo, selector: str, words: tuple[str
 class Material(Strict):
     """Material of all parts."""
 
-    E: Stress
-    G: Stress
-    nu: Annotated[units.Number, AfterValidator(_poisson)]
-    rho: Density
+    E: Annotated[Stress, Field(description="Young's modulus")]
+    G: Annotated[Stress, Field(description="shear modulus")]
+    nu: Annotated[
+        Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
+    ]
+    rho: Annotated[Density, Field(description="density")]
 
 
 class Pin(Strict):
-    """A pin of the cross as a round beam along its axis."""
+    """Each of the four pins: a round beam along its axis e, clamped at the hub, its mass lumped at its end."""
 
-    l: Length  # noqa: E741
-    A: Area
-    J: AreaMoment
-    Jp: AreaMoment | None = None
-    chi: Number
-    d: Length
-    mass: Mass | None = None
-    inertia: Triple | None = None
+    l: Annotated[Length, Field(description="length of the beam, from the hub to the middle of the contact")]  # noqa: E741
+    A: Annotated[Area, Field(description="area of the section")]
+    J: Annotated[AreaMoment, Field(description="area moment of the section")]
+    Jp: Annotated[
+        AreaMoment | None, Field(description="polar moment of the section; when left out: 2 J, that of a circle")
+    ] = None
+    chi: Annotated[Number, Field(description="shear factor of the section, 1.11 for a circle")]
+    d: Annotated[Diameter, Field(description="diameter of the solid cylinder whose inertia the pin has")]
+    mass: Annotated[Mass | None, Field(description="mass; when left out: rho A l")] = None
+    inertia: Annotated[
+        Triple | None,
+        Field(
+            description="moments of inertia about e, t, z; when left out: those of a solid cylinder of this "
+            "diameter, length and mass",
+            examples=[["5.78e-5 kg*m^2", "6.42e-5 kg*m^2", "6.42e-5 kg*m^2"]],
+        ),
+    ] = None
 
     def body(self, rho: float) -> tuple[float, Array]:
         """Mass (kg) and inertia about (e, t, z) (kg*m^2, shape (3,)) at density `rho` (kg/m^3).
@@ -94,16 +107,23 @@ class Pin(Strict):
 
 
 class Arm(Strict):
-    """An arm of a fork as a beam along the shaft."""
+    """Each of the four arms: a beam along the shaft, clamped at its fork, its mass lumped at the hole's centre."""
 
-    l_f: Length
-    A: Area
-    Jx: AreaMoment
-    Jy: AreaMoment
-    Jp: AreaMoment
-    chi: Number
-    mass: Mass | None = None
-    inertia: Triple | None = None
+    l_f: Annotated[Length, Field(description="length of the beam, from its fork to the hole's centre")]
+    A: Annotated[Area, Field(description="area of the section")]
+    Jx: Annotated[AreaMoment, Field(description="area moment about x, the local t")]
+    Jy: Annotated[AreaMoment, Field(description="area moment about y, the local e")]
+    Jp: Annotated[AreaMoment, Field(description="polar moment of the section")]
+    chi: Annotated[Number, Field(description="shear factor of the section, 1.2 for a rectangle")]
+    mass: Annotated[Mass | None, Field(description="mass; when left out: rho A l_f")] = None
+    inertia: Annotated[
+        Triple | None,
+        Field(
+            description="moments of inertia about e, t, z; when left out: those of a box with the area moments "
+            "of the section, l_f long along z",
+            examples=[["1.40e-4 kg*m^2", "5.31e-5 kg*m^2", "1.11e-4 kg*m^2"]],
+        ),
+    ] = None
 
     def body(self, rho: float) -> tuple[float, Array]:
         """Mass (kg) and inertia about (e, t, z) (kg*m^2, shape (3,)) at density `rho` (kg/m^3).
@@ -122,43 +142,53 @@ class Arm(Strict):
 
 
 class Hub(Strict):
-    """Centre of the cross."""
+    """Middle of the cross, to which the four pins are attached."""
 
-    mass: Mass
-    inertia: Triple
+    mass: Annotated[Mass, Field(description="mass")]
+    inertia: Annotated[Triple, Field(description="moments of inertia about x, y, z of the cross")]
 
 
 class Shaft(Strict):
     """Output shaft."""
 
-    Js: Inertia
+    Js: Annotated[Inertia, Field(description="inertia of the output shaft about its axis")]
 
 
 class Cross(Strict):
     """Main dimensions of the cross."""
 
-    R: Length
-    r_b: Length
+    R: Annotated[Length, Field(description="distance from the centre of the joint to the middle of pin and hole")]
+    r_b: Annotated[Length, Field(description="distance from the centre of the joint to the marker of a cross bushing")]
 
 
 class BeamAxes(Strict):
-    """Stiffness of one bushing in the axes of Table 3: z along the beam, b bending, t torsion."""
+    """Stiffness of a bushing in beam axes: z along the beam, x the local t, y the third, of a pin z, of an arm e."""
 
-    k_x: Stiffness
-    k_y: Stiffness
-    k_z: Stiffness
-    k_bx: RotaryStiffness
-    k_by: RotaryStiffness
-    k_tz: RotaryStiffness
+    k_x: Annotated[Stiffness, Field(description="shear along x")]
+    k_y: Annotated[Stiffness, Field(description="shear along y")]
+    k_z: Annotated[Stiffness, Field(description="tension")]
+    k_bx: Annotated[RotaryStiffness, Field(description="bending about x")]
+    k_by: Annotated[RotaryStiffness, Field(description="bending about y")]
+    k_tz: Annotated[RotaryStiffness, Field(description="torsion")]
 
 
 class Bushing(Strict):
-    """Elasticity of the pins and arms."""
+    """Bushings, the elasticity of pins and arms: three springs and three torsion springs each, eq. (8)."""
 
-    stiffness: Literal["given", "beam"]
-    xi: Ratio
-    cross: BeamAxes | None = Field(default=None, validate_default=True)
-    fork: BeamAxes | None = Field(default=None, validate_default=True)
+    stiffness: Annotated[
+        Literal["given", "beam"],
+        Field(
+            description="`given`: by the tables `cross` and `fork`, whatever material and dimensions are; "
+            "`beam`: by material and sections of pin and arm, eqs. (9)-(11)"
+        ),
+    ]
+    xi: Annotated[Ratio, Field(description="damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
+    cross: BeamAxes | None = Field(
+        default=None, validate_default=True, description="Stiffness of a pin's bushing, needed with `given`"
+    )
+    fork: BeamAxes | None = Field(
+        default=None, validate_default=True, description="Stiffness of an arm's bushing, needed with `given`"
+    )
 
     @field_validator("cross", "fork")
     @classmethod

@@ -1,4 +1,4 @@
-"""Registry of the questions: a folder each, whose query takes a `store.view.View`, or a study that it simulates.
+"""Registry of the questions: a folder each, whose query takes a `store.view.View`, a study to simulate, or a joint.
 
 Commands, public names, sections of the page and the JSON summary come from here, in this order; `report`, `verify` and
 `status` print more than one question and are commands of their own. Modules are imported on first use.
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from tolstat.questions.multifidelity.query import two_fidelities as two_fidelities
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
+    from tolstat.questions.show.rendering import draw_errors as draw_errors
+    from tolstat.questions.show.rendering import draw_joint as draw_joint
+    from tolstat.questions.show.rendering import draw_row as draw_row
     from tolstat.questions.time_above.query import time_above as time_above
     from tolstat.store.view import View
 
@@ -61,6 +64,12 @@ QUESTIONS = (
         "causes",
         ("worst", "causes"),
         ("query.causes_of", "angles.against_angle", "tail.worst_joints"),
+        has_section=True,
+    ),
+    Question(
+        "show",
+        ("show",),
+        ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"),
         has_section=True,
     ),
     Question(

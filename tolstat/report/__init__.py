@@ -13,7 +13,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
 from tolstat.display import text
 from tolstat.solver import fidelity
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 from tolstat.store.view import View
 
 
@@ -35,7 +35,7 @@ class Report(NamedTuple):
     files: list[Path]
 
 
-def write(path: str | Path, out_dir: str | Path | None = None) -> list[Path]:
+def write_report(path: str | Path, out_dir: str | Path | None = None) -> list[Path]:
     """Write the report of a result file; see `build`.
 
     Returns
@@ -77,7 +77,7 @@ def build(path: str | Path, out_dir: str | Path | None = None) -> Report:
     path = Path(path)
     stem = (Path(out_dir) if out_dir is not None else path.parent) / path.stem
     try:
-        with ResultStore.open(path) as store:
+        with Reader.open(path) as store:
             stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
                 return _noted(_cases(store, stem), stands_on)
@@ -130,7 +130,7 @@ def _accuracy(view: View) -> str:
     return f"\n{rendering.note(view.verification)}" if view.verification else ""
 
 
-def _cases(store: ResultStore, stem: Path) -> Report:
+def _cases(store: Reader, stem: Path) -> Report:
     from tolstat.report import cases
 
     full = cases.table(store)

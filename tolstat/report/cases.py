@@ -19,15 +19,15 @@ from tolstat.study.design import IDEAL
 
 if TYPE_CHECKING:
     from tolstat.common.tables import Variant
-    from tolstat.store import ResultStore
+    from tolstat.store import Reader
 
 
-def table(store: ResultStore) -> pd.DataFrame:
+def table(store: Reader) -> pd.DataFrame:
     """Largest loads and Gamma of every joint of the study.
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         File of a study whose method is ``cases``.
 
     Returns
@@ -63,12 +63,12 @@ def table(store: ResultStore) -> pd.DataFrame:
     return pd.DataFrame(columns | reference(store))
 
 
-def reference(store: ResultStore) -> dict[str, object]:
+def reference(store: Reader) -> dict[str, object]:
     """Compare every joint with the tight reference.
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         File of the study.
 
     Returns

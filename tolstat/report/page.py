@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.tables import Fidelity, Method, Start
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Facts, Listing, Page, Section
 from tolstat.report import html, verdict
 from tolstat.solver import fidelity
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 from tolstat.store.integrity import DIGEST
 from tolstat.store.result_file import BLOCK
 
@@ -29,7 +27,7 @@ REPLAYED = 1000
 """Default number of joints whose load histories are evaluated: some 2 s if they are simulated again."""
 
 
-def write(path: str | Path, out: str | Path, accepted: float = np.nan, replay: int = REPLAYED) -> Path:
+def write_page(path: str | Path, out: str | Path, accepted: float = np.nan, replay: int = REPLAYED) -> Path:
     """Write the report of a result file as one page; the campaign may be unfinished.
 
     Parameters
@@ -59,7 +57,7 @@ def write(path: str | Path, out: str | Path, accepted: float = np.nan, replay: i
     >>> tolstat.write_page("iso2768_f.h5", "iso2768_f.html", accepted=0.01)  # doctest: +SKIP
     PosixPath('iso2768_f.html')
     """
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         if store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
             raise StoreError(str(Fault(str(path), "lists its joints one by one", remedy)))
@@ -101,15 +99,9 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
     yield "Result file", f"schema {attributes['schema_version']}, attributes {digest or 'without checksum'}"
     if digest:
         yield "Checksum of the results", results_digest(store)
-    yield "Solver", ", ".join(f"{name} {_word(name, value)}" for name, value in store.options.items())
+    yield "Solver", ", ".join(f"{name} {value}" for name, value in store.options.items())
     for k, retry in enumerate(store.retries, 1):
         yield f"Retry {k}", ", ".join(f"{name} {value}" for name, value in retry.get("settings", {}).items())
-
-
-def _word(name: str, value: Any) -> str:
-    """Value of a solver setting as it is written in a study."""
-    kinds: dict[str, type[IntEnum]] = {"method": Method, "start": Start, "fidelity": Fidelity}
-    return kinds[name](value).name.lower() if name in kinds else str(value)
 
 
 def results_digest(store: Reader) -> str:

@@ -21,6 +21,7 @@ from tolstat.questions.accuracy import rendering as accuracy
 from tolstat.questions.capability import query as capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.exceedance.rendering import LIMIT_DASH, LIMITS
+from tolstat.questions.show import section as show
 from tolstat.store.view import View
 
 WORDS = {"yes": "kept", "no": "not kept", "open": "open"}
@@ -30,15 +31,17 @@ def section(view: View, asked: Asked) -> Section:
     """Question, headline, and each limit with its share of joints above it."""
     question = question_of(view.store.study_text)
     blocks: list[Block] = [Text(f"Question: {question}")] if question else []
+    joint = show.legend(view, asked)
     if view.sampled and view.limits:
         table = exceedance.limits(view)
         verdicts = [verdict(row, asked.accepted) for row in table.to_dict("records")]
         blocks.append(Cards([*_headline(view, asked, table, verdicts), *_basis(view)]))
-        blocks += _limits(view, asked, table, verdicts)
+        blocks += _limits(view, asked, table, verdicts, joint)
     else:
         blocks.append(Cards(_basis(view)))
         if view.sampled:
             blocks.append(Text("The study sets no limits, so there is no verdict. Its loads are below."))
+        blocks += [Panels(joint), Text(show.LEGEND, small=True)] if joint else []
     blocks += [Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes]
     return Section("verdict", "Verdict", blocks)
 
@@ -120,7 +123,8 @@ def _basis(view: View) -> list[Card]:
     return cards
 
 
-def _limits(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str]) -> list[Block]:
+def _limits(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str], joint: list[Panel]) -> list[Block]:
+    """Share above each limit, beside the drawings of the joint; the table of limits; notes."""
     words = dict(zip(table["load"], (WORDS.get(v, "") for v in verdicts), strict=True))
     kept = Column("kept", lambda row: words[row["load"]], shown=lambda _: asked.judges)
     block = as_block("Limits", (*LIMITS, kept), table, verdicts if asked.judges else ())
@@ -137,7 +141,9 @@ def _limits(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str]) 
         (4.9, drawing.rows_height(len(table))),
         1.4,
     )
-    blocks: list[Block] = [Panels([panel]), block]
+    blocks: list[Block] = [Panels([panel, *joint])]
+    blocks += [Text(show.LEGEND, small=True)] if joint else []
+    blocks.append(block)
     if "open" in verdicts and view.iid and not view.weighted:
         blocks.append(Text(_open(table.to_dict("records"), verdicts, asked.accepted)))
     blocks.append(Text(_how(view, asked), small=True))

@@ -146,7 +146,7 @@ def sentence(options: Mapping[str, Any], record: Mapping[str, Any]) -> str:
     """Fidelity of the numbers in a file, for its report; empty for dynamic fidelity at steps that the user gave."""
     if record:
         return str(record["reason"])
-    rung = Rung(Fidelity(options["fidelity"]), options["steps_per_rev"])
+    rung = Rung(Fidelity[options["fidelity"].upper()], options["steps_per_rev"])
     return "" if rung.fidelity == Fidelity.DYNAMIC else f"fidelity: {rung}"
 
 

@@ -9,11 +9,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.common.shown import shown
 from tolstat.common.tables import Method, Options, Status
 
 MethodName = Literal["generalized_alpha", "bdf2", "tr_bdf2"]
 
 
+@shown
 class Trajectory(NamedTuple):
     """Solution on the output grid.
 

@@ -29,9 +29,10 @@ SPECS = {
         "N, N*m",
         "range and mean of the largest rainflow cycles of the last revolution, descending, 0 where there are none; of "
         "bushings cross 1-4, fork 1-4 in turn: force e, t, z, torque e, t, z, modulus of force, of torque",
+        ("channel", "cycle", "of_cycle"),
     ),
     "cycle_count": HistorySpec(
-        (len(CHANNELS),), "u2", "1", "rainflow cycles of the last revolution, those not kept included"
+        (len(CHANNELS),), "u2", "1", "rainflow cycles of the last revolution, those not kept included", ("channel",)
     ),
 }
 """What `count` gives for a joint, as histories of a result file."""

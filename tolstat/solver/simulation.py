@@ -312,10 +312,10 @@ def _groups(params: NDArray[np.void], max_size: int) -> Iterator[NDArray[np.intp
 def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:
     """Extract the histories that are kept from the samples of the recorded revolution."""
     if histories == "full":
-        held = {name: samples["value"][:, span] for name, span in SPAN.items()}
-        held |= {name: samples[name] for name in samples.dtype.names or ()}
+        held = {name: samples["loads"][:, span] for name, span in SPAN.items()}
+        held |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
         return {name: held[name].reshape(spec.shape) for name, spec in specs.items()}
-    loads = np.ascontiguousarray(samples["loads"])
+    loads = np.ascontiguousarray(samples["components"])
     sample = rainflow.count(loads) if "cycles" in histories else {}
     if "harmonics" in histories:
         sample |= _harmonics(loads, specs["coefficients_real"].shape[-1])

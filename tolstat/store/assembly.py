@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from tolstat.common.files import atomic_write
 from tolstat.common.tables import Status
-from tolstat.store.histories import HISTORY_BYTES, HistoryParts, attach_scales, create_dataset, rows_per_chunk
+from tolstat.store.axes import attach_scales
+from tolstat.store.histories import HISTORY_BYTES, HistoryParts, create_dataset, create_group, rows_per_chunk
+from tolstat.store.new_file import fill
 from tolstat.store.reader import Reader, parts_folder
-from tolstat.store.result_file import BLOCK, campaign_digest, fill, store_error
+from tolstat.store.result_file import BLOCK, LINKED, campaign_digest, store_error
 
 
 class DifferingResults(Exception):
@@ -98,7 +100,8 @@ def _copy_results(file: h5py.File, source: Reader) -> None:
         done = source.status(own) != Status.PENDING
         held = file["results/status"][there] != Status.PENDING
         both, new = done & held, done & ~held
-        for name, dataset in file["results"].items():
+        for name in (c.name for c in source.columns):
+            dataset = file["results"][name]
             values, before = source.column("results", name, own), dataset[there]
             same = _bytes(values[both]) == _bytes(before[both])
             if not same.all():
@@ -107,7 +110,7 @@ def _copy_results(file: h5py.File, source: Reader) -> None:
             before[new] = values[new]
             dataset[there] = before
         for name, dataset in file["ledger"].items():
-            if name != "errors_check":
+            if name not in ("errors_check", *LINKED):
                 dataset[there] = np.where(new, source.column("ledger", name, own), dataset[there])
 
 
@@ -129,7 +132,7 @@ def _histories_inside(file: h5py.File, n: int, sources: Sequence[Reader]) -> Non
     specs = sources[0].history_specs
     if not specs:
         return
-    group = file.create_group("histories")
+    group = create_group(file)
     for name, spec in specs.items():
         attach_scales(create_dataset(group, name, n, spec), file["row"], spec)
     for source in sources:

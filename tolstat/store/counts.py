@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import FAILED, Status
+from tolstat.common.shown import shown
+from tolstat.common.tables import FAILED, UNSETTLED, Status
 
 
+@shown
 class Counts(NamedTuple):
     """Numbers of joints by status.
 
@@ -19,17 +21,17 @@ class Counts(NamedTuple):
         All joints.
     done : int
         Joints that are not pending.
-    not_settled : int
-        Joints whose status is NOT_SETTLED or NOT_PERIODIC.
+    unsettled : int
+        Joints whose status is in `tables.UNSETTLED`.
     failed : int
         Joints without results.
     not_resolved : int
-        Joints whose largest loads still change with finer steps.
+        Those of the unsettled joints whose largest loads still change with finer steps.
     """
 
     total: int
     done: int
-    not_settled: int
+    unsettled: int
     failed: int
     not_resolved: int = 0
 
@@ -41,7 +43,7 @@ class Counts(NamedTuple):
     @property
     def shortfall(self) -> str:
         """``"1 failed, 0 not settled"``, and how many are not resolved if any are."""
-        words = f"{self.failed} failed, {self.not_settled} not settled"
+        words = f"{self.failed} failed, {self.unsettled - self.not_resolved} not settled"
         return words + (f", {self.not_resolved} not resolved" if self.not_resolved else "")
 
     def after(self, status: NDArray[np.uint8]) -> Counts:
@@ -53,7 +55,7 @@ class Counts(NamedTuple):
         return Counts(
             self.total,
             self.done + len(status) - count(Status.PENDING),
-            self.not_settled + count(Status.NOT_SETTLED, Status.NOT_PERIODIC),
+            self.unsettled + count(*UNSETTLED),
             self.failed + count(*FAILED),
             self.not_resolved + count(Status.NOT_RESOLVED),
         )

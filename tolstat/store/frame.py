@@ -8,42 +8,52 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import draw_records
-from tolstat.common.columns import ERROR_COLUMNS
+from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.tables import Status
+from tolstat.store.meanings import LABELS
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
+    from tolstat.store.checked_tables import CheckedTables
     from tolstat.store.reader import Reader
 
-LABELS = np.array([s.label for s in Status], dtype=object)
+
+def described(store: Reader) -> dict[str, Column]:
+    """Columns with unit and description that an export has, by name; see `to_pandas` for the others."""
+    return {c.name: c for c in (*draw_records.columns(store.sampling), *ERROR_COLUMNS, *store.columns)}
 
 
-def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
-    """Export a campaign to one DataFrame, see `ResultStore.to_pandas`."""
+def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
+    """Export a campaign to one DataFrame, see `Reader.to_pandas`."""
     import pandas as pd
 
-    errors, results = store.errors(), store.results()
-    data: dict[tuple[str, str], NDArray[Any]] = _design(store) if store.case_names else {}
+    first = 0 if nominal else store.first_sample
+    rows = slice(first, None)
+    errors, results = store.errors(rows), store.results(rows)
+    data: dict[str, NDArray[Any]] = {}
+    if nominal:
+        data["nominal"] = np.arange(store.n) < store.first_sample
+    if store.case_names:
+        data |= _design(store)
     drawn = draw_records.columns(store.sampling)
     if drawn:
-        origin = store.origin()
-        data |= {(c.name, c.unit): c.of(origin) for c in drawn}
-    data |= {(c.name, c.unit): c.of(errors) for c in ERROR_COLUMNS}
-    data |= {(c.name, c.unit): c.of(results) for c in store.columns}
+        origin = store.origin(rows)
+        data |= {c.name: c.of(origin) for c in drawn}
+    data |= {c.name: c.of(errors) for c in ERROR_COLUMNS}
+    data |= {c.name: c.of(results) for c in store.columns}
     if store.retries:
-        data["attempt", "1"] = store.attempt()
-    data["status", "1"] = LABELS[results["status"]]
-    index = pd.RangeIndex(store.rows, name="row")
-    if units:
-        return pd.DataFrame(data, index=index)
-    return pd.DataFrame({name: values for (name, _), values in data.items()}, index=index)
+        data["attempt"] = store.attempt(rows)
+    data |= {name: labels[data[name]] for name, labels in LABELS.items()}
+    frame = pd.DataFrame(data, index=pd.RangeIndex(store.rows[first:], name="row"))
+    columns = described(store)
+    frame.attrs["units"] = {name: columns[name].unit if name in columns else "1" for name in data}
+    return frame
 
 
-def to_xarray(store: Reader) -> xarray.Dataset:
-    """Export a campaign to one Dataset, see `ResultStore.to_xarray`."""
+def to_xarray(store: Reader, nominal: bool) -> xarray.Dataset:
+    """Export a campaign to one Dataset, see `Reader.to_xarray`."""
     try:
         import xarray
     except ImportError as error:
@@ -51,20 +61,19 @@ def to_xarray(store: Reader) -> xarray.Dataset:
             str(store.path), "xarray is not installed", "install it with: pip install xarray, or use to_pandas()"
         )
         raise InputError([fault]) from error
-    frame = to_pandas(store)
-    columns = (*draw_records.columns(store.sampling), *ERROR_COLUMNS, *store.columns)
-    described = {c.name: {"units": c.unit, "description": c.description} for c in columns}
-    data = {name: ("row", frame[name].to_numpy(), described.get(str(name), {})) for name in frame}
+    frame, columns = to_pandas(store, nominal), described(store)
+    attrs = {name: {"units": c.unit, "description": c.description} for name, c in columns.items()}
+    data = {name: ("row", frame[name].to_numpy(), attrs.get(str(name), {})) for name in frame}
     return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": store.study_name})
 
 
-def _design(store: Reader) -> dict[tuple[str, str], NDArray[Any]]:
+def _design(store: CheckedTables) -> dict[str, NDArray[Any]]:
     """Case, variant, family and group of each row; case and family by name, variant and group by index."""
     design = store.design()
     families = np.array([variant.family for variant in store.variants], dtype=object)
     return {
-        ("case", "1"): np.array(store.case_names, dtype=object)[design["case"]],
-        ("variant", "1"): design["variant"],
-        ("family", "1"): families[design["variant"]],
-        ("group", "1"): design["group"],
+        "case": np.array(store.case_names, dtype=object)[design["case"]],
+        "variant": design["variant"],
+        "family": families[design["variant"]],
+        "group": design["group"],
     }

@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 
 from tolstat.common.files import atomic_write
 from tolstat.common.tables import HistorySpec
-from tolstat.store.result_file import put_attributes, store_error
+from tolstat.store import meanings
+from tolstat.store.axes import attach_scales
+from tolstat.store.result_file import link_rows, put_attributes, store_error
 
 CHUNK_BYTES = 1 << 16
 """Approximate size of one chunk of a history before compression, bytes."""
@@ -33,6 +35,14 @@ HISTORY_BYTES = 1 << 25
 def rows_per_chunk(spec: HistorySpec, n: int) -> int:
     """Return how many of `n` joints share a compressed chunk."""
     return max(1, min(n, CHUNK_BYTES // spec.blank(1).nbytes))
+
+
+def create_group(file: h5py.File) -> h5py.Group:
+    """Create the group of the histories in a result file."""
+    group = file.create_group("histories")
+    put_attributes(group, {"description": "loads of each joint over its last revolution, or what follows from them"})
+    link_rows(file, group)
+    return group
 
 
 def create_dataset(group: h5py.Group, name: str, n: int, spec: HistorySpec) -> h5py.Dataset:
@@ -47,20 +57,9 @@ def create_dataset(group: h5py.Group, name: str, n: int, spec: HistorySpec) -> h
         fillvalue=spec.blank(1).flat[0],
     )
     put_attributes(dataset, {"units": spec.unit, "description": spec.description})
+    if name in meanings.FIXED:
+        meanings.put(dataset, meanings.FIXED[name])
     return dataset
-
-
-def attach_scales(dataset: h5py.Dataset, row: h5py.Dataset, spec: HistorySpec) -> None:
-    """Attach dimension scales to a history: `row` to the first axis, those named in `spec` to the others."""
-    dataset.dims[0].attach_scale(row)
-    name = dataset.name.rpartition("/")[2]
-    given = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
-    for k, (axis, size) in enumerate(zip(given, spec.shape, strict=True), 1):
-        if axis not in dataset.parent:
-            scale = dataset.parent.create_dataset(axis, data=np.arange(size, dtype="i4"))
-            scale.make_scale(axis)
-            put_attributes(scale, {"units": "1", "description": "index along this axis, from 0"})
-        dataset.dims[k].attach_scale(dataset.parent[axis])
 
 
 class Index(NamedTuple):
@@ -193,7 +192,7 @@ class HistoryParts:
         """
         index = self.index()
         self._check_held(index.part)
-        group = file.create_group("histories")
+        group = create_group(file)
         for name, spec in self.specs.items():
             dataset = create_dataset(group, name, self.n, spec)
             attach_scales(dataset, file["row"], spec)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -12,25 +12,19 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results, tables
-from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common import selected_results
 from tolstat.common.errors import StoreError
+from tolstat.common.loads import limits_in_words
+from tolstat.common.shown import table
 from tolstat.common.tables import Status, Variant
 from tolstat.store import checks, integrity
+from tolstat.store.checked_tables import CheckedTables
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
 from tolstat.store.histories import HistoryParts
-from tolstat.store.numbering import Numbering
-from tolstat.store.result_file import (
-    BLOCK,
-    RUN_AGAIN,
-    campaign_digest,
-    descriptions,
-    is_locked,
-    open_hdf5,
-    store_error,
-    text,
-)
+from tolstat.store.named_loads import NamedLoads
+from tolstat.store.result_file import BLOCK, RUN_AGAIN, campaign_digest, is_locked, open_hdf5, store_error, text
+from tolstat.store.view import View
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,8 +38,81 @@ class Session(NamedTuple):
     done: int
 
 
-class Reader(Numbering):
-    """Read access to an open result file; see `ResultStore`."""
+class Reader(CheckedTables):
+    """A result file that is open for reading, also while a campaign writes it; close it, or use a ``with`` block.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    n : int
+        Number of joints in the file.
+    rows : range
+        Rows of the campaign in the file: all of them, unless the file holds a slice. File slot i (row i of every
+        table) is row ``rows[i]`` of the campaign.
+    campaign_rows : int
+        Number of rows of the campaign.
+    study_name, study_text : str
+        Name of the study and the TOML that it was read from.
+    identity : dict
+        All settings that determine results, by dotted key.
+    columns : tuple of Column
+        Columns of the results that the campaign keeps, in the order of the table.
+    joint, options, sampling, versions : dict
+        Nominal joint with all values resolved, solver options, sampling (with ``dimensions``), software versions.
+    limits : dict of str to float
+        Limits of the study in SI units, ``{"cross1.F": 700.0}``.
+    case_names : tuple of str
+        Cases of a study that lists its joints, ``"ideal"`` first; empty for other methods.
+    variants : tuple of Variant
+        Family and values (dotted key to SI value or word) of each joint that the study lists; else empty.
+    created, git_commit : str
+        Time of creation (UTC) and commit of the code, if known.
+    stop : dict
+        Stop rule and its outcome, if the precision asked for was reached before all rows were simulated; else empty.
+    retries : list of dict
+        Settings of each retry, in chronological order; see `attempt`.
+    history_specs : dict of str to HistorySpec
+        Histories that the campaign keeps; empty if none.
+    """
+
+    @classmethod
+    def open(cls, path: str | Path) -> Reader:
+        """Open a result file for reading, also while a campaign writes it.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Reader
+            Has no method that writes; close it, or use it in a ``with`` block.
+
+        Raises
+        ------
+        StoreError
+            When it is not a result file of this schema version, or is damaged.
+
+        Examples
+        --------
+        >>> with tolstat.open("iso2768_f.h5") as store:  # doctest: +SKIP
+        ...     store.loads["cross1.F"].describe()
+        """
+        return Reader._opened(Path(path), "r")
+
+    @classmethod
+    def _opened(cls, path: Path, mode: str) -> Self:
+        file = open_hdf5(path, mode)
+        try:
+            return cls(path, file)
+        except StoreError:
+            file.close()
+            raise
+        except checks.DAMAGE_ERRORS as error:
+            file.close()
+            raise store_error(path, f"is damaged: {error}", RUN_AGAIN) from error
 
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
@@ -77,6 +144,25 @@ class Reader(Numbering):
         checks.check_histories(file, self.history_specs, self.n)
         self._parts = HistoryParts(parts_folder(path), self.n, self.history_specs, campaign_digest(file))
 
+    def __repr__(self) -> str:
+        if not self._file:
+            return f"<result file {self.path.name!r}, closed>"
+        return f"<result file {self.path.name!r}: {self.n - self.first_sample} joints ({self._progress()})>"
+
+    def _repr_html_(self) -> str:
+        entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
+        entries += [("sampling", self.sampling["method"]), ("created", self.created)]
+        entries.append(("limits", limits_in_words(self.limits)))
+        if self._file:
+            entries.append(("loads", ", ".join(self.loads)))
+        return table(repr(self)[1:-1], entries)
+
+    def _progress(self) -> str:
+        """Numbers of joints by status, the nominal joint not counted; states as the file has them, unchecked."""
+        codes, numbers = np.unique(self.column("results", "status", slice(self.first_sample, None)), return_counts=True)
+        labels = {status.value: status.label for status in Status}
+        return ", ".join(f"{n} {labels.get(code, 'damaged')}" for code, n in zip(codes.tolist(), numbers, strict=True))
+
     def __enter__(self) -> Self:
         return self
 
@@ -89,6 +175,29 @@ class Reader(Numbering):
         """Close the file."""
         self._file.close()
 
+    def view(self, study_path: Path | None = None) -> View:
+        """View of the file that questions read, while the file is open.
+
+        Parameters
+        ----------
+        study_path : Path, optional
+            Study file to read if the text in the result file can no longer be read.
+        """
+        return View(self, study_path)
+
+    @cached_property
+    def loads(self) -> NamedLoads:
+        """Largest loads of the joints by name, as pandas Series: ``store.loads["cross1.F"]``.
+
+        They are read when first used, and kept: open the file anew to see more of a campaign under way.
+        """
+        return NamedLoads(self.view())
+
+    @property
+    def nominal(self) -> pd.Series[float]:
+        """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
+        return self.loads.nominal()
+
     @property
     def complete(self) -> bool:
         """Whether no row is pending."""
@@ -98,30 +207,6 @@ class Reader(Numbering):
     def whole(self) -> bool:
         """Whether the file holds all rows of its campaign, not a slice."""
         return self.rows == range(self.campaign_rows)
-
-    def status(self, rows: slice = slice(None)) -> NDArray[np.uint8]:
-        """Status of the joints, (n,), or of a slice of file slots; joints whose row is damaged are PENDING.
-
-        Raises
-        ------
-        StoreError
-            When a status is unknown to this version.
-        """
-        if self._file.mode != "r":
-            return self._status(rows)  # opening for writing has already marked damaged rows as pending
-        first, last, _ = rows.indices(self.n)
-        blocks = (slice(begin, min(begin + BLOCK, last)) for begin in range(first, last, BLOCK))
-        return np.concatenate([np.empty(0, np.uint8), *map(self._status_if_intact, blocks)])
-
-    def damaged(self) -> NDArray[np.intp]:
-        """File slots whose results do not match their checksums, as after an interrupted write or a disk fault."""
-        found = [np.empty(0, np.intp)]
-        for first in range(0, self.n, BLOCK):
-            rows = slice(first, first + BLOCK)
-            done = self._status(rows) != Status.PENDING
-            if done.any():
-                found.append(first + np.flatnonzero(done & ~self._intact(rows, self._results(rows))))
-        return np.concatenate(found)
 
     def counts(self) -> Counts:
         """Count the joints of the file by status."""
@@ -134,92 +219,8 @@ class Reader(Numbering):
         """Return the run under way; None if no process is writing the file."""
         if "session" not in self._file or not is_locked(self.path):
             return None
-        started, done = np.asarray(self._file["session"][:])
+        started, done = (self._file["session"][name][()] for name in ("started", "done"))
         return Session(float(started), int(done)) if started > 0 else None
-
-    def pending(self) -> NDArray[np.intp]:
-        """File slots still to be simulated, ascending."""
-        return np.concatenate([np.empty(0, np.intp), *self.pending_blocks()])
-
-    def pending_blocks(self) -> Iterator[NDArray[np.intp]]:
-        """Yield the file slots still to be simulated, ascending, in non-empty arrays of at most `BLOCK`."""
-        for first in range(0, self.n, BLOCK):
-            found = np.flatnonzero(self.status(slice(first, first + BLOCK)) == Status.PENDING)
-            if found.size:
-                yield found + first
-
-    def design(self) -> NDArray[np.void]:
-        """Variant, case and group of every joint, (n,) table DESIGN.
-
-        Raises
-        ------
-        StoreError
-            When the study does not list its joints, or the table is damaged.
-        """
-        if "design" not in self._file:
-            remedy = 'give the result file of a study with sampling.method = "cases"'
-            raise store_error(self.path, "has no list of cases and variants", remedy)
-        table = self._described("design", slice(None))
-        for name, end in (("variant", len(self.variants)), ("case", len(self.case_names))):
-            if table[name].min() < 0 or table[name].max() >= end:
-                found = f"is damaged: design/{name} is not between 0 and {end - 1}"
-                raise store_error(self.path, found, RUN_AGAIN)
-        self._check_errors(slice(None), self._errors(slice(None)))
-        return table
-
-    def origin(self, rows: slice = slice(None)) -> NDArray[np.void]:
-        """How every joint was drawn, (n,) table with the columns `draw_records.columns`, or of a slice of file slots.
-
-        Raises
-        ------
-        StoreError
-            When the sampling method has no such table, or it is damaged.
-        """
-        if "origin" not in self._file:
-            remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
-            raise store_error(self.path, "has no record of how its joints were drawn", remedy)
-        self.errors(rows)  # checks this table too: it enters the checksums of the errors
-        return self._described("origin", rows)
-
-    def errors(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
-        """Errors of every joint, (n,) table ERROR, or of a slice of file slots.
-
-        With `fields` the table has these only: all fields are read and checked in blocks, the others then dropped.
-
-        Raises
-        ------
-        StoreError
-            When the errors are damaged.
-        """
-        if fields is not None:
-            return self._in_blocks(self.errors, rows, tables.ERROR, fields)
-        table = self._errors(rows)
-        self._check_errors(rows, table)
-        return table
-
-    def results(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
-        """Results of every joint, (n,) table RESULT, or of a slice of file slots.
-
-        A joint whose row is damaged is PENDING. Results of pending joints are NaN (integers 0), as are columns that
-        the campaign does not keep. With `fields` the table has these only, as in `errors`.
-
-        Raises
-        ------
-        StoreError
-            When a status is unknown to this version.
-        """
-        if fields is not None:
-            return self._in_blocks(self.results, rows, tables.RESULT, fields)
-        table = self._results(rows)
-        broken = (table["status"] == Status.PENDING) | ~self._intact(rows, table)
-        for field in tables.RESULT_FIELDS:
-            table[field.name][broken] = np.nan if np.dtype(field.dtype).kind == "f" else 0
-        self._check_status(table["status"])
-        return table
-
-    def attempt(self, rows: slice = slice(None)) -> NDArray[np.int32]:
-        """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``."""
-        return np.asarray(self.column("ledger", "attempt", rows))
 
     def histories(self, name: str, rows: NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Read the histories of one kind.
@@ -260,25 +261,45 @@ class Reader(Numbering):
         self._check_history(name, unique, values, np.ones(len(unique), bool))
         return values[back]
 
-    def to_pandas(self, units: bool = False) -> pd.DataFrame:
+    def to_pandas(self, nominal: bool = False) -> pd.DataFrame:
         """Export errors and results as one DataFrame, one row per joint, pending and failed joints included.
 
         Parameters
         ----------
-        units : bool
-            Give the columns a second level with the SI unit.
+        nominal : bool
+            Include the nominal joint, and a column ``nominal`` that marks it.
 
         Returns
         -------
         pandas.DataFrame
             Index ``row``: row of the campaign. Columns: case, variant, family and group for a study that lists its
-            joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` as text.
+            joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` and ``motion``
+            as text. ``attrs["units"]`` has the SI unit of each column.
         """
-        return to_pandas(self, units)
+        return to_pandas(self, nominal)
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Export errors and results along ``row``, with units and descriptions; raises InputError without xarray."""
-        return to_xarray(self)
+    def to_xarray(self, nominal: bool = False) -> xarray.Dataset:
+        """Export errors and results along ``row``, with units and descriptions.
+
+        Parameters
+        ----------
+        nominal : bool
+            As in `to_pandas`.
+
+        Raises
+        ------
+        InputError
+            Without xarray.
+        """
+        return to_xarray(self, nominal)
+
+    def attributes(self) -> dict[str, str | int]:
+        """All attributes of the file as integers or text; JSON is not parsed."""
+        attrs = self._file.attrs
+        return {
+            name: int(value) if isinstance(value, (int, np.integer)) else text(attrs, name)
+            for name, value in attrs.items()
+        }
 
     def _read_study_attributes(self) -> None:
         attrs = self._file.attrs
@@ -298,44 +319,6 @@ class Reader(Numbering):
         self._file = file
         return True
 
-    def _status(self, rows: slice) -> NDArray[np.uint8]:
-        found = np.asarray(self.column("results", "status", rows))
-        self._check_status(found)
-        return found
-
-    def _status_if_intact(self, rows: slice) -> NDArray[np.uint8]:
-        found = self._status(rows)
-        # any(): PENDING is 0; copy(): a view would keep the whole table of the block in memory
-        return self.results(rows)["status"].copy() if found.any() else found
-
-    def _check_status(self, found: NDArray[np.uint8]) -> None:
-        if found.size and found.max() > max(Status):
-            raise store_error(self.path, f"is damaged: a joint has the unknown status {found.max()}", RUN_AGAIN)
-
-    def _described(self, group: str, rows: slice) -> NDArray[np.void]:
-        return self._read(group, *descriptions(self._file)[group], rows)
-
-    def _errors(self, rows: slice) -> NDArray[np.void]:
-        return self._read("errors", ERROR_COLUMNS, tables.ERROR, rows)
-
-    def _results(self, rows: slice) -> NDArray[np.void]:
-        table = self._read("results", self.columns, tables.RESULT, rows)
-        selected_results.blank_others(table, self.columns)
-        return table
-
-    def _intact(self, rows: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:
-        """Whether rows match their checksums, (m,); checksums are read after the values, the order of writing."""
-        attempt, errors, held = (self.column("ledger", c.name, rows) for c in LEDGER_COLUMNS)
-        return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
-
-    def _check_errors(self, rows: slice, errors: NDArray[np.void]) -> None:
-        first = self.row(rows.indices(self.n)[0])
-        described = [(c, self._read(name, c, dtype, rows)) for name, (c, dtype) in descriptions(self._file).items()]
-        right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", rows)
-        if not right.all():
-            found = f"is damaged: the errors of row {first + int(np.argmin(right))} do not match their checksum"
-            raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
-
     def _check_history(self, name: str, rows: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
         held = self.column("ledger", f"{name}_check", slice(None))[rows[done]]
         wrong = integrity.history_checks(values[done], self.row(rows[done])) != held
@@ -343,49 +326,6 @@ class Reader(Numbering):
             row = self.rows[rows[done][np.argmax(wrong)]]
             found = f"is damaged: the history {name} of row {row} does not match its checksum"
             raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
-
-    def _in_blocks(
-        self, read: Callable[[slice], NDArray[np.void]], rows: slice, dtype: np.dtype[np.void], fields: Sequence[str]
-    ) -> NDArray[np.void]:
-        """Selected fields of a table; all fields are read and checked, `BLOCK` rows at a time."""
-        first, last, _ = rows.indices(self.n)
-        table = np.empty(max(0, last - first), [(name, dtype[name]) for name in fields])
-        for begin in range(first, last, BLOCK) if fields else ():
-            block = read(slice(begin, min(begin + BLOCK, last)))
-            for name in fields:
-                table[name][begin - first : begin - first + len(block)] = block[name]
-        return table
-
-    def _read(self, group: str, columns: tuple[Column, ...], dtype: Any, rows: slice) -> NDArray[np.void]:
-        first, last, _ = rows.indices(self.n)
-        table = np.zeros(max(0, last - first), dtype)
-        # The status is read first among the results: the values that it declares valid were written before it.
-        for c in columns:
-            c.of(table)[:] = self.column(group, c.name, slice(first, last))
-        return table
-
-    def attributes(self) -> dict[str, str | int]:
-        """All attributes of the file as integers or text; JSON is not parsed."""
-        attrs = self._file.attrs
-        return {
-            name: int(value) if isinstance(value, (int, np.integer)) else text(attrs, name)
-            for name, value in attrs.items()
-        }
-
-    def column(self, group: str, name: str, rows: Any) -> NDArray[Any]:
-        """Read a dataset at an index or slice of its rows.
-
-        Raises
-        ------
-        StoreError
-            When it cannot be read.
-        """
-        try:
-            return np.asarray(self._file[group][name][rows])
-        except checks.DAMAGE_ERRORS as error:
-            if not self._file:
-                raise
-            raise store_error(self.path, f"is damaged: {group}/{name} cannot be read", RUN_AGAIN) from error
 
 
 def parts_folder(path: Path) -> Path:

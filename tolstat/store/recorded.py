@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.solver_options import from_names, unknown_names
 from tolstat.common.strict import validate
 from tolstat.common.tables import PARAM, Options
 from tolstat.joint import Joint, perturb, varied
@@ -50,13 +51,13 @@ def options_of(store: Reader, row: int) -> Options:
         solver = validate(Solver, nested(written)["solver"], f"{store.path}: solver")
         return settings(solver, store.fidelity)
     held = store.retries[attempt - 1]["options"] if attempt else store.options
-    unknown = held.keys() - set(Options._fields)
+    unknown = [*sorted(held.keys() - set(Options._fields)), *unknown_names(held)]
     if unknown:
-        found = f"has solver options that this version of tolstat does not know: {', '.join(sorted(unknown))}"
+        found = f"has solver options that this version of tolstat does not know: {', '.join(unknown)}"
         raise InputError(
             [Fault(str(store.path), found, f"use the version that made it: {store.versions.get('tolstat')}")]
         )
-    return Options(**held)
+    return from_names(held)
 
 
 def settings(solver: Solver, choice: dict[str, Any]) -> Options:

@@ -1,4 +1,4 @@
-"""Layout of a result file (docs/result_format.md): fill a new file, open or replace an existing one."""
+"""Result files as HDF5: open one, replace one by a changed copy, read and write columns and attributes."""
 
 from __future__ import annotations
 
@@ -6,33 +6,27 @@ import errno
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records, selected_results, tables
-from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common import draw_records, tables
+from tolstat.common.columns import DESIGN_COLUMNS, Column
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.files import atomic_write, check_disk_space
-from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Options
-from tolstat.store.integrity import errors_hash, seal
-from tolstat.store.provenance import git_commit, versions
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
+from tolstat.store.integrity import seal
 
 FILETYPE = "tolstat campaign"
 MAX_FIXED_TEXT = 32_000
 """Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
-COLUMN_OVERHEAD = 800
-"""Bytes that HDF5 needs per column beside its values."""
+LINKED = ("row", "nominal")
+"""Datasets of the file that every group with joints has as links: number of each row, mark of the nominal joint."""
 BLOCK = 1 << 16
 """Rows read or written at a time, so that no table of a large campaign need be in memory."""
 RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
@@ -47,61 +41,6 @@ def campaign_digest(file: h5py.File) -> str:
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
 
 
-def study_attributes(study: Study) -> dict[str, str]:
-    """Return the attributes of a study that do not affect results and may change between runs of a campaign."""
-    return {"study": study.text, "study_name": study.name, "limits": json.dumps(study.limits, allow_nan=False)}
-
-
-def attributes(
-    study: Study,
-    specs: Mapping[str, HistorySpec],
-    dimensions: Mapping[str, int],
-    options: Options | None = None,
-    fidelity: Mapping[str, Any] | None = None,
-) -> dict[str, Any]:
-    """Return the attributes of a new file: all that a reader needs beyond the tables.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    specs : mapping of str to HistorySpec
-        Histories that the campaign keeps.
-    dimensions : mapping of str to int
-        Dimension of the sampling sequence that each error is drawn from.
-    options, fidelity : Options and mapping, optional
-        Settings that ``solver.fidelity = "auto"`` chose, and the record of that choice.
-    """
-    sampling = study.sampling.model_dump(mode="json")
-    structured = {
-        "identity": study.identity(),
-        "joint": study.joint.model_dump(mode="json"),
-        "options": (options or study.solver.options())._asdict(),
-        "fidelity": dict(fidelity or {}),
-        "design": {"cases": study.case_names, "variants": [variant._asdict() for variant in study.variants]},
-        "sampling": sampling | {"dimensions": dict(dimensions)},
-        "versions": versions(),
-        "histories": specs,
-        "retries": [],
-    }
-    plain = {
-        "filetype": FILETYPE,
-        "schema_version": SCHEMA_VERSION,
-        "campaign_rows": study.rows,
-        "git_commit": git_commit(),
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-    plain |= study_attributes(study)
-    return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
-
-
-def size_of_new(n: int, results: tuple[Column, ...]) -> int:
-    """Approximate upper bound on the size of a new file of `n` rows, bytes, without long attributes."""
-    groups = (DESIGN_COLUMNS, ERROR_COLUMNS, results, LEDGER_COLUMNS)
-    columns = [np.dtype(c.dtype).itemsize for group in groups for c in group]
-    return n * sum(columns) + COLUMN_OVERHEAD * len(columns)
-
-
 def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:
     """Write attributes; texts are fixed-length UTF-8, which MATLAB and Fortran can read, except very long ones."""
     for name, value in values.items():
@@ -111,6 +50,12 @@ def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str |
             data = value.encode()
             dtype = h5py.string_dtype("utf-8", max(1, len(data)))
         holder.attrs.create(name, data, dtype=dtype)
+
+
+def link_rows(file: h5py.File, group: h5py.Group) -> None:
+    """Link ``row`` and ``nominal`` of the file into a group, so that it can be read on its own."""
+    for name in LINKED:
+        group[name] = file[name]
 
 
 def text(attrs: h5py.AttributeManager, name: str) -> str:
@@ -131,78 +76,9 @@ def text(attrs: h5py.AttributeManager, name: str) -> str:
     raise ValueError(f"attribute {name} is not a text")
 
 
-def fill(
-    file: h5py.File,
-    attrs: Mapping[str, str | int | float],
-    rows: range,
-    errors: Iterable[NDArray[np.void]],
-    design: NDArray[np.void] | None,
-    origin: Iterable[NDArray[np.void]] | None = None,
-) -> None:
-    """Fill an empty file with everything but histories, all rows pending.
-
-    Parameters
-    ----------
-    file : h5py.File
-        The file.
-    attrs : mapping
-        See `attributes`.
-    rows : range
-        Rows of the campaign that the file holds.
-    errors : iterable of table ERROR
-        Errors of these rows, in consecutive blocks.
-    design : (len(rows),) table DESIGN, optional
-        Variant, case and group of each row, for a study that lists its joints.
-    origin : iterable of tables, optional
-        How each row was drawn, in consecutive blocks, for methods that have `draw_records.columns`.
-    """
-    n = len(rows)
-    put_attributes(file, dict(attrs) | {"first_row": rows.start})
-    scale = file.create_dataset("row", (n,), "i8", dcpl=_allocated(None))
-    for first in range(0, n, BLOCK):
-        last = min(first + BLOCK, n)
-        scale[first:last] = np.arange(rows.start + first, rows.start + last)
-    scale.make_scale("row")
-    put_attributes(scale, {"units": "1", "description": "row of the campaign: the joint's number"})
-    if design is not None:
-        create_table(file, "design", DESIGN_COLUMNS, n, [design])
-    drawn = draw_records.columns(json.loads(str(attrs["sampling"])))
-    if bool(drawn) != (origin is not None):
-        raise ValueError("how the joints were drawn must be given for the methods that have columns for it, only")
-    if drawn:
-        create_table(file, "origin", drawn, n, origin)
-    create_table(file, "results", selected_results.columns(json.loads(str(attrs["identity"]))), n)
-    create_table(file, "ledger", (*LEDGER_COLUMNS, *history_check_columns(attrs)), n)
-    session = file.create_dataset("session", (2,), "f8", dcpl=_allocated("f8", 0.0))
-    put_attributes(session, {"units": "s, 1", "description": "of the run under way: start (Unix time), joints done"})
-    create_table(file, "errors", ERROR_COLUMNS, n, _checked(file, rows, errors))
-    seal(file)
-
-
-def history_check_columns(attrs: Mapping[str, Any]) -> tuple[Column, ...]:
-    """Columns of the ledger with the checksums of the kept histories."""
-    return tuple(check_column(name) for name in json.loads(attrs["histories"]))
-
-
 def check_column(history: str) -> Column:
     """Column of the ledger with the checksums of a history."""
     return Column(f"{history}_check", "1", f"CRC-32 of the joint's {history}", "u4", f"{history}_check", ())
-
-
-def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -> Iterator[NDArray[np.void]]:
-    """Yield the blocks of `errors` unchanged, after writing their checksums."""
-    first = 0
-    for block in errors:
-        here = slice(first, first + len(block))
-        described = []
-        for group, (columns, dtype) in descriptions(file).items():
-            table = np.empty(len(block), dtype)
-            for c in columns:
-                c.of(table)[:] = file[group][c.name][here]
-            described.append((columns, table))
-        file["ledger/errors_check"][here] = errors_hash(rows.start + first, block, described)
-        yield block
-        first = here.stop
 
 
 def descriptions(file: h5py.File) -> dict[str, tuple[tuple[Column, ...], np.dtype[np.void]]]:
@@ -215,58 +91,6 @@ def descriptions(file: h5py.File) -> dict[str, tuple[tuple[Column, ...], np.dtyp
         sampling = json.loads(text(file.attrs, "sampling"))
         held["origin"] = (draw_records.columns(sampling), draw_records.dtype(sampling))
     return held
-
-
-def create_table(
-    file: h5py.File,
-    name: str,
-    columns: tuple[Column, ...],
-    n: int,
-    blocks: Iterable[NDArray[np.void]] | None = None,
-    scale: h5py.Dataset | None = None,
-) -> None:
-    """Create a table: one contiguous dataset per column, which can be overwritten in place.
-
-    Parameters
-    ----------
-    file : h5py.File
-        File with the dimension scale ``row``.
-    name : str
-        Group of the datasets.
-    columns : tuple of Column
-        Columns of the table.
-    n : int
-        Number of rows.
-    blocks : iterable of structured array, optional
-        Values, in consecutive blocks of rows; without them floats are NaN and integers 0.
-    scale : h5py.Dataset, optional
-        Dimension scale of the rows; ``row`` of the file without it.
-    """
-    group, row = file.create_group(name), scale or file["row"]
-    for c in columns:
-        blank = np.nan if np.dtype(c.dtype).kind == "f" else 0
-        dataset = group.create_dataset(
-            c.name, (n,), c.dtype, dcpl=_allocated(c.dtype, blank if blocks is None else None)
-        )
-        dataset.dims[0].attach_scale(row)
-        put_attributes(dataset, {"units": c.unit, "description": c.description})
-    first = 0
-    for block in blocks or ():
-        for c in columns:
-            group[c.name][first : first + len(block)] = c.of(block)
-        first += len(block)
-    if blocks is not None and first != n:
-        raise ValueError(f"{first} rows of {name} given, {n} expected")
-
-
-def _allocated(dtype: str | None, fill: float | None = None) -> h5py.h5p.PropDCID:
-    """Creation properties of a dataset that is allocated, and filled with `fill` if given, when it is created."""
-    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
-    if fill is not None:
-        properties.set_fill_value(np.array(fill, dtype))
-    return properties
 
 
 def get(dataset: h5py.Dataset, rows: NDArray[np.intp]) -> NDArray[Any]:

@@ -20,82 +20,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
-from tolstat.common.errors import StoreError
 from tolstat.common.files import atomic_write, check_disk_space
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
-from tolstat.store.checks import DAMAGE_ERRORS
 from tolstat.store.histories import HISTORY_BYTES
 from tolstat.store.integrity import history_checks, results_hash
+from tolstat.store.new_file import attributes, fill, size_of_new, study_attributes
 from tolstat.store.reader import Reader, parts_folder
-from tolstat.store.result_file import (
-    RUN_AGAIN,
-    attributes,
-    copy_open,
-    fill,
-    get,
-    is_at,
-    open_hdf5,
-    put,
-    put_attributes,
-    replace,
-    size_of_new,
-    store_error,
-    study_attributes,
-    text,
-)
-from tolstat.store.view import View
+from tolstat.store.result_file import copy_open, get, is_at, put, put_attributes, replace, store_error, text
 
 if TYPE_CHECKING:
     from tolstat.study import Study
 
 
 class ResultStore(Reader):
-    """A result file; make one with `create` or `open`, and use it as a context manager.
+    """A result file that is open for writing, made by `create` or `open_to_write`.
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    n : int
-        Number of joints in the file.
-    rows : range
-        Rows of the campaign in the file: all of them, unless the file holds a slice. File slot i (row i of every
-        table) is row ``rows[i]`` of the campaign.
-    campaign_rows : int
-        Number of rows of the campaign.
-    study_name, study_text : str
-        Name of the study and the TOML that it was read from.
-    identity : dict
-        All settings that determine results, by dotted key.
-    columns : tuple of Column
-        Columns of the results that the campaign keeps, in the order of the table.
-    joint, options, sampling, versions : dict
-        Nominal joint with all values resolved, solver options, sampling (with ``dimensions``), software versions.
-    limits : dict of str to float
-        Limits of the study in SI units, ``{"cross1.F": 700.0}``.
-    case_names : tuple of str
-        Cases of a study that lists its joints, ``"ideal"`` first; empty for other methods.
-    variants : tuple of Variant
-        Family and values (dotted key to SI value or word) of each joint that the study lists; else empty.
-    created, git_commit : str
-        Time of creation (UTC) and commit of the code, if known.
-    stop : dict
-        Stop rule and its outcome, if the precision asked for was reached before all rows were simulated; else empty.
-    retries : list of dict
-        Settings of each retry, in chronological order; see `attempt`.
-    history_specs : dict of str to HistorySpec
-        Histories that the campaign keeps; empty if none.
+    It reads as its base class `Reader` does.
     """
-
-    def view(self, study_path: Path | None = None) -> View:
-        """View of the file that questions read, while the file is open.
-
-        Parameters
-        ----------
-        study_path : Path, optional
-            Study file to read if the text in the result file can no longer be read.
-        """
-        return View(self, study_path)
 
     @classmethod
     def create(
@@ -161,19 +102,18 @@ class ResultStore(Reader):
             reason = error.strerror or str(error)
             remedy = "check that the folder is writable and the disk has space"
             raise store_error(path, f"cannot be written: {reason}", remedy) from error
-        return cls.open(path, "r+")
+        return cls.open_to_write(path)
 
     @classmethod
-    def open(cls, path: str | Path, mode: str = "r") -> Self:
-        """Open a result file.
+    def open_to_write(cls, path: str | Path) -> Self:
+        """Open a result file for writing, by one process at a time.
+
+        Rows with damaged results or missing histories become pending.
 
         Parameters
         ----------
         path : str or Path
             The file.
-        mode : {"r", "r+"}
-            For reading, also while a campaign writes it; or for writing, by one process at a time, where rows with
-            damaged results or missing histories become pending.
 
         Raises
         ------
@@ -181,21 +121,9 @@ class ResultStore(Reader):
             When it is not a result file of this schema version, is damaged, or is being written by another
             process.
         """
-        if mode not in ("r", "r+"):
-            raise ValueError(f"mode is {mode!r}, 'r' or 'r+' expected")
-        path = Path(path)
-        file = open_hdf5(path, mode)
-        try:
-            store = cls(path, file)
-        except StoreError:
-            file.close()
-            raise
-        except DAMAGE_ERRORS as error:
-            file.close()
-            raise store_error(path, f"is damaged: {error}", RUN_AGAIN) from error
-        if mode == "r+":
-            store._make_pending(store.damaged())
-            store._reset_rows_without_histories()
+        store = cls._opened(Path(path), "r+")
+        store._make_pending(store.damaged())
+        store._reset_rows_without_histories()
         return store
 
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
@@ -236,12 +164,16 @@ class ResultStore(Reader):
 
     def begin_session(self, done: int) -> None:
         """Record for readers of the file that a run begins with `done` joints finished."""
-        self._file["session"][:] = time.time(), done
+        session = self._file["session"]
+        session["done"][()] = done
+        session["started"][()] = time.time()
         self._sync()
 
     def end_session(self) -> None:
         """Record that the run is over; after a killed run, readers infer this from the missing lock (`session`)."""
-        self._file["session"][:] = 0.0
+        session = self._file["session"]
+        session["started"][()] = np.nan
+        session["done"][()] = 0
         self._sync()
 
     def finish(self) -> None:

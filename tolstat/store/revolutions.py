@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.shown import shown
 from tolstat.common.tables import BUSHINGS
 from tolstat.joint import perturb
 from tolstat.solver.simulation import restore, simulate_rows, warm_up
@@ -28,6 +29,7 @@ _COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 FloatArray = NDArray[np.float64]
 
 
+@shown
 class Revolutions(NamedTuple):
     """Moduli of the bushing loads of some joints over the last revolution.
 
@@ -73,7 +75,7 @@ def read(store: Reader, slots: NDArray[np.intp], max_angles: int = ANGLES) -> Re
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         A campaign whose joints are drawn from tolerances.
     slots : ndarray of int, shape (m,)
         File slots, ascending; none pending.
@@ -114,7 +116,7 @@ def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         The campaign.
     slots : ndarray of int, shape (m,)
         File slots.

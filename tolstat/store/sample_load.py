@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,13 +12,23 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis import exceedance, quantile, weighted
 from tolstat.analysis.exceedance import Exceedance, FloatArray, Mask
 from tolstat.analysis.quantile import Quantile
+from tolstat.common.shown import table
 
 CONFIDENCE = 0.95
 LONG_TAIL = 3.0
 """Ratio of the largest load to the median above which a load has a long tail."""
 
 
-@dataclass(frozen=True, eq=False)
+ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
+
+
+def frozen(array: ArrayT) -> ArrayT:
+    """Return an array that is kept for later readers, and cannot be written to from now on."""
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class SampleLoad:
     """Largest load over the revolution of n joints.
 
@@ -51,10 +62,24 @@ class SampleLoad:
     weights: FloatArray | None
     iid: bool
 
+    def __repr__(self) -> str:
+        valid = self.valid
+        span = f", {valid[0]:.4g} to {valid[-1]:.4g} {self.unit}" if valid.size else ""
+        limit = "" if self.limit is None else f", limit {self.limit:.4g} {self.unit}"
+        return f"<load {self.name!r}: {valid.size} of {self.values.size} joints valid{span}{limit}>"
+
+    def _repr_html_(self) -> str:
+        shares = (0.5, 0.9, 0.99) if self.valid.size else ()
+        entries = [(f"{share:.0%} quantile", f"{self.quantile(share).estimate:.4g} {self.unit}") for share in shares]
+        return table(repr(self)[1:-1], [("nominal", f"{self.nominal:.4g} {self.unit}"), *entries])
+
     @cached_property
     def sample(self) -> exceedance.Sample:
         """Loads of the valid joints, ascending, and numbers of the others."""
-        return exceedance.sort_out(self.values, self.status, self.ends)
+        sample = exceedance.sort_out(self.values, self.status, self.ends)
+        for array in (sample.valid, sample.lower, sample.upper):
+            frozen(array)
+        return sample
 
     @cached_property
     def _weighted(self) -> weighted.Sample:
@@ -69,7 +94,7 @@ class SampleLoad:
     @cached_property
     def is_valid(self) -> Mask:
         """Which joints are valid, (n,)."""
-        return exceedance.split(self.values, self.status)[0]
+        return frozen(exceedance.split(self.values, self.status)[0])
 
     @property
     def valid_or_nan(self) -> FloatArray:
@@ -93,7 +118,7 @@ class SampleLoad:
         return Exceedance(*self.curve([level], confidence)[0].tolist())
 
     def quantile(self, share: float, confidence: float = CONFIDENCE) -> Quantile:
-        """Load that a share of the joints stays at or below; see `quantile.at`."""
+        """Load that a share of the joints stays at or below; see `quantile.quantile`."""
         if self.weights is None:
             return quantile.of_sample(self.sample, share, confidence, self.iid)
         return weighted.quantile_of(self._weighted, share, confidence)

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results, tables
 from tolstat.common.columns import Column
-from tolstat.store.result_file import create_table, put_attributes, text
+from tolstat.common.shown import shown
+from tolstat.store.new_file import create_table
+from tolstat.store.result_file import put_attributes, text
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 GROUP = "verify"
 
 
+@shown
 class Check(NamedTuple):
     """Results of the joints with other settings or another solver.
 
@@ -38,6 +41,7 @@ class Check(NamedTuple):
     results: NDArray[np.void]
 
 
+@shown
 class Verification(NamedTuple):
     """Some joints of a campaign: their results in the campaign and in each check.
 
@@ -93,7 +97,9 @@ def _write(file: h5py.File, verification: Verification, columns: tuple[Column, .
     if GROUP in file:
         del file[GROUP]
     group = file.create_group(GROUP)
-    put_attributes(group, {"seed": verification.seed, "checks": " ".join(verification.checks)})
+    about = "joints of the campaign simulated again in other ways, to know its numerical error"
+    names = " ".join(verification.checks)
+    put_attributes(group, {"description": about, "seed": verification.seed, "checks": names})
     rows = group.create_dataset("rows", data=verification.rows.astype("i8"))
     rows.make_scale("rows")
     put_attributes(rows, {"units": "1", "description": "rows of the joints in the campaign, counted from 0"})

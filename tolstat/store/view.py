@@ -15,14 +15,15 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS
+from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS, limits_in_words
+from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, FAILED, RESULT, UNSETTLED, VALID, Status
 from tolstat.store import verification
 from tolstat.store.counts import Counts
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
-from tolstat.store.sample_load import SampleLoad
+from tolstat.store.sample_load import SampleLoad, frozen
 from tolstat.store.verification import Verification
 
 if TYPE_CHECKING:
@@ -67,8 +68,8 @@ class _FirstPass(NamedTuple):
 class View:
     """A result file as questions read it. Element i of every array is sample i; the nominal joint is not among them.
 
-    Each part is read and checked when it is first used, and kept. Tables of errors are kept for the first `BLOCK`
-    samples; those of larger campaigns are read in blocks.
+    Each part is read and checked when it is first used, and kept; arrays that are kept cannot be written to. Tables of
+    errors are kept for the first `BLOCK` samples; those of larger campaigns are read in blocks.
 
     Attributes
     ----------
@@ -95,6 +96,14 @@ class View:
         self._study_path = study_path
         self._loads: dict[str, SampleLoad] = {}
 
+    def __repr__(self) -> str:
+        loads = f"{len(self.kept_loads)} loads, {len(self.limits)} with a limit"
+        return f"<view of {self.path.name!r}: {self.n} joints ({METHODS.get(self.method, self.method)}), {loads}>"
+
+    def _repr_html_(self) -> str:
+        loads = [("loads", ", ".join(self.kept_loads)), ("limits", limits_in_words(self.limits))]
+        return table(repr(self)[1:-1], [("study", self.name), *loads])
+
     @cached_property
     def study(self) -> Study:
         """The study that the file was made from, with its distributions; see `recall` for exceptions."""
@@ -118,7 +127,7 @@ class View:
         """Weight of each joint, (n,), if joints were not drawn from the tolerances alone."""
         if self.method != "importance":
             return None
-        return np.asarray(self.store.origin()["weight"][self.store.first_sample :])
+        return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
 
     @property
     def results(self) -> NDArray[np.void]:
@@ -174,7 +183,7 @@ class View:
             shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
             total += float(weight[valid].sum())
         mean = shares / total if total else np.full((4, 4), np.nan)
-        return _FirstPass(results, nominal, np.concatenate(kept)[:MAX_LISTED], mean)
+        return _FirstPass(frozen(results), frozen(nominal), frozen(np.concatenate(kept)[:MAX_LISTED]), frozen(mean))
 
     def load(self, name: str) -> SampleLoad:
         """Largest load over the revolution of every joint, by its name.
@@ -193,12 +202,12 @@ class View:
             if not selected_results.holds(self.columns, name):
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
-            load, table = LOADS[name], self.results
+            load, results = LOADS[name], self.results
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
-            values = load.of(table)
+            values, ends = frozen(load.of(results)), load.ends(results)
             self._loads[name] = SampleLoad(
-                name, load.unit, self.limits.get(name), nominal, values, load.ends(table), self.status, self.weights,
-                self.iid,
+                name, load.unit, self.limits.get(name), nominal, values, (frozen(ends[0]), frozen(ends[1])),
+                self.status, self.weights, self.iid,
             )  # fmt: skip
         return self._loads[name]
 
@@ -324,7 +333,7 @@ class View:
 
     @cached_property
     def _first_errors(self) -> NDArray[np.void]:
-        return self._errors(0, min(BLOCK, self.n), None)
+        return frozen(self._errors(0, min(BLOCK, self.n), None))
 
     def _errors(self, first: int, last: int, columns: Sequence[str] | None) -> NDArray[np.void]:
         skip = self.store.first_sample

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.tables import HOLES, PINS
+from tolstat.study.bonus import Bonus
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]
@@ -116,16 +117,20 @@ class Axis:
         in the circle that keeps both ends of the tilted axis in the zone. Infinite otherwise.
     reach : float
         Distance of the features' middles from the joint's centre, m; for pairs only.
+    bonus : Bonus, optional
+        Maximum material requirement of the position of a pin or hole.
     """
 
     name: str
     over: float = math.nan
     room: float = math.inf
     reach: float = math.nan
+    bonus: Bonus | None = None
 
-    def describe(self) -> dict[str, float]:
-        """Numbers that determine the errors, besides what is drawn, as JSON values: those that matter for the axis."""
-        return {key: value for key, value in asdict(self).items() if key != "name" and math.isfinite(value)}
+    def describe(self) -> dict[str, Any]:
+        """What determines the errors, besides what is drawn, as JSON values: what matters for the axis."""
+        bonus = {} if self.bonus is None else asdict(self.bonus)
+        return _finite(asdict(self) | bonus)
 
     def fill(self, table: Table, drawn: Mapping[str, Array]) -> None:
         """Set the errors.
@@ -137,6 +142,9 @@ class Axis:
         drawn : mapping of str to ndarray, (2, n)
             Vectors by key: along t and z in m, or slopes.
         """
+        if self.bonus is not None:
+            deviation = table[self.bonus.diameter]
+            drawn = {key: self.bonus.shift(vector, deviation) for key, vector in drawn.items()}
         middle, slope = self._line(drawn)
         if self.name not in PAIRS:
             _set(table, self.name, middle, slope)
@@ -154,7 +162,8 @@ class Axis:
             if key == "offset_radial":
                 return _offset(errors, self.name)
             slope = _slope(errors, self.name)
-            return self._of_line(key, slope, lambda: _offset(errors, self.name))
+            found = self._of_line(key, slope, lambda: _offset(errors, self.name))
+            return found if self.bonus is None else self.bonus.unshift(found, errors[self.bonus.diameter])
         first, second = PAIRS[self.name]
         near = _offset(errors, first)
         far, _ = _as_seen(_offset(errors, second), np.zeros((2, 1)), -1.0)
@@ -193,6 +202,12 @@ class Axis:
         taken: Array = np.hypot(*slope) * self.over / (2.0 * self.room)
         left: Array = np.maximum(1.0 - taken, 1e-9)  # zero would lose where in the zone the middle is
         return left
+
+
+def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that are texts or finite numbers; not the axis' name."""
+    kept = {key: value for key, value in values.items() if key != "name" and isinstance(value, (str, float))}
+    return {key: value for key, value in kept.items() if isinstance(value, str) or math.isfinite(value)}
 
 
 def component(name: str, vector: Array) -> Array:

@@ -76,6 +76,7 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
     for name, text in touched.items():
         site, place = sites[name][0], f"--set {text!r}"
         try:
+            _check_bonus(study, name, place)
             read[name] = site, kinds.entry(entries[name], site, place, ("tolerances", name))
             _check_zone(study, site, read[name][1], place)
             found |= read[name][1].quantities(site)
@@ -90,6 +91,13 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
     if faults:
         raise InputError(faults)
     return found
+
+
+def _check_bonus(study: Study, name: str, place: str) -> None:
+    """Refuse changes of a position with a bonus and of its diameter: they move what a part's zone is."""
+    if study.has_bonus(name):
+        found = "a position with a bonus by maximum material cannot be changed, nor its diameter"
+        raise InputError([Fault(place, found, "run a study of its own")])
 
 
 def _check_zone(study: Study, site: Site, new: ToleranceEntry, place: str) -> None:

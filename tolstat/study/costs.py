@@ -27,31 +27,31 @@ REACH = (0.25, 4.0)
 
 
 class CostEntry(Strict):
-    """Cost of the tolerance of one error.
+    """Cost of the tolerance of one error."""
 
-    Attributes
-    ----------
-    cost : float
-        Cost of the tolerance `at`, in any currency.
-    fixed : float
-        Part of it that does not depend on the tolerance.
-    at : float, optional
-        Tolerance (half the band) that costs `cost`, SI; that of the study by default.
-    power : float
-        Exponent of the reciprocal.
-    least, most : float, optional
-        Smallest tolerance that the process can hold, largest tolerance that the function allows, SI.
-    keep : bool
-        Whether the tolerance stays as it is.
-    """
-
-    cost: Annotated[units.Number, Field(ge=0)] = 1.0
-    fixed: Annotated[units.Number, Field(ge=0)] = 0.0
-    at: Positive | None = None
-    power: Annotated[units.Number, Field(gt=0, le=10)] = 1.0
-    least: Positive | None = None
-    most: Positive | None = None
-    keep: Annotated[bool, Field(strict=True)] = False
+    cost: Annotated[
+        units.Number, Field(ge=0, description="cost of the tolerance `at`, in any currency", examples=[4.0])
+    ] = 1.0
+    fixed: Annotated[
+        units.Number, Field(ge=0, description="part of it that does not depend on the tolerance", examples=[1.0])
+    ] = 0.0
+    at: Annotated[
+        Positive | None,
+        Field(
+            description="tolerance (half the band) that costs `cost`; that of the study by default",
+            examples=["0.5 deg"],
+        ),
+    ] = None
+    power: Annotated[units.Number, Field(gt=0, le=10, description="exponent of the reciprocal", examples=[2.0])] = 1.0
+    least: Annotated[
+        Positive | None, Field(description="smallest tolerance that the process can hold", examples=["0.1 deg"])
+    ] = None
+    most: Annotated[
+        Positive | None, Field(description="largest tolerance that the function allows", examples=["0.030 mm"])
+    ] = None
+    keep: Annotated[bool, Field(strict=True, description="whether the tolerance stays as it is", examples=[True])] = (
+        False
+    )
 
     @model_validator(mode="after")
     def _in_order(self) -> CostEntry:
@@ -129,7 +129,8 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
             cost = strict.validate(CostEntry, entry.value, str(path), prefix=entry.path, context=context)
             found |= dict.fromkeys(names, cost)
     if faults:
-        raise InputError(faults)
+        toml = path.suffix != ".csv"
+        raise InputError(strict.with_lines(faults, str(path), path.read_text(encoding="utf-8")) if toml else faults)
     kept = CostEntry(cost=0.0, keep=True)
     return [Cost(t.width, tuple(found.get(name, kept) for name in t.names)) for t in tolerances]
 

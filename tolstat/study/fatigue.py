@@ -20,32 +20,41 @@ Exponent = Annotated[units.Number, Field(ge=1, le=30)]
 
 
 class Settings(Strict):
-    """``[fatigue]`` as written; `read` converts the S–N lines.
+    """Evaluation of load cycles; affects no result."""
 
-    Attributes
-    ----------
-    exponents : list of float
-        Wöhler exponents of the damage-equivalent loads.
-    revolutions : float
-        Service life, in revolutions of the input shaft.
-    reference_cycles : float
-        Number of cycles that the damage-equivalent loads refer to.
-    line : dict
-        S–N lines by channel or pattern.
-    """
-
-    exponents: list[Exponent] = Field(default_factory=lambda: [3.0, 5.0, 10.0], min_length=1)
-    revolutions: Positive = 1e6
-    reference_cycles: Positive = 1e6
-    line: dict[str, Any] = Field(default_factory=dict)
+    exponents: list[Exponent] = Field(
+        default_factory=lambda: [3.0, 5.0, 10.0],
+        min_length=1,
+        description="Wöhler exponents of the damage-equivalent loads",
+        examples=[[5.0]],
+    )
+    revolutions: Annotated[
+        Positive, Field(description="service life in revolutions of the input shaft", examples=[2e7])
+    ] = 1e6
+    reference_cycles: Annotated[
+        Positive, Field(description="number of cycles that the damage-equivalent loads refer to", examples=[2e6])
+    ] = 1e6
+    line: dict[str, Any] = Field(
+        default_factory=dict,
+        description="S–N lines by channel or pattern",
+        examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
+        json_schema_extra={"x-table": "lines"},
+    )
 
 
 class LineEntry(Strict):
-    """One entry of ``[fatigue.line]``: N = N0 (S/S0)^-m, S the range of a load cycle."""
+    """S–N line N = N0 (S/S0)^-m, S the range of a load cycle."""
 
-    m: Exponent
-    S0: Any
-    N0: Positive
+    m: Annotated[Exponent, Field(description="exponent", examples=[5])]
+    S0: Annotated[
+        Any,
+        Field(
+            description="range of the load that is borne for N0 cycles, a force or torque",
+            examples=["150 N*m"],
+            json_schema_extra={"x-table": "quantity"},
+        ),
+    ]
+    N0: Annotated[Positive, Field(description="number of cycles at the range S0", examples=[2e6])]
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,17 @@ from tolstat.common.loads import LOADS, UNIT_OF_LOAD
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
+from tolstat.joint.model import merged
 from tolstat.study import fatigue, listing, proposal, selection
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
-from tolstat.study.tolerances import reading
+from tolstat.study.tolerances import fits, reading
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
 from tolstat.study.tolerances.entry import Site
+from tolstat.study.tolerances.fits import Fit
 from tolstat.study.tolerances.reading import Nominal, Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
@@ -63,9 +65,12 @@ class StudyFile:
         self.place = str(path)
         self.data = read_toml(path, text)
         self.text = path.read_text(encoding="utf-8") if text is None else text
+        self._lined = text is None
+        self._overridden: set[str] = set()
         self._faults: list[Fault] = []
         self._claims = Assignments(self.place)
         self._toleranced: dict[str, str] = {}
+        self._accepted: set[str] = set()
         allowed = list(sections)
         for key in self.data:
             if key not in allowed:
@@ -77,15 +82,19 @@ class StudyFile:
         Raises
         ------
         InputError
-            With every fault.
+            With every fault; those of the file have its lines, unless their value is from the command line.
         """
-        if self._faults:
-            raise InputError(self._faults)
+        if not self._faults:
+            return
+        lined = strict.with_lines(self._faults, self.place, self.text) if self._lined else self._faults
+        pairs = zip(self._faults, lined, strict=True)
+        raise InputError([fault if fault.place in self._overridden else found for fault, found in pairs])
 
     def override(self, section: str, key: str, value: object) -> None:
         """Replace a value of the file by one from the command line."""
         if isinstance(self.data.setdefault(section, {}), dict):
             self.data[section][key] = value
+        self._overridden.add(f"{self.place}: {section}.{key}")
 
     def model(self, section: str, model: type[ModelT], *, required: bool = False) -> ModelT | None:
         """Read a section that is one model; the model has its defaults where the file lacks the section."""
@@ -97,8 +106,14 @@ class StudyFile:
             return strict.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
         return None
 
-    def joint(self) -> Joint | None:
-        """``[joint]``: a joint file by name or path, and keys that replace some of its own."""
+    def fit(self) -> Fit | None:
+        """``tolerances.fit``: the fit of all pins in their holes."""
+        with gather(self._faults):
+            return fits.read(self.data.get("tolerances"), self.place)
+        return None
+
+    def joint(self, fit: Fit | None = None) -> Joint | None:
+        """``[joint]``: a joint file by name or path, and keys that replace some of its own; diameters by the fit."""
         table = self._table("joint")
         base = table.get("base")
         if base is None:
@@ -107,9 +122,19 @@ class StudyFile:
             self._fault(("joint", "base"), f"{base!r} is not a text", "give a name in data/joints or a path")
         else:
             overrides = {key: value for key, value in table.items() if key != "base"}
+            if fit is not None:
+                overrides = merged(overrides, {"contact": self._diameters(fit, overrides)})
             with gather(self._faults):
                 return joint.load(base, overrides, self.place, self.path.parent)
         return None
+
+    def _diameters(self, fit: Fit, overrides: Mapping[str, Any]) -> dict[str, str]:
+        """Nominal diameters of the fit; note diameters that the study sets beside it."""
+        own = overrides.get("contact")
+        for key in fit.diameters:
+            if isinstance(own, Mapping) and key in own:
+                self._fault(("joint", "contact", key), "is set by tolerances.fit already", "remove one of the two")
+        return fit.diameters
 
     def errors(self) -> dict[str, float]:
         """``[errors]``: the errors that every joint has."""
@@ -117,10 +142,10 @@ class StudyFile:
             return selection.fixed_errors(self._table("errors"), ("errors",), self.place, self._claims)
         return {}
 
-    def tolerances(self, joint: Joint | None, operation: Operation | None) -> Tolerances:
+    def tolerances(self, joint: Joint | None, operation: Operation | None, fit: Fit | None) -> Tolerances:
         """``[tolerances]``: how errors scatter."""
         written = []
-        for entry in self._entries("tolerances"):
+        for entry in fits.entries(self._table("tolerances"), fit):
             with gather(self._faults):
                 selected = selection.resolve(entry, TOLERANCED, self.place)
                 with gather(self._faults):
@@ -128,6 +153,7 @@ class StudyFile:
                 self._toleranced |= {name: TOLERANCED[name] for name in selected}
                 written.append((entry, selected))
         found = reading.read(written, Nominal(joint, operation, self.path.parent), self.place, self._faults)
+        self._accepted = {bonus.diameter for bonus in found.rejecting}
         drawn: dict[str, list[str]] = {}
         for quantity in found.distributions:
             drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)
@@ -140,7 +166,12 @@ class StudyFile:
         entries = self._list("correlation", Correlation)
         if len(self._faults) == before:
             with gather(self._faults):
-                return assemble(entries, self._toleranced, self.place)
+                copula = assemble(entries, self._toleranced, self.place)
+                for name in sorted(self._accepted & set(copula.names)):
+                    remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
+                    found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
+                    self._fault(("correlation",), found, remedy)
+                return copula
         return Copula()
 
     def proposals(self) -> tuple[Proposal, ...]:

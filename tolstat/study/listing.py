@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tolstat import joint
-from tolstat.common import strict
+from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.notation import DIAMETER
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import merged, overridden
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
-from tolstat.study.model import MAX_ROWS, CaseEntry, Range, Solver, VariantEntry
+from tolstat.study.listed import CaseEntry, Range, VariantEntry
+from tolstat.study.model import MAX_ROWS, Solver
 from tolstat.study.selection import UNITS, Assignments, Entry
 
 Section = tuple[int | str, ...]
@@ -254,7 +256,9 @@ class _Variants:
         values = [
             {key: low[key] + s * (high[key] - low[key]) for key, s in zip(ranges, row, strict=True)} for row in shares
         ]
-        return [nested({key: _written(value, text[key]) for key, value in own.items()}) for own in values]
+        return [
+            nested({key: _written(value, text[key], ranges[key].start) for key, value in own.items()}) for own in values
+        ]
 
     def _joint(self, keys: Mapping[str, Any], at: Section) -> Joint:
         overrides = {key: value for key, value in keys.items() if key != "base"}
@@ -281,10 +285,15 @@ def _ranges(section: Mapping[str, Any], at: Section, place: str, before: str = "
             yield f"{before}{key}", strict.validate(Range, value, place, prefix=(*at, key))
 
 
-def _written(value: float, like: str | float) -> str | float:
-    """`value` (SI) with the unit of `like`, a quantity of a joint's JSON dump.
+def _written(value: float, like: str | float, users: object) -> str | float:
+    """`value` (SI) with the unit of the user's text, or of `like`, a quantity of a joint's JSON dump.
 
-    Rounded to fifteen digits, so that values as users write them are reproduced: 0.076, not 0.07600000000000001.
+    Rounded to fifteen digits, so that values as users write them are reproduced: 0.076, not 0.07600000000000001. The
+    user's unit is for faults; it is used where it gives the same number.
     """
     value = float(f"{value:.15g}")
-    return f"{value!r} {like.partition(' ')[2]}" if isinstance(like, str) else value
+    if not isinstance(like, str):
+        return value
+    unit = like.partition(" ")[2]
+    own, text = units.written(value, unit, users, 15), f"{value!r} {unit}"
+    return own if units.to_si(own, unit, DIAMETER) == units.to_si(text, unit) else text

@@ -26,39 +26,104 @@ Flag = Annotated[bool, Field(strict=True)]
 
 
 class Solver(Strict):
-    """``[solver]``: numerical settings of all joints except those of variants with settings of their own.
+    """Numerical settings of all joints except those of variants with settings of their own."""
 
-    Attributes
-    ----------
-    fidelity : str
-        ``dynamic``: integration until settled; ``quasistatic``: equilibrium at each angle; ``ideal``: closed forms of
-        the joint without errors; ``auto``: the cheapest fidelity and steps per revolution that meet `error_budget`.
-    error_budget : float
-        Largest error of a load that ``auto`` allows, relative to the joint's largest load of the kind.
-    peak_substeps : int
-        Number of parts of a step where a contact switches on a load's peak, see `kernel.revolution.closeup`; with 1
-        these steps are not repeated.
-    max_refinements : int
-        Maximum number of times that the steps of a refined joint are halved to estimate their error, see `refinement`;
-        0 leaves all joints at `steps_per_rev`.
-    duration : int
-        Revolutions for which the largest loads of a joint that never repeats are estimated, see `stationary`.
-    """
-
-    fidelity: Literal["dynamic", "quasistatic", "ideal", "auto"] = "dynamic"
-    error_budget: Annotated[Number, Field(ge=1e-6, lt=1)] = 0.005
-    method: Literal["bdf2", "generalized_alpha", "tr_bdf2"] = "bdf2"
-    start: Literal["static", "ramp"] = "static"
-    steps_per_rev: Annotated[int, Field(strict=True, ge=12, le=20_000)] = _DEFAULTS.steps_per_rev
-    max_revs: Annotated[int, Field(strict=True, ge=2, le=1000)] = _DEFAULTS.max_revs
-    settle_tol: Annotated[Number, Field(gt=0, lt=1)] = _DEFAULTS.settle_tol
-    newton_tol: Annotated[Number, Field(ge=1e-12, le=1e-2)] = _DEFAULTS.newton_tol
-    newton_max_iter: Annotated[int, Field(strict=True, ge=2, le=100)] = _DEFAULTS.newton_max_iter
-    max_halvings: Annotated[int, Field(strict=True, ge=0, le=20)] = _DEFAULTS.max_halvings
-    rho_inf: Annotated[Number, Field(ge=0, le=1)] = _DEFAULTS.rho_inf
-    peak_substeps: Annotated[int, Field(strict=True, ge=1, le=64)] = _DEFAULTS.peak_substeps
-    max_refinements: Annotated[int, Field(strict=True, ge=0, le=4)] = _DEFAULTS.max_refinements
-    duration: Annotated[int, Field(strict=True, ge=1, le=1_000_000_000)] = _DEFAULTS.duration
+    fidelity: Annotated[
+        Literal["dynamic", "quasistatic", "ideal", "auto"],
+        Field(
+            description="what is solved: `dynamic`, integration until settled; `quasistatic`, equilibrium at "
+            "each angle; "
+            "`ideal`, closed forms of the joint without errors; `auto`, the cheapest fidelity and steps per revolution "
+            "that meet `error_budget`",
+            examples=["quasistatic"],
+        ),
+    ] = "dynamic"
+    error_budget: Annotated[
+        Number,
+        Field(
+            ge=1e-6,
+            lt=1,
+            description="largest error of a load that `auto` allows, relative to the joint's largest load of the kind",
+            examples=[0.01],
+        ),
+    ] = 0.005
+    method: Annotated[
+        Literal["bdf2", "generalized_alpha", "tr_bdf2"],
+        Field(description="time integration; `bdf2` alone runs joints in SIMD lanes", examples=["tr_bdf2"]),
+    ] = "bdf2"
+    start: Annotated[
+        Literal["static", "ramp"],
+        Field(
+            description="start from the equilibrium at theta = 0, or from the ideal pose with a torque that rises",
+            examples=["ramp"],
+        ),
+    ] = "static"
+    steps_per_rev: Annotated[
+        int, Field(strict=True, ge=12, le=20_000, description="equal steps per revolution", examples=[360])
+    ] = _DEFAULTS.steps_per_rev
+    max_revs: Annotated[
+        int, Field(strict=True, ge=2, le=1000, description="most revolutions until a joint settles", examples=[60])
+    ] = _DEFAULTS.max_revs
+    settle_tol: Annotated[
+        Number, Field(gt=0, lt=1, description="closure error below which a joint is settled", examples=[1e-3])
+    ] = _DEFAULTS.settle_tol
+    newton_tol: Annotated[
+        Number,
+        Field(
+            ge=1e-12,
+            le=1e-2,
+            description="residual that ends Newton's iteration, relative to torque / (2 R)",
+            examples=[1e-7],
+        ),
+    ] = _DEFAULTS.newton_tol
+    newton_max_iter: Annotated[
+        int, Field(strict=True, ge=2, le=100, description="most Newton iterations of a step", examples=[20])
+    ] = _DEFAULTS.newton_max_iter
+    max_halvings: Annotated[
+        int,
+        Field(
+            strict=True,
+            ge=0,
+            le=20,
+            description="most halvings of a step that Newton's iteration fails on",
+            examples=[8],
+        ),
+    ] = _DEFAULTS.max_halvings
+    rho_inf: Annotated[
+        Number,
+        Field(ge=0, le=1, description="spectral radius of `generalized_alpha` at infinite frequency", examples=[0.9]),
+    ] = _DEFAULTS.rho_inf
+    peak_substeps: Annotated[
+        int,
+        Field(
+            strict=True,
+            ge=1,
+            le=64,
+            description="parts of a step where a contact switches on a load's peak; with 1 these steps are not "
+            "repeated",
+            examples=[1],
+        ),
+    ] = _DEFAULTS.peak_substeps
+    max_refinements: Annotated[
+        int,
+        Field(
+            strict=True,
+            ge=0,
+            le=4,
+            description="most halvings of the steps of a refined joint; 0 leaves all joints at `steps_per_rev`",
+            examples=[0],
+        ),
+    ] = _DEFAULTS.max_refinements
+    duration: Annotated[
+        int,
+        Field(
+            strict=True,
+            ge=1,
+            le=1_000_000_000,
+            description="revolutions for which the largest loads of a joint that never repeats are estimated",
+            examples=[1000],
+        ),
+    ] = _DEFAULTS.duration
 
     @model_validator(mode="after")
     def _auto(self) -> Self:
@@ -93,32 +158,52 @@ class Solver(Strict):
 SamplingMethod = Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"]
 
 
+def _of_a_file(schema: dict[str, Any]) -> None:
+    """Leave out of a schema the method that no file can set."""
+    schema["enum"].remove("subset")
+
+
 class Sampling(Strict):
-    """``[sampling]``: how many joints, and how they are drawn.
+    """How many joints there are, and how they are drawn."""
 
-    Attributes
-    ----------
-    n : int, optional
-        Number of joints without the nominal one; not for sweeps and cases, whose points and list give the number.
-    method : str
-        ``random``, ``sobol``, ``lhs``; ``sweep``: a grid of errors; ``cases``: joints listed one by one;
-        ``importance``: random, from the tolerances and ``[[proposal]]``;
-        ``pick_freeze``: for Sobol' indices, `n` times two random joints, and for each group of errors the first of the
-        two with that group's errors of the second (Saltelli et al. 2010); ``subset``: not in a file, see `Subset`.
-    groups : str
-        Groups of ``pick_freeze``: ``tolerance``, all errors of an entry of ``[tolerances]``, or ``error``, each alone.
-    seed : int
-        Seed of all draws.
-    nominal_first : bool
-        Whether row 0 is the joint without errors, which statistics leave out. Never with ``cases``, where each group
-        has its own joint without errors.
-    """
-
-    method: SamplingMethod = "random"
-    n: Annotated[int, Field(strict=True, ge=1, le=MAX_SAMPLES)] | None = None
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
-    nominal_first: Flag = True
-    groups: Literal["tolerance", "error"] = "tolerance"
+    method: Annotated[
+        SamplingMethod,
+        Field(
+            description="`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `importance`, "
+            "random, from "
+            "[tolerances] and [[proposal]]; `pick_freeze`, joints that share errors, for Sobol' indices; "
+            "`sweep`, the grid "
+            "of [sweep]; `cases`, the joints of [[case]], [[variant]] and [grid]",
+            examples=["sobol"],
+            json_schema_extra=_of_a_file,
+        ),
+    ] = "random"
+    n: Annotated[
+        int | None,
+        Field(
+            strict=True,
+            ge=1,
+            le=MAX_SAMPLES,
+            description="number of joints without the nominal one; needed by all methods but `sweep` and `cases`; "
+            "with `pick_freeze` of pairs of random joints",
+            examples=[1024],
+        ),
+    ] = None
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63, description="seed of all draws", examples=[2021])] = 0
+    nominal_first: Annotated[
+        Flag,
+        Field(
+            description="whether row 0 is the joint without errors, which statistics leave out; not with `cases`",
+            examples=[False],
+        ),
+    ] = True
+    groups: Annotated[
+        Literal["tolerance", "error"],
+        Field(
+            description="what `pick_freeze` exchanges together: all errors of an entry of [tolerances], or each alone",
+            examples=["error"],
+        ),
+    ] = "tolerance"
 
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -207,21 +292,33 @@ def _check_pattern(pattern: str) -> str:
 
 
 class Output(Strict):
-    """``[output]``: what is stored of each joint.
+    """What is stored of each joint."""
 
-    Attributes
-    ----------
-    results : list of str, optional
-        Names or patterns of result columns to store beside those that are always stored; all by default.
-    histories : str
-        What is stored beside the results.
-    harmonics : int
-        Fourier coefficients up to this order, where `histories` has them.
-    """
-
-    results: Annotated[list[Annotated[str, AfterValidator(_check_pattern)]], Field(min_length=1)] | None = None
-    histories: Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"] = "none"
-    harmonics: Annotated[int, Field(strict=True, ge=0, le=10_000)] = 16
+    results: Annotated[
+        list[Annotated[str, AfterValidator(_check_pattern)]] | None,
+        Field(
+            min_length=1,
+            description="names or patterns of result columns to store beside status and course; all by default",
+            examples=[["cross*.[FT]_max"]],
+        ),
+    ] = None
+    histories: Annotated[
+        Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"],
+        Field(
+            description="what is stored of the last revolution: all samples, Fourier coefficients, counted load cycles",
+            examples=["harmonics+cycles"],
+        ),
+    ] = "none"
+    harmonics: Annotated[
+        int,
+        Field(
+            strict=True,
+            ge=0,
+            le=10_000,
+            description="highest order of the Fourier coefficients, where `histories` has them",
+            examples=[32],
+        ),
+    ] = 16
 
     def identity(self) -> dict[str, Any]:
         """Settings that determine what is stored: names instead of patterns, no names if all results are kept."""
@@ -238,73 +335,14 @@ class Output(Strict):
         return selected_results.columns({selected_results.KEY: self.identity().get("results")})
 
 
-class CaseEntry(Strict):
-    """One ``[[case]]``: the joint with these errors."""
-
-    name: Annotated[str, Field(min_length=1)]
-    errors: Annotated[dict[str, Any], Field(min_length=1)]
-
-
-class Range(Strict):
-    """One entry of ``vary``: a key of the joint goes from `start` to `stop`, given as in the file."""
-
-    start: Annotated[Any, Field(alias="from")]
-    stop: Annotated[Any, Field(alias="to")]
-
-
-class VariantEntry(Strict):
-    """One ``[[variant]]``: another joint, or a family of them.
-
-    Attributes
-    ----------
-    name : str
-        Name of the family; entries of one name make one family.
-    joint : dict
-        Keys in place of those of ``[joint]``, which may name another `base` too.
-    points : int, optional
-        Number of joints of a family; needed with `vary`.
-    design : str
-        ``line``: all keys of `vary` go from one end to the other together; ``sobol``: a scrambled Sobol' sequence
-        fills the box.
-    seed : int
-        Seed of the scrambling.
-    vary : dict
-        Keys of the joint that the family varies, each with its range.
-    cases : list of str, optional
-        Cases to run; all by default. The joint without errors is always run.
-    operation, solver : dict
-        Keys in place of those of ``[operation]`` and ``[solver]``.
-    note : str
-        Note for the reader of the report.
-    """
-
-    name: Annotated[str, Field(min_length=1)]
-    joint: Annotated[dict[str, Any], Field(default_factory=dict)]
-    points: Annotated[int, Field(strict=True, ge=2, le=10_000)] | None = None
-    design: Literal["line", "sobol"] = "line"
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
-    vary: Annotated[dict[str, Any], Field(default_factory=dict)]
-    cases: list[str] | None = None
-    operation: Annotated[dict[str, Any], Field(default_factory=dict)]
-    solver: Annotated[dict[str, Any], Field(default_factory=dict)]
-    note: str = ""
-
-    @model_validator(mode="after")
-    def _family(self) -> Self:
-        if bool(self.vary) != (self.points is not None):
-            given, lacking = ("vary", "points") if self.vary else ("points", "vary")
-            raise refuse(f"{given} without {lacking}", f"add {lacking}")
-        if self.seed and self.design != "sobol":
-            raise refuse("seed without a random design", 'remove it, or write design = "sobol"')
-        return self
-
-
 class SweepEntry(Strict):
-    """One entry of ``[sweep]``: the errors that a pattern selects go from `start` to `stop` together."""
+    """The errors that a name or pattern selects go from one value to another together; several entries make a grid."""
 
-    start: Annotated[Value, Field(alias="from")]
-    stop: Annotated[Value, Field(alias="to")]
-    points: Annotated[int, Field(strict=True, ge=2, le=MAX_ROWS)]
+    start: Annotated[Value, Field(alias="from", description="first value", examples=["0.14 mm"])]
+    stop: Annotated[Value, Field(alias="to", description="last value", examples=["-0.60 mm"])]
+    points: Annotated[
+        int, Field(strict=True, ge=2, le=MAX_ROWS, description="number of equally spaced values", examples=[38])
+    ]
 
     @model_validator(mode="after")
     def _moves(self) -> Self:

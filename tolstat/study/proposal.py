@@ -36,21 +36,28 @@ MAX_SHIFT, MAX_WIDEN = 10.0, 10.0
 
 
 class ProposalEntry(Strict):
-    """One ``[[proposal]]``: a component of the mixture that joints are drawn from.
+    """A component of the mixture that importance sampling draws joints from."""
 
-    Attributes
-    ----------
-    share : float
-        Its share of the joints.
-    widen : float or dict
-        Factor on the standard deviation of all scores, or by name or pattern of errors.
-    shift : dict
-        Mean of the scores, in standard deviations, by name or pattern of errors.
-    """
-
-    share: Annotated[Number, Field(gt=0, lt=1)]
-    widen: float | dict[str, Any] = 1.0
-    shift: Annotated[dict[str, Any], Field(default_factory=dict)]
+    share: Annotated[Number, Field(gt=0, lt=1, description="share of the joints drawn from it", examples=[0.3])]
+    widen: Annotated[
+        float | dict[str, Any],
+        Field(
+            description="factor on the standard deviation of all scores, or of those by name or pattern of errors, "
+            f"from {1 / MAX_WIDEN:g} to {MAX_WIDEN:g}",
+            examples=[1.5],
+            json_schema_extra={"x-table": "widen"},
+        ),
+    ] = 1.0
+    shift: Annotated[
+        dict[str, Any],
+        Field(
+            default_factory=dict,
+            description="mean of the scores in standard deviations, by name or pattern of errors, "
+            f"from {-MAX_SHIFT:g} to {MAX_SHIFT:g}",
+            examples=[{"pin1.tilt_z": 2.0}],
+            json_schema_extra={"x-table": "shift"},
+        ),
+    ]
 
 
 @dataclass(frozen=True)

@@ -67,5 +67,5 @@ def _put(table: Any, key: str, value: Any) -> None:
         comments = []
         while body and body[-1][0] is None:
             comments.append(body.pop())
-        table[key] = value
+        table[key] = tomlkit.value(inline(value)) if isinstance(value, Mapping) else value
         body.extend(reversed(comments))

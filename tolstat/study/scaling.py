@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.notation import DIAMETER
-from tolstat.study import rewriting, selection
+from tolstat.common.notation import DIAMETER, PLUS_MINUS
+from tolstat.study import rewriting
 from tolstat.study.study import Study
-from tolstat.study.tolerances import kinds
+from tolstat.study.tolerances import fits, kinds
 from tolstat.study.tolerances.density_ratio import unbounded
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
@@ -67,7 +67,7 @@ class Tolerance(NamedTuple):
             del entry["iso2768"], entry["nominal"]
         for key in _WIDTHS:
             if key in entry:
-                value = factor * units.to_si(entry[key], self.site.unit, DIAMETER if key == "zone" else "")
+                value = factor * units.to_si(entry[key], self.site.unit, DIAMETER if key == "zone" else PLUS_MINUS)
                 entry[key] = units.written(value, self.site.unit, entry[key], digits)
         ends = [key for key in ("lower", "upper") if key in entry]
         if ends:
@@ -92,8 +92,9 @@ class Tolerance(NamedTuple):
 def tolerances(study: Study) -> list[Tolerance]:
     """Entries of a study that can be scaled, in its order; not those of operating point and material.
 
-    Left out are entries with correlated errors, which cannot be scaled independently, and the position of an axis whose
-    direction has a zone, too: that zone must stay the smaller one, and bounds where the middle is.
+    Left out are entries with correlated errors, which cannot be scaled independently; the position of an axis whose
+    direction has a zone, too: that zone must stay the smaller one, and bounds where the middle is; and positions with a
+    bonus with their diameters.
     """
     found = []
     for entry in study.entries:
@@ -101,6 +102,7 @@ def tolerances(study: Study) -> list[Tolerance]:
         names = tuple(entry.quantities)
         own = not site.name.startswith(("operation.", "material."))
         refined = any(one.shared and one.name.endswith(".position") for one, _ in entry.models)
+        refined |= any(study.has_bonus(one.name) for one, _ in entry.models)
         if own and not refined and entry.keys["distribution"] in SCALED and not set(names) & set(study.copula.names):
             found.append(Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site)))
     return found
@@ -144,10 +146,19 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     InputError
         See `rewriting.with_keys`.
     """
-    table = tomllib.loads(study.text)["tolerances"]
-    changes = {
-        entry.path: dict.fromkeys(entry.value) | dict(entries[entry.pattern])
-        for entry in selection.entries(table, "tolerances")
-        if entry.pattern in entries
-    }
-    return rewriting.with_keys(study.text, {("sampling",): {"seed": seed}, **changes}, f"{study.name}.toml")
+    data = tomllib.loads(study.text)
+    every = list(fits.entries(data["tolerances"], study.fit))
+    changes: dict[tuple[int | str, ...], dict[str, Any]] = {("sampling",): {"seed": seed}}
+    for entry in every:
+        if entry.pattern in entries and entry.path != fits.PATH:
+            changes[entry.path] = dict.fromkeys(entry.value) | dict(entries[entry.pattern])
+    diameters = {entry.pattern: entry.value for entry in every if entry.path == fits.PATH}
+    if (
+        study.fit is not None and diameters.keys() & entries.keys()
+    ):  # its zones have changed: state what a fit stands for
+        changes["tolerances",] = {fits.KEY: None} | {key: entries.get(key, own) for key, own in diameters.items()}
+        if "contact" in data["joint"]:
+            changes["joint", "contact"] = dict(study.fit.diameters)
+        else:
+            changes["joint",] = {"contact": study.fit.diameters}
+    return rewriting.with_keys(study.text, changes, f"{study.name}.toml")

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results
+from tolstat.common import selected_results, shown
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words
+from tolstat.common.strict import with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.study.axes import Axis
@@ -26,9 +27,10 @@ from tolstat.study.proposal import Proposal
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.fits import Fit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Case:
     """One joint to be simulated.
 
@@ -60,8 +62,28 @@ class Case:
         """Name of the file without folder and ending."""
         return self.path.stem
 
+    def fault(self, key: str, found: str, remedy: str) -> Fault:
+        """Fault of a key of the file, with its line."""
+        (lined,) = with_lines([Fault(f"{self.path}: {key}", found, remedy)], str(self.path), self.text)
+        return lined
 
-@dataclass(frozen=True)
+    def __repr__(self) -> str:
+        errors = f"{len(self.errors)} errors" if self.errors else "no errors"
+        return f"<case {self.name!r}: one joint, {errors}, {self.solver.fidelity}>"
+
+    def _repr_html_(self) -> str:
+        return shown.table(repr(self)[1:-1], self._entries())
+
+    def _entries(self) -> list[tuple[str, object]]:
+        """Named values that a notebook shows."""
+        point, solver = self.operation, self.solver
+        turned = f"{math.degrees(point.alpha):.4g} deg, {point.speed * 30 / math.pi:.4g} rpm, {point.torque:.4g} N m"
+        words = f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution"
+        errors = ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none"
+        return [("file", str(self.path)), ("operation", turned), ("solver", words), ("fixed errors, SI", errors)]
+
+
+@dataclass(frozen=True, repr=False)
 class Study(Case):
     """A campaign: its joints, the distribution of their errors, limits, and what is stored.
 
@@ -94,6 +116,8 @@ class Study(Case):
         What is stored of each joint.
     groups : tuple of Group
         Errors that ``sampling.method`` ``pick_freeze`` exchanges together; empty for other methods.
+    fit : Fit, optional
+        Fit by ISO 286 that gives the diameters.
     """
 
     sampling: Sampling
@@ -108,6 +132,7 @@ class Study(Case):
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
     groups: tuple[Group, ...] = ()
+    fit: Fit | None = None
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -134,6 +159,12 @@ class Study(Case):
         """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where joints are not listed."""
         return self.listed.table if self.listed else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
+    def has_bonus(self, name: str) -> bool:
+        """Whether `name` is a position with a bonus by maximum material, or the diameter of such a feature."""
+        feature, _, key = name.partition(".")
+        axis = self.axes.get(feature)
+        return axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
+
     @property
     def samples(self) -> int:
         """Number of joints, the nominal one not counted."""
@@ -159,6 +190,16 @@ class Study(Case):
         if self.limits or self.output.results is None:
             return list(self.limits)
         return [load for load in UNIT_OF_LOAD if selected_results.holds(self.output.columns, load)]
+
+    def __repr__(self) -> str:
+        parts = [f"{self.samples} joints ({self.sampling.method})", f"{len(self.tolerances)} toleranced errors"]
+        parts.append(f"{len(self.limits)} limit{'s' * (len(self.limits) != 1)}")
+        return f"<study {self.name!r}: {', '.join(parts)}>"
+
+    def _entries(self) -> list[tuple[str, object]]:
+        sampling = f"{self.sampling.method}, {self.samples} joints, seed {self.sampling.seed}"
+        toleranced = ("toleranced", ", ".join(self.tolerances) or "none")
+        return [*super()._entries(), ("sampling", sampling), toleranced, ("limits", limits_in_words(self.limits))]
 
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.
@@ -243,11 +284,12 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     file = StudyFile(Path(path), SECTIONS, text)
     if n is not None:
         file.override("sampling", "n", n)
-    joint = file.joint()
+    fit = file.fit()
+    joint = file.joint(fit)
     operation = file.model("operation", Operation, required=True)
     solver = file.model("solver", Solver)
     errors = file.errors()
-    read = file.tolerances(joint, operation)
+    read = file.tolerances(joint, operation, fit)
     copula = file.correlation()
     proposals = file.proposals()
     sampling = file.model("sampling", Sampling, required=True)
@@ -286,6 +328,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         tolerances=read.distributions,
         entries=read.entries,
         axes=read.axes,
+        fit=fit,
         copula=copula,
         proposals=proposals,
         sweep=sweep,

@@ -42,7 +42,7 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
     load = LOADS[str(sampling["load"])]
     if not selected_results.holds(study.output.columns, load.name):
         remedy = f"add {', '.join(load.columns)}"
-        faults.append(Fault(f"{study.path}: output.results", f"leaves out {load.name}, which --limit needs", remedy))
+        faults.append(study.fault("output.results", f"leaves out {load.name}, which --limit needs", remedy))
     own = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
     with gather(faults):
         read = validate(Subset, own | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")

@@ -84,15 +84,17 @@ def load(path: Path, quick: bool = False) -> tuple[Setup, Study]:
     InputError
         With every fault of the comparison, or of the study.
     """
-    setup = strict.validate(Setup, strict.read_toml(path), str(path))
-    base = study.load(path.parent / setup.study)
-    first = base.first_sample
-    if base.listed is not None:
-        raise InputError([Fault(f"{path}: study", f"{setup.study} lists its joints", "name one that draws them")])
-    if setup.joints > base.rows - first:
-        found = f"{setup.joints} of the {base.rows - first} joints of {setup.study}"
-        raise InputError([Fault(f"{path}: joints", found, "give fewer joints, or another study")])
-    if "CVODE" in setup.others.codes and not has_cvode():
-        hint = 'pip install "tolstat[bench]", or leave CVODE out'
-        raise InputError([Fault(f"{path}: others.codes", "CVODE needs scikit-sundae", hint)])
+    data = strict.read_toml(path)
+    with strict.lines_of(path):
+        setup = strict.validate(Setup, data, str(path))
+        base = study.load(path.parent / setup.study)
+        first = base.first_sample
+        if base.listed is not None:
+            raise InputError([Fault(f"{path}: study", f"{setup.study} lists its joints", "name one that draws them")])
+        if setup.joints > base.rows - first:
+            found = f"{setup.joints} of the {base.rows - first} joints of {setup.study}"
+            raise InputError([Fault(f"{path}: joints", found, "give fewer joints, or another study")])
+        if "CVODE" in setup.others.codes and not has_cvode():
+            hint = 'pip install "tolstat[bench]", or leave CVODE out'
+            raise InputError([Fault(f"{path}: others.codes", "CVODE needs scikit-sundae", hint)])
     return setup.quick() if quick else setup, base

@@ -16,7 +16,7 @@ from tolstat.kernel.simd.lane import pick
 FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR = (SPAN[kind].start for kind in ("F", "T", "contact", "psi"))
 """First element of each kind."""
 N_LOADS = sum(kind.size for kind in LOAD_KINDS)
-N_COURSES = sum(kind.size for kind in LOAD_KINDS if kind.course)
+N_AVERAGED = sum(kind.size for kind in LOAD_KINDS if kind.averaged)
 """Number of values, and of those whose mean and range are computed, which come first: moduli of the bushing loads."""
 INTERPOLATED = np.repeat([kind.interpolated for kind in LOAD_KINDS], [kind.size for kind in LOAD_KINDS])
 """Whether the largest value is interpolated between samples."""
@@ -41,33 +41,33 @@ def output_speed(lane, par, work, v):
 
 
 @njit
-def other_loads(lane, par, work, v, value):
-    """Write all loads but the bushings' moduli to `value`, (N_LOADS,); other arguments as in `settle.record`."""
+def other_loads(lane, par, work, v, loads):
+    """Write all loads but the bushings' moduli to `loads`, (N_LOADS,); other arguments as in `settle.record`."""
     for pin in range(4):
         for i in range(len(CONTACTS)):
-            value[CONTACT_FORCES + len(CONTACTS) * pin + i] = pick(work.contact[pin, i], lane)
-    value[SPEED_ERROR] = abs(output_speed(lane, par, work, v)[1])
+            loads[CONTACT_FORCES + len(CONTACTS) * pin + i] = pick(work.contact[pin, i], lane)
+    loads[SPEED_ERROR] = abs(output_speed(lane, par, work, v)[1])
 
 
 @njit
-def all_loads(lane, par, work, v, value):
-    """Write all loads to `value`, (N_LOADS,); other arguments as in `settle.record`."""
+def all_loads(lane, par, work, v, loads):
+    """Write all loads to `loads`, (N_LOADS,); other arguments as in `settle.record`."""
     for b in range(8):
-        value[FORCES + b], value[TORQUES + b] = modulus(0, b, lane, work), modulus(3, b, lane, work)
-    other_loads(lane, par, work, v, value)
+        loads[FORCES + b], loads[TORQUES + b] = modulus(0, b, lane, work), modulus(3, b, lane, work)
+    other_loads(lane, par, work, v, loads)
 
 
 @njit
-def loads_to_follow(work, v, value):
-    """Write squares of the bushings' moduli and all other loads to `value`, (N_LOADS,), in all lanes at once.
+def loads_to_follow(work, v, loads):
+    """Write squares of the bushings' moduli and all other loads to `loads`, (N_LOADS,), in all lanes at once.
 
     `v`: velocities that ``work`` was evaluated at, (55,).
     """
     for b in range(8):
         for kind in range(2):
             x, y, z = work.load[b, 3 * kind], work.load[b, 3 * kind + 1], work.load[b, 3 * kind + 2]
-            value[(FORCES, TORQUES)[kind] + b] = x * x + y * y + z * z
+            loads[(FORCES, TORQUES)[kind] + b] = x * x + y * y + z * z
     for pin in range(4):
         for i in range(len(CONTACTS)):
-            value[CONTACT_FORCES + len(CONTACTS) * pin + i] = work.contact[pin, i]
-    value[SPEED_ERROR] = abs(v[PSI] / (work.shaft[0] + v[PSI]))
+            loads[CONTACT_FORCES + len(CONTACTS) * pin + i] = work.contact[pin, i]
+    loads[SPEED_ERROR] = abs(v[PSI] / (work.shaft[0] + v[PSI]))

@@ -10,7 +10,7 @@ import math
 
 from tolstat.kernel.integrators.integrate import UNLIMITED
 from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD
-from tolstat.kernel.mechanics.loads import FORCES, INTERPOLATED, N_COURSES, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.loads import FORCES, INTERPOLATED, N_AVERAGED, N_LOADS, TORQUES
 from tolstat.kernel.revolution.settle import peak, record
 from tolstat.kernel.simd.jit import njit, njit_inner
 
@@ -41,8 +41,8 @@ def on_a_peak(s, samples, out):
         for i in range(first, first + 8):
             size = max(size, out.largest[i])
         for i in range(first, first + 8):
-            m0, m1 = samples[s - 2].value[i], samples[s - 1].value[i]
-            m2, m3, m4 = samples[s].value[i], samples[(s + 1) % n].value[i], samples[(s + 2) % n].value[i]
+            m0, m1 = samples[s - 2].loads[i], samples[s - 1].loads[i]
+            m2, m3, m4 = samples[s].loads[i], samples[(s + 1) % n].loads[i], samples[(s + 2) % n].loads[i]
             kink = max(abs(m3 - m0 - 3 * (m2 - m1)), abs(m4 - m1 - 3 * (m3 - m2)))
             if max(m1, m2, m3) > out.largest[i] - NEAR * size and kink > KINK * size:
                 return True
@@ -50,9 +50,9 @@ def on_a_peak(s, samples, out):
 
 
 @njit
-def extend(load, top, reach):
-    """Return largest value and range of a curve, formerly `top` and `reach`, after adding the value `load`."""
-    low = min(top - reach, load)
+def extend(load, top, span):
+    """Return largest value and range of a curve, formerly `top` and `span`, after adding the value `load`."""
+    low = min(top - span, load)
     top = max(top, load)
     return top, top - low
 
@@ -68,11 +68,11 @@ def count_in(j, fine, out):
     """Update the extremes in `out` with sample `j` of the finer integration and the peak at sample `j - 1`, if any."""
     here, before, first = fine[j % 3], fine[(j - 1) % 3], fine[(j - 2) % 3]
     for i in range(N_LOADS):
-        load = here.value[i]
+        load = here.loads[i]
         if j > 1 and INTERPOLATED[i]:
-            load = max(load, height(first.value[i], before.value[i], load))
-        if i < N_COURSES:
-            out.largest[i], out.reach[i] = extend(load, out.largest[i], out.reach[i])
+            load = max(load, height(first.loads[i], before.loads[i], load))
+        if i < N_AVERAGED:
+            out.largest[i], out.range[i] = extend(load, out.largest[i], out.range[i])
         else:
             out.largest[i] = max(out.largest[i], load)
 

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from tolstat.common.tables import CONTACTS, INNER, OUTER
-from tolstat.kernel.mechanics.loads import CONTACT_FORCES, INTERPOLATED, N_COURSES, N_LOADS, loads_to_follow
+from tolstat.kernel.mechanics.loads import CONTACT_FORCES, INTERPOLATED, N_AVERAGED, N_LOADS, loads_to_follow
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import any_of, pick, retain, where
 
@@ -18,7 +18,7 @@ PEAKS = np.dtype(
         ("one", "f8", N_LOADS),  # of the last step
         ("two", "f8", N_LOADS),  # of the step before
         ("top", "f8", N_LOADS),  # largest so far
-        ("low", "f8", N_COURSES),  # smallest so far
+        ("low", "f8", N_AVERAGED),  # smallest so far
     ]
 )
 """Of one joint; a batch has them in lanes."""
@@ -39,7 +39,7 @@ def follow_value(i, peaks):
             top = max(top, where(bent, height, top))
         peaks.one[i], peaks.two[i] = load, one
     peaks.top[i] = max(top, load)
-    if i < N_COURSES:
+    if i < N_AVERAGED:
         peaks.low[i] = min(peaks.low[i], load)
 
 
@@ -57,7 +57,7 @@ def forget(mask, peaks):
     for i in range(N_LOADS):
         peaks.top[i] = retain(mask, 0.0, peaks.top[i])
         peaks.one[i], peaks.two[i] = retain(mask, np.nan, peaks.one[i]), retain(mask, np.nan, peaks.two[i])
-        if i < N_COURSES:
+        if i < N_AVERAGED:
             peaks.low[i] = retain(mask, np.inf, peaks.low[i])
 
 
@@ -76,6 +76,6 @@ def write_peaks(lane, peaks, out):
     """Write largest and smallest loads of a lane to `out`, a row of KERNEL_RESULT."""
     for i in range(N_LOADS):
         out.largest[i] = pick(peaks.top[i], lane)
-        if i < N_COURSES:
+        if i < N_AVERAGED:
             out.largest[i] = math.sqrt(out.largest[i])
-            out.reach[i] = out.largest[i] - math.sqrt(pick(peaks.low[i], lane))
+            out.range[i] = out.largest[i] - math.sqrt(pick(peaks.low[i], lane))

@@ -82,7 +82,7 @@ def end_closure(samples):
         largest = 0.0
         for s in range(samples.size):
             for b in range(8):
-                largest = max(largest, samples[s].value[(FORCES, TORQUES)[kind] + b])
+                largest = max(largest, samples[s].loads[(FORCES, TORQUES)[kind] + b])
         change = samples[0].change[kind]
         worst = larger(worst, change / largest if largest > 0 else change)
     return worst
@@ -103,7 +103,7 @@ def speed_ratios(par, samples):
         slope = (ahead - before) * by_sample
         before = here
         samples[s].tau = speed_ratio(2 * math.pi * s / n, par.alpha) + slope
-        samples[s].value[SPEED_ERROR] = abs(slope / samples[s].tau)
+        samples[s].loads[SPEED_ERROR] = abs(slope / samples[s].tau)
 
 
 def build_quasistatic(hold, relax, record):

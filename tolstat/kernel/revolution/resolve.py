@@ -15,7 +15,7 @@ import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Motion, Options, Status
 from tolstat.kernel.integrators.mesh import CELL, cells_of
-from tolstat.kernel.mechanics.loads import FORCES, N_COURSES, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_LOADS, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
 from tolstat.kernel.mechanics.vector import copy
@@ -73,7 +73,7 @@ TURNS = np.dtype(
         ("steps", "i8"),  # explicit steps of a revolution before they were halved
         ("bearable", "f8"),  # contact force of an end station up to which the steps in use are stable, N
         ("growth", "f8"),  # sum of the logarithms of its growth
-        ("before", "f8", N_COURSES),  # largest bushing loads with the steps before
+        ("before", "f8", N_AVERAGED),  # largest bushing loads with the steps before
         ("other", "f8", (3, N_DOF)),  # q, v, a of the neighbour; of the joint while `beside` is 1
     ]
 )
@@ -155,18 +155,18 @@ def clear_extremes(extremes):
     """Reset largest and smallest loads."""
     for i in range(N_LOADS):
         extremes.largest[i] = 0.0
-    for i in range(N_COURSES):
-        extremes.reach[i] = -np.inf
+    for i in range(N_AVERAGED):
+        extremes.range[i] = -np.inf
 
 
 @njit
 def merge_extremes(one, out):
     """Include the extremes `one` in those of `out`."""
-    for i in range(N_COURSES):
-        low = one.largest[i] - one.reach[i]
-        top, reach = extend(one.largest[i], out.largest[i], out.reach[i])
-        out.largest[i], out.reach[i] = top, max(reach, top - low)
-    for i in range(N_COURSES, N_LOADS):
+    for i in range(N_AVERAGED):
+        low = one.largest[i] - one.range[i]
+        top, span = extend(one.largest[i], out.largest[i], out.range[i])
+        out.largest[i], out.range[i] = top, max(span, top - low)
+    for i in range(N_AVERAGED, N_LOADS):
         out.largest[i] = max(out.largest[i], one.largest[i])
 
 
@@ -183,7 +183,7 @@ def keep_revolution(samples, extremes, trail, r):
     clear_extremes(extremes)
     stride = -(-samples.size // trail.modulus.shape[1])
     for s in range(0, samples.size, stride):
-        copy(samples[s].value[:N_COURSES], trail.modulus[r % trail.revolution.size, s // stride])
+        copy(samples[s].loads[:N_AVERAGED], trail.modulus[r % trail.revolution.size, s // stride])
     return own
 
 
@@ -216,7 +216,7 @@ def find_period(last, closure, tolerance, turns, trail):
 @njit
 def halve_steps(period, turns, out):
     """Halve the steps from the next revolution on; keep `period` and the largest loads in `out` for comparison."""
-    copy(out.largest[:N_COURSES], turns.before)
+    copy(out.largest[:N_AVERAGED], turns.before)
     turns.halved += 1
     turns.since, turns.period = turns.revolution, period
     turns.limit = max(turns.limit, turns.revolution + SETTLING)

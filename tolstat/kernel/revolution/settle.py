@@ -8,7 +8,7 @@ import numpy as np
 from tolstat.kernel.mechanics.loads import (
     FORCES,
     INTERPOLATED,
-    N_COURSES,
+    N_AVERAGED,
     N_LOADS,
     TORQUES,
     modulus,
@@ -26,8 +26,8 @@ from tolstat.kernel.simd.lane import pick
 
 SAMPLE = np.dtype(
     [
-        ("loads", "f8", (8, 6)),  # N, N m
-        ("value", "f8", (N_LOADS,)),  # of every load, kind after kind
+        ("components", "f8", (8, 6)),  # of the bushing loads along and about e, t, z; N, N m
+        ("loads", "f8", (N_LOADS,)),  # kind after kind
         ("change", "f8", (2,)),  # largest change of |F| and |T| against the revolution before
         ("tau", "f8"),
         ("mode", "u1", (4,)),
@@ -105,15 +105,15 @@ def record(k, lane, in_full, par, work, v, samples):
         change = 0.0
         for b in range(8):
             i, load = (FORCES, TORQUES)[kind] + b, modulus(3 * kind, b, lane, work)
-            change = larger(change, abs(load - sample.value[i]))  # NaN in the first revolution
-            sample.value[i] = load
+            change = larger(change, abs(load - sample.loads[i]))  # NaN in the first revolution
+            sample.loads[i] = load
         sample.change[kind] = change
     if not in_full:
         return
-    other_loads(lane, par, work, v, sample.value)
+    other_loads(lane, par, work, v, sample.loads)
     for b in range(8):
         for i in range(6):
-            sample.loads[b, i] = pick(work.load[b, i], lane)
+            sample.components[b, i] = pick(work.load[b, i], lane)
     for pin in range(4):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin] = pressed(pin, lane, par, work)
@@ -160,7 +160,7 @@ def closure_error(samples):
         for s in range(samples.size):
             change = larger(change, samples[s].change[kind])
             for b in range(8):
-                largest = max(largest, samples[s].value[(FORCES, TORQUES)[kind] + b])
+                largest = max(largest, samples[s].loads[(FORCES, TORQUES)[kind] + b])
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
     return worst
@@ -208,12 +208,12 @@ def step_error(par, samples, out):
         worst = 0.0
         for body in range(N_LUMPS):
             k, k_turn = stiffness(body, par)
-            of_force = of_torque = 0.0
+            shift = turn = 0.0
             for i in range(6 * body, 6 * body + 3):
                 j = i + 3
-                of_force = max(of_force, abs(q3[i] - q0[i] - 3 * (q2[i] - q1[i])))
-                of_torque = max(of_torque, abs(q3[j] - q0[j] - 3 * (q2[j] - q1[j])))
-            worst = max(worst, max(k / force * of_force, k_turn / torque * of_torque))
+                shift = max(shift, abs(q3[i] - q0[i] - 3 * (q2[i] - q1[i])))
+                turn = max(turn, abs(q3[j] - q0[j] - 3 * (q2[j] - q1[j])))
+            worst = max(worst, max(k / force * shift, k_turn / torque * turn))
         total += worst
     return 2 / 9 * total / samples.size
 
@@ -223,18 +223,18 @@ def summarise(samples, out):
     """Write the statistics of the recorded revolution to a row of KERNEL_RESULT."""
     n = samples.size
     for i in range(N_LOADS):
-        if i < N_COURSES:
-            top, low = extremes(samples.value[:, i])
+        if i < N_AVERAGED:
+            top, low = extremes(samples.loads[:, i])
             total = 0.0
             for s in range(n):
-                total += samples[s].value[i]
-            out.largest[i], out.average[i], out.reach[i] = top, total / n, top - max(low, 0.0)
+                total += samples[s].loads[i]
+            out.largest[i], out.average[i], out.range[i] = top, total / n, top - max(low, 0.0)
         elif INTERPOLATED[i]:
-            out.largest[i], _ = extremes(samples.value[:, i])
+            out.largest[i], _ = extremes(samples.loads[:, i])
         else:
             out.largest[i] = 0.0
             for s in range(n):
-                out.largest[i] = max(out.largest[i], samples[s].value[i])
+                out.largest[i] = max(out.largest[i], samples[s].loads[i])
     for pin in range(4):
         for mode in range(4):
             count = 0

@@ -12,7 +12,7 @@ from tolstat.kernel.integrators.state import AHEAD, FACTORISATIONS, HALVINGS, IT
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.guess import rigid_guess
 from tolstat.kernel.mechanics.ideal_loads import ideal_loads
-from tolstat.kernel.mechanics.loads import N_COURSES, N_LOADS
+from tolstat.kernel.mechanics.loads import N_AVERAGED, N_LOADS
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import make_work
@@ -94,8 +94,8 @@ def clear_results(out):
     out.step_error = out.refinement_change = nan
     for i in range(N_LOADS):
         out.largest[i] = nan
-    for i in range(N_COURSES):
-        out.average[i] = out.reach[i] = nan
+    for i in range(N_AVERAGED):
+        out.average[i] = out.range[i] = nan
     for pin in range(4):
         for k in range(4):
             out.mode_share[pin, k] = nan
@@ -110,7 +110,7 @@ def clear(par, state, samples, notes):
     state.a0[:] = 0.0
     reset(state)
     for s in range(samples.size):
-        samples[s].value[:N_COURSES] = np.nan
+        samples[s].loads[:N_AVERAGED] = np.nan
     notes.count = 0
 
 
@@ -227,7 +227,7 @@ def run_dynamic(par, options, work, state, ring, out):
 def is_finite(out):
     """Whether the statistics of the bushing loads of a joint are finite."""
     good = True
-    for i in range(N_COURSES):
+    for i in range(N_AVERAGED):
         good = good and out.largest[i] < 1e300 and out.average[i] < 1e300
     return good
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT
-from tolstat.kernel.mechanics.loads import FORCES, N_COURSES, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_LOADS, TORQUES
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit
 
@@ -27,7 +27,7 @@ NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
 class Trail(NamedTuple):
     """Work arrays; revolution r lies at index r modulo the number kept."""
 
-    modulus: np.ndarray  # (kept, angles, N_COURSES) moduli of the bushing loads
+    modulus: np.ndarray  # (kept, angles, N_AVERAGED) moduli of the bushing loads
     revolution: np.ndarray  # (kept,) record of KERNEL_RESULT: statistics of each revolution
     notes: np.record  # NOTES
 
@@ -35,7 +35,7 @@ class Trail(NamedTuple):
 def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
     """Allocate the arrays of several trails, for `kept` revolutions."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
-    modulus = np.full((joints, kept, angles, N_COURSES), np.nan)
+    modulus = np.full((joints, kept, angles, N_AVERAGED), np.nan)
     return modulus, np.zeros((joints, kept), KERNEL_RESULT).view(np.recarray), make_notes(joints)
 
 
@@ -109,11 +109,11 @@ def combine(last, count, trail, out):
         for r in range(last - count + 1, last + 1):
             one = trail.revolution[r % kept]
             top = max(top, one.largest[i])
-            if i < N_COURSES:
-                low, total = min(low, one.largest[i] - one.reach[i]), total + one.average[i]
+            if i < N_AVERAGED:
+                low, total = min(low, one.largest[i] - one.range[i]), total + one.average[i]
         out.largest[i] = top
-        if i < N_COURSES:
-            out.average[i], out.reach[i] = total / count, top - low
+        if i < N_AVERAGED:
+            out.average[i], out.range[i] = total / count, top - low
     out.mode_share[:] = 0.0
     for r in range(last - count + 1, last + 1):
         for pin in range(4):

@@ -14,6 +14,7 @@ from tolstat.analysis import allocation, reweight
 from tolstat.analysis.reweight import Weights
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.questions.allocate.ratios import DensityRatios, Entries
 from tolstat.store.view import View
@@ -33,6 +34,7 @@ MIN_CHANGE = 5e-3
 """Smallest relative change of a tolerance that is proposed."""
 
 
+@shown
 class Allocation(NamedTuple):
     """Tolerances proposed for a study.
 

@@ -14,6 +14,7 @@ from tolstat.analysis import sensitivity
 from tolstat.analysis.sensitivity import FirstOrder
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
+from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import BUSHINGS, Status
 from tolstat.questions.causes.query import scattering
@@ -29,6 +30,7 @@ SPREAD = (0.05, 0.5, 0.95)
 """Shares of the joints at which quantiles of the load are shown."""
 
 
+@shown
 class AgainstAngle(NamedTuple):
     """First-order indices of a load at each shaft angle.
 

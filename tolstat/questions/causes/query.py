@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tolstat import sampling
 from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.shown import shown
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
@@ -27,6 +28,7 @@ MAX_JOINTS = sensitivity.MOST
 a million joints with fifty errors do not fit into a gigabyte."""
 
 
+@shown
 class Causes(NamedTuple):
     """Causes of one load.
 

@@ -11,11 +11,13 @@ from tolstat import sampling
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import LOADS
+from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.store.view import View
 
 
+@shown
 class TailJoint(NamedTuple):
     """A joint with a large load.
 
@@ -37,6 +39,7 @@ class TailJoint(NamedTuple):
     scores: dict[str, float]
 
 
+@shown
 class Tail(NamedTuple):
     """The joints with the largest values of a load.
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import difference
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.store.counts import Counts
@@ -57,7 +58,7 @@ class Side(NamedTuple):
     def unresolved(self) -> int:
         """Number of these joints that failed or did not settle."""
         counts = Counts.of(self.view.status[self.samples])
-        return counts.failed + counts.not_settled + counts.not_resolved
+        return counts.failed + counts.unsettled
 
     def load(self, name: str) -> SampleLoad:
         """Load of these joints."""
@@ -96,6 +97,7 @@ class Sides(NamedTuple):
         return a.valid_or_nan, b.valid_or_nan, a.unit
 
 
+@shown
 class Comparison(NamedTuple):
     """Differences between two campaigns.
 

@@ -47,7 +47,7 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
 
     Parameters
     ----------
-    store : ResultStore
+    store : Reader
         The campaign.
     slots : ndarray of int, shape (m,)
         File slots, ascending.

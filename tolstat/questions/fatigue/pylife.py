@@ -20,9 +20,13 @@ INTERVALS = ("range", "mean")
 
 
 def pylife_series(
-    view: View, channels: Sequence[str] | None = None, bins: int = 100, revolutions: float = 1.0
+    view: View,
+    channels: Sequence[str] | None = None,
+    bins: int = 100,
+    revolutions: float = 1.0,
+    nominal: bool = False,
 ) -> pd.Series[float]:
-    """Rainflow cycles of every joint of a file, the nominal joint included, as a pyLife load collective.
+    """Rainflow cycles of every joint of a file as a pyLife load collective.
 
     Parameters
     ----------
@@ -35,6 +39,8 @@ def pylife_series(
         classes for all forces, one for all torques.
     revolutions : float
         Number of revolutions that the numbers of cycles refer to.
+    nominal : bool
+        Include the nominal joint, row 0 of the campaign.
 
     Returns
     -------
@@ -53,11 +59,12 @@ def pylife_series(
 
     if bins < 1:
         raise ValueError(f"{bins} classes: at least 1 expected")
-    cycles = cycles_of(view.store, np.arange(view.store.n), channels)
+    first = 0 if nominal else view.store.first_sample
+    cycles = cycles_of(view.store, np.arange(first, view.store.n), channels)
     joint, channel, place = np.nonzero(cycles.ranges > 0)  # leaves out NaN
     values = {"range": cycles.ranges[joint, channel, place], "mean": cycles.means[joint, channel, place]}
     torque = np.array([CHANNELS[name] != "N" for name in cycles.channels], bool)[channel]
-    rows = np.array(view.store.rows)[joint]
+    rows = np.array(view.store.rows[first:])[joint]
     frame = pd.DataFrame({"joint": rows, "channel": channel, "cycles": cycles.weights[place] * revolutions})
     for name in INTERVALS:
         frame[f"{name}_left"], frame[f"{name}_right"] = np.zeros((2, len(frame)))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import cycles, damage, exceedance, quantile
 from tolstat.analysis.cycles import Cycles, FloatArray
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.shown import shown
 from tolstat.common.tables import CHANNELS, ERROR_FIELDS, Status
 from tolstat.questions.fatigue.counting import cycles_of
 from tolstat.store.view import View
@@ -23,6 +24,7 @@ MAX_NUMBERS = 40
 """Maximum number of points of a spectrum."""
 
 
+@shown
 @dataclass(frozen=True)
 class Loading:
     """Load cycles of the joints of one campaign or of a duty cycle, and the settings of their evaluation.
@@ -187,8 +189,8 @@ def damages(loading: Loading, confidence: float = 0.95) -> pd.DataFrame:
             for part in (loading.cycles, loading.nominal)
         )
         head = {"channel": channel, **line._asdict(), "nominal": _only(nominal)}
-        head["median"] = quantile.at(sums, loading.status, 0.5).estimate
-        above = exceedance.at(sums, loading.status, 1.0, confidence, loading.iid)
+        head["median"] = quantile.quantile(sums, loading.status, 0.5).estimate
+        above = exceedance.exceedance(sums, loading.status, 1.0, confidence, loading.iid)
         rows.append({**head, **asdict(above), "confidence": confidence})
     return pd.DataFrame(rows)
 

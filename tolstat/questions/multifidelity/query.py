@@ -19,10 +19,11 @@ from tolstat.campaign.plan import simulate_timed
 from tolstat.campaign.progress import note
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
+from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean, validate
 from tolstat.joint import perturb
 from tolstat.sampling import draw, draw_blocks
-from tolstat.store import ResultStore
+from tolstat.store import Reader, ResultStore
 from tolstat.store.recorded import perturbed
 from tolstat.store.sample_load import SampleLoad
 from tolstat.study import Study
@@ -33,6 +34,7 @@ MAX_TIMED = 64
 """Maximum number of joints simulated to measure the cost of a fidelity."""
 
 
+@shown
 class TwoFidelities(NamedTuple):
     """Result of a campaign at two fidelities.
 
@@ -174,7 +176,7 @@ def _plans(study: Study, low: str, high: str, folder: Path, pilot: int) -> tuple
         faults.append(Fault("low", f"{low!r} is the same as {high!r}", "give a cheaper one"))
     if study.sampling.method != "random":
         found = f"is {study.sampling.method!r}: the intervals hold for independent samples only"
-        faults.append(Fault(f"{study.path}: sampling.method", found, 'use "random"'))
+        faults.append(study.fault("sampling.method", found, 'use "random"'))
     if faults:
         raise InputError(faults)
     output = study.output.model_copy(update={"histories": "none"})
@@ -189,7 +191,7 @@ def _simulate(plan: _Plan, workers: int | None) -> int:
     """Simulate the pending joints of a file, a new one with the joints of the pilot; return its number of joints."""
     n = plan.pilot
     if plan.path.exists():
-        with ResultStore.open(plan.path) as store:
+        with Reader.open(plan.path) as store:
             n = store.n - store.first_sample
     campaign.run(_sized(plan.study, n), plan.path, execution=Execution(workers=workers), check=False)
     return n
@@ -198,7 +200,7 @@ def _simulate(plan: _Plan, workers: int | None) -> int:
 def _extend(plan: _Plan, n: int) -> None:
     """Extend a file to `n` joints; the new ones are pending."""
     study = _sized(plan.study, n)
-    with ResultStore.open(plan.path, "r+") as store:
+    with ResultStore.open_to_write(plan.path) as store:
         more = range(store.n, study.rows)
         if more:
             grow(store, study, draw_blocks(plan.study, more))
@@ -235,7 +237,7 @@ def _read(plans: tuple[_Plan, _Plan], names: Sequence[str], costs: tuple[float, 
     """Read loads of both files."""
     found = []
     for plan in plans:
-        with ResultStore.open(plan.path) as store:
+        with Reader.open(plan.path) as store:
             view = store.view()
             found.append({load.name: load for load in view.loads(names)})
     high, low = found

@@ -7,12 +7,13 @@ the loads in the file determine the next joints, so that an interrupted run resu
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -26,7 +27,9 @@ from tolstat.campaign.progress import note
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS
-from tolstat.store import ResultStore
+from tolstat.common.shown import shown
+from tolstat.store import Reader, ResultStore
+from tolstat.store.recall import differing_keys
 from tolstat.study import Study, subset_of
 from tolstat.study.model import Subset
 from tolstat.study.selection import limit_of
@@ -36,6 +39,7 @@ MIN_PARALLEL = 2000
 _LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
 
 
+@shown
 class RareEvent(NamedTuple):
     """Result of a subset simulation.
 
@@ -132,7 +136,16 @@ def subset_study(
     return subset_of(study, fields | own)
 
 
-def rare_event(study: Study, limit: str, out: str | Path, workers: int | None = None, **settings: Any) -> RareEvent:
+def rare_event(
+    study: Study,
+    limit: str,
+    out: str | Path,
+    workers: int | None = None,
+    n: int = 1000,
+    p0: float = 0.1,
+    seed: int | None = None,
+    unresolved: Literal["above", "below"] = "below",
+) -> RareEvent:
     """Estimate the probability of a rare load by subset simulation.
 
     Parameters
@@ -145,8 +158,8 @@ def rare_event(study: Study, limit: str, out: str | Path, workers: int | None = 
         Result file; an existing one of the same study, limit and settings is resumed.
     workers : int, optional
         As in `run`.
-    **settings
-        ``n``, ``p0``, ``seed`` and ``unresolved`` of `subset_study`.
+    n, p0, seed, unresolved
+        As in `subset_study`.
 
     Returns
     -------
@@ -165,7 +178,7 @@ def rare_event(study: Study, limit: str, out: str | Path, workers: int | None = 
     >>> found.estimate.lower < 0.0668 < found.estimate.upper  # the load is normal: 700 N, standard deviation 100 N
     True
     """
-    return run(subset_study(study, limit, **settings), Path(out), workers)
+    return run(subset_study(study, limit, n, p0, seed, unresolved), Path(out), workers)
 
 
 def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> RareEvent:
@@ -190,7 +203,7 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     Raises
     ------
     StoreError
-        When the file is of another study, limit or settings, or was begun by other code.
+        When the file is of another study, limit or settings, or lacks joints and was begun by other code.
     Interrupted, WorkerDied
         As `campaign.run`; the same call resumes.
     """
@@ -200,10 +213,15 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     unresolved: list[int] = []
     first, told = plan.first_sample, 0
     rows = _rows(out) or first + settings.per_level
-    _simulate(plan, out, rows, rows, workers, tell)  # also checks that the file is of the same plan
+    held = _is_done(_sized(plan, rows), out)  # by any version of the code: reading it needs no simulation
+    if not held:
+        _simulate(plan, out, rows, rows, workers, tell)  # also checks that the file is of the same plan and code
     while not walk.done:
         stage = range(first, first + walk.next.parent.size)
         if rows < stage.stop:
+            if held:
+                _simulate(plan, out, rows, rows, workers, tell)  # nothing to simulate: checks before rows are appended
+                held = False
             rows = stage.stop
             _append(plan, out, stage, walk.next)
             _simulate(plan, out, rows, len(stage), workers, tell)
@@ -229,8 +247,17 @@ def _rows(out: Path) -> int:
     """Number of rows of the file, 0 if there is none."""
     if not out.exists():
         return 0
-    with ResultStore.open(out) as store:
+    with Reader.open(out) as store:
         return store.n
+
+
+def _is_done(plan: Study, out: Path) -> bool:
+    """Whether the file has all rows of the study simulated."""
+    if not out.exists():
+        return False
+    with ResultStore.open(out) as store:
+        differing = differing_keys(store.identity, json.loads(json.dumps(plan.identity())))
+        return store.complete and not differing
 
 
 def _sized(plan: Study, rows: int) -> Study:
@@ -250,7 +277,7 @@ def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
     """Append the joints of a stage to the file, as pending rows."""
     origin = np.empty(len(stage), SUBSET)
     origin["level"], origin["parent"] = joints.level, joints.parent + plan.first_sample
-    with ResultStore.open(out, "r+") as store:
+    with ResultStore.open_to_write(out) as store:
         grow(store, _sized(plan, stage.stop), [sampling.from_scores(plan, joints.scores)], [origin])
 
 
@@ -261,12 +288,12 @@ def _loads(plan: Study, settings: Subset, out: Path, stage: range, joints: Candi
     stage are its file slots.
     """
     slots = slice(stage.start, stage.stop)
-    with ResultStore.open(out) as store:
+    with Reader.open(out) as store:
         results, origin = store.results(slots), store.origin(slots)
     parent = np.where(joints.parent < 0, -1, joints.parent + plan.first_sample)
     if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():
         found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
-        raise StoreError(str(Fault(str(out), found, "run the simulation again with another --out")))
+        raise StoreError(str(Fault(str(out), found, "run the study again into another file (--out)")))
     loads = LOADS[settings.load].of(results).copy()
     valid = split(loads, results["status"])[0]
     loads[~valid] = math.inf if settings.unresolved == "above" else -math.inf

@@ -14,6 +14,7 @@ from tolstat.analysis import reweight
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.reweight import Weights
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -29,6 +30,7 @@ MAX_OUTSIDE = 1e-4
 _ENDS = np.array([1e-12, 1 - 1e-12])
 
 
+@shown
 class Reweighted(NamedTuple):
     """Statistics of a campaign reweighted to other tolerances.
 
@@ -78,7 +80,8 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
     InputError
         With the faults of the settings, and every error whose new distribution exceeds the range of the old one.
     StoreError
-        When the joints of the file are not drawn from tolerances, or none of them is possible under the new ones.
+        When the joints of the file are not drawn from tolerances, none of them is possible under the new ones, or none
+        has a valid load.
 
     Examples
     --------
@@ -102,6 +105,9 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
     except ValueError as error:
         raise StoreError(str(Fault(str(view.path), str(error), "run a study with these tolerances"))) from error
     loads = [view.load(name).only(done) for name in view.limits or view.shown_loads]
+    if lacking := [load.name for load in loads if not load.is_valid.any()]:
+        found = f"holds no joint with a valid load: {', '.join(lacking)}"
+        raise StoreError(str(Fault(str(view.path), found, f"see why: tolstat status {view.path}")))
     if view.limits:
         rows = [_share_above(load, weights, view.limits[load.name], confidence) for load in loads]
     else:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import cycles, exceedance, quantile
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import CHANNELS, Status
 from tolstat.store import revolutions
@@ -25,6 +26,7 @@ POINTS = 60
 """Number of levels of a curve."""
 
 
+@shown
 class TimeAbove(NamedTuple):
     """Time above levels within a revolution, over the joints.
 

@@ -34,7 +34,7 @@ _LINES = {
 def _share(name: str) -> Callable[[Row], str]:
     def cell(row: Row) -> str:
         own, low, high = (100.0 * row[name + end] for end in ("", "_lower", "_upper"))
-        return f"{own:.3g}" if math.isnan(low) else f"{own:.3g} ({low:.3g} .. {high:.3g}) %"
+        return f"{own:.3g} %" if math.isnan(low) else f"{own:.3g} ({low:.3g} .. {high:.3g}) %"
 
     return cell
 

@@ -23,13 +23,26 @@ MIN_EIGENVALUE = 1e-9
 
 
 class Correlation(Strict):
-    """One ``[[correlation]]``: every pair of the errors in `between` has the correlation `rho`.
+    """Correlation of every pair of some errors."""
 
-    `rho` is the correlation of the normal scores (Gaussian copula), and of the errors themselves if they are normal.
-    """
-
-    between: Annotated[list[str], Field(min_length=1)]
-    rho: Annotated[Number, Field(gt=-1, lt=1)]
+    between: Annotated[
+        list[str],
+        Field(
+            min_length=1,
+            description="names or patterns of errors that have a tolerance; every pair of them has the "
+            "correlation `rho`",
+            examples=[["pin*.diameter"]],
+        ),
+    ]
+    rho: Annotated[
+        Number,
+        Field(
+            gt=-1,
+            lt=1,
+            description="correlation of the normal scores (Gaussian copula), and of the errors themselves if normal",
+            examples=[0.6],
+        ),
+    ]
 
 
 @dataclass(frozen=True)

@@ -363,5 +363,5 @@ def iso2768(path: Path, kind: str, grade: str, nominal: float) -> float:
     fits = (row for row in rows if size <= row.up_to * (1 + 1e-12))
     row = next(fits, None) if size >= rows[0].over * (1 - 1e-12) else None
     if row is None:
-        raise ValueError(f"{size:g} mm is outside the table ({rows[0].over:g} mm to {rows[-1].up_to:g} mm)")
+        raise ValueError(f"outside the table ({rows[0].over:g} mm to {rows[-1].up_to:g} mm)")
     return row.deviation

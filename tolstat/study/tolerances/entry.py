@@ -12,14 +12,30 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.files import data_dir
+from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.moments import outside, standard_deviation
+
+
+class Diameter(NamedTuple):
+    """Tolerance of the diameter of a pin or hole.
+
+    Attributes
+    ----------
+    band : tuple of float, optional
+        Lower and upper limit, m.
+    distribution : Distribution
+        Distribution of the error.
+    """
+
+    band: tuple[float, float] | None
+    distribution: Distribution
 
 
 class Site(NamedTuple):
@@ -41,6 +57,8 @@ class Site(NamedTuple):
         For a zone: whether the axis has a position and a zone of direction.
     direction : ToleranceEntry, optional
         For the position of such an axis: the entry for its direction.
+    diameter : Diameter, optional
+        For the position of a pin or hole: the tolerance of its diameter.
     """
 
     name: str
@@ -50,6 +68,7 @@ class Site(NamedTuple):
     reach: float = math.nan
     shared: bool = False
     direction: ToleranceEntry | None = None
+    diameter: Diameter | None = None
 
 
 class Meaning(NamedTuple):
@@ -82,10 +101,24 @@ def _read(value: object, info: ValidationInfo) -> float:
     return units.to_si(value, site.unit)
 
 
-Value = Annotated[float, BeforeValidator(_read)]
+Value = Annotated[float, BeforeValidator(_read), WithJsonSchema({"x-unit": "error"})]
+"""Quantity in the unit of the error that the entry is for."""
+
+
+def _read_half_width(value: object, info: ValidationInfo) -> float:
+    """Read a quantity that may have the sign ±."""
+    site: Site = (info.context or {})["site"]
+    return units.to_si(value, site.unit, PLUS_MINUS)
+
+
 Positive = Annotated[Value, AfterValidator(units.positive)]
+HalfWidth = Annotated[
+    float, BeforeValidator(_read_half_width), AfterValidator(units.positive), WithJsonSchema({"x-unit": "error"})
+]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
-Truncate = Annotated[bool, Field(strict=True)]
+Truncate = Annotated[
+    bool, Field(strict=True, description="whether parts outside the band are sorted out", examples=[True])
+]
 PositiveLength = Annotated[units.Length, AfterValidator(units.positive)]
 
 
@@ -159,9 +192,17 @@ class Toleranced(NamedTuple):
 class HalfBand(SingleEntry):
     """Entry with a band that may be given by its half width."""
 
-    plus_minus: Positive | None = None
-    iso2768: Literal["f", "m"] | None = None
-    nominal: PositiveLength | None = None
+    plus_minus: Annotated[
+        HalfWidth | None, Field(description="half width of the band about the nominal value", examples=["0.1 mm"])
+    ] = None
+    iso2768: Annotated[
+        Literal["f", "m"] | None,
+        Field(description="band of this class of ISO 2768-1, for the size `nominal`", examples=["f"]),
+    ] = None
+    nominal: Annotated[
+        PositiveLength | None,
+        Field(description="size for `iso2768`; for an angle its shorter leg", examples=["72.8 mm"]),
+    ] = None
 
     def half_width(self, site: Site) -> float | None:
         """Half width of the band; None where none is given."""
@@ -178,7 +219,7 @@ class HalfBand(SingleEntry):
         try:
             return distributions.iso2768(data_dir() / "iso2768.csv", kind, self.iso2768, self.nominal)
         except ValueError as error:
-            raise refuse(f"nominal: {error}", "give plus_minus") from error
+            raise refuse(f"nominal = {{nominal}}: {error}", "give plus_minus", "nominal") from error
 
     def number(self, site: Site) -> str:
         """See `SingleEntry.number`."""
@@ -191,8 +232,14 @@ class HalfBand(SingleEntry):
 class Banded(HalfBand):
     """Entry with a band."""
 
-    lower: Value | None = None
-    upper: Value | None = None
+    lower: Annotated[
+        Value | None,
+        Field(
+            description="lower limit of the band",
+            examples=["0 mm"],
+        ),
+    ] = None
+    upper: Annotated[Value | None, Field(description="upper limit of the band", examples=["0.030 mm"])] = None
 
     def band(self, site: Site) -> tuple[float, float] | None:
         """Lower and upper limit; None where none is given."""

@@ -6,9 +6,12 @@ No statistics of the errors of Cardan crosses are published: the distribution is
 from __future__ import annotations
 
 import csv
+import json
 import math
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
@@ -31,14 +34,21 @@ from tolstat.study.tolerances.moments import mean_square, outside
 from tolstat.study.tolerances.radial import Rayleigh
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
 
+CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
+Cpk = Annotated[PositiveNumber | None, Field(description=f"{CPK}; 1 unless given", examples=[1.33])]
+
 
 class NormalEntry(Banded):
-    """Mean in the middle of the band unless given; sigma from `cpk` (1 unless given) or `std`."""
+    """Mean in the middle of the band, sigma by `cpk`: 0.27 % of the parts are outside at Cpk 1."""
 
     distribution: Literal["normal"]
-    cpk: PositiveNumber | None = None
-    mean: Value | None = None
-    std: Positive | None = None
+    cpk: Cpk = None
+    mean: Annotated[
+        Value | None, Field(description="mean; the middle of the band unless given", examples=["0.01 mm"])
+    ] = None
+    std: Annotated[
+        Positive | None, Field(description="standard deviation, in place of `cpk`", examples=["0.05 mm"])
+    ] = None
     truncate: Truncate = False
 
     def build(self, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
@@ -73,7 +83,7 @@ class NormalEntry(Banded):
 
 
 class UniformEntry(Banded):
-    """Uniform on the band."""
+    """All values of the band are equally probable, none is outside."""
 
     distribution: Literal["uniform"]
 
@@ -83,10 +93,12 @@ class UniformEntry(Banded):
 
 
 class TriangularEntry(Banded):
-    """Triangular on the band, most likely at `peak` (the middle unless given)."""
+    """Most likely at `peak`, none is outside the band."""
 
     distribution: Literal["triangular"]
-    peak: Value | None = None
+    peak: Annotated[
+        Value | None, Field(description="most likely value; the middle of the band unless given", examples=["0 mm"])
+    ] = None
 
     def build(self, site: Site) -> tolerance.Triangular:
         """See `ToleranceEntry.build`."""
@@ -98,13 +110,18 @@ class TriangularEntry(Banded):
 
 
 class LogNormalEntry(Banded):
-    """Lognormal above `threshold` (0 unless given): by band and Cpk of the logarithm, or by mean and std."""
+    """The logarithm of the value above `threshold` is normal: by band and Cpk of the logarithm, or by mean and std."""
 
     distribution: Literal["lognormal"]
-    threshold: Value = 0.0
-    cpk: PositiveNumber | None = None
-    mean: Value | None = None
-    std: Positive | None = None
+    threshold: Annotated[Value, Field(description="least possible value; 0 unless given", examples=["-0.01 mm"])] = 0.0
+    cpk: Cpk = None
+    mean: Annotated[
+        Value | None, Field(description="mean of the value, with `std` in place of a band", examples=["0.02 mm"])
+    ] = None
+    std: Annotated[
+        Positive | None,
+        Field(description="standard deviation of the value, with `mean` in place of a band", examples=["0.01 mm"]),
+    ] = None
     truncate: Truncate = False
 
     def build(self, site: Site) -> tolerance.LogNormal:
@@ -139,11 +156,11 @@ class LogNormalEntry(Banded):
 
 
 class BetaEntry(Banded):
-    """Beta with shapes `a`, `b` on the band."""
+    """Beta distribution with shapes `a`, `b`, stretched over the band."""
 
     distribution: Literal["beta"]
-    a: PositiveNumber
-    b: PositiveNumber
+    a: Annotated[PositiveNumber, Field(description="shape at the lower limit", examples=[2.0])]
+    b: Annotated[PositiveNumber, Field(description="shape at the upper limit", examples=[5.0])]
 
     def build(self, site: Site) -> tolerance.Beta:
         """See `ToleranceEntry.build`."""
@@ -151,11 +168,14 @@ class BetaEntry(Banded):
 
 
 class RayleighEntry(HalfBand):
-    """Radius of an offset whose two coordinates have sigma = plus_minus / (3 cpk) each, or the given `sigma`."""
+    """Radius of an offset in a random direction; its two coordinates are normal with sigma = band / (3 Cpk) each."""
 
     distribution: Literal["rayleigh"]
-    cpk: PositiveNumber | None = None
-    sigma: Positive | None = None
+    cpk: Cpk = None
+    sigma: Annotated[
+        Positive | None,
+        Field(description="standard deviation of each coordinate, in place of `cpk`", examples=["0.03 mm"]),
+    ] = None
     truncate: Truncate = False
 
     def build(self, site: Site) -> Rayleigh:
@@ -192,12 +212,14 @@ class RayleighEntry(HalfBand):
 
 
 class MeasuredEntry(SingleEntry):
-    """One column of a CSV file with a header row; `unit` is that of the column."""
+    """Measured parts of a CSV file with a header row, drawn with equal probability."""
 
     distribution: Literal["measured"]
-    file: str
-    column: str
-    unit: str | None = None
+    file: Annotated[str, Field(description="path of the CSV file, from the study's folder", examples=["rattle.csv"])]
+    column: Annotated[str, Field(description="name of the column in the header row", examples=["speed_rpm"])]
+    unit: Annotated[
+        str | None, Field(description="unit of the column; needed unless the error is a pure number", examples=["rpm"])
+    ] = None
 
     def build(self, site: Site) -> tolerance.Measured:
         """See `ToleranceEntry.build`."""
@@ -260,8 +282,12 @@ ZONE_KINDS: dict[str, dict[str, type[ToleranceEntry]]] = {
     "coaxiality": dict.fromkeys(("normal", "uniform"), CoaxialityEntry),
 }
 """Entries for zones, by the key after the feature's name."""
-EXAMPLE = 'write { plus_minus = ..., distribution = "normal", cpk = 1.0 }'
 ZONE_EXAMPLE = 'write { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", cp = 1.0 }'
+
+
+def kinds_of(name: str) -> dict[str, type[ToleranceEntry]]:
+    """Entries that an error or a zone can have, by the word for ``distribution``."""
+    return ZONE_KINDS.get(name.partition(".")[2], KINDS)
 
 
 def entry(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> ToleranceEntry:
@@ -286,10 +312,12 @@ def entry(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> 
     InputError
         With the faults of the entry.
     """
-    where, key = f"{place}: {strict.dotted(path)}", site.name.partition(".")[2]
-    kinds = ZONE_KINDS.get(key, KINDS)
+    where, kinds = f"{place}: {strict.dotted(path)}", kinds_of(site.name)
     if not isinstance(data, dict):
-        remedy = EXAMPLE if key == "offset_radial" or key not in ZONE_KINDS else ZONE_EXAMPLE
+        half = json.dumps(data, ensure_ascii=False) if isinstance(data, str) else "..."
+        remedy = f'write {{ plus_minus = {half}, distribution = "normal", cpk = 1.0 }}'
+        if "normal" in kinds and kinds is not KINDS:
+            remedy = ZONE_EXAMPLE
         raise InputError([Fault(where, f"{data!r} is not a tolerance", remedy)])
     kind = data.get("distribution")
     if kind is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -21,12 +22,12 @@ def standard_deviation(found: Distribution) -> float:
 
 def mean(found: Distribution) -> float:
     """Return the mean of a distribution, SI."""
-    return float(_average(found, 1))
+    return average(found, lambda values: values)
 
 
 def mean_square(found: Distribution) -> float:
     """Return the mean of the square of a distributed quantity, SI."""
-    return float(_average(found, 2))
+    return average(found, np.square)
 
 
 def outside(found: Distribution, lower: float, upper: float) -> float:
@@ -38,12 +39,13 @@ def outside(found: Distribution, lower: float, upper: float) -> float:
     return share if share > NEGLIGIBLE else 0.0
 
 
-def _average(found: Distribution, power: int) -> float:
+def average(found: Distribution, function: Callable[[Array], Array]) -> float:
+    """Return the mean of a function of a distributed quantity."""
     if isinstance(found, Measured):
-        return float(np.mean(found.values**power))
+        return float(np.mean(function(found.values)))
     from scipy.special import ndtr
 
     weights: Array = np.exp(-0.5 * NODES**2)
     # the upper half from its own tail would need a survival function: beyond a score of 8 ndtr rounds to 1
     values = found.ppf(np.minimum(ndtr(NODES), 1.0 - 2.0**-53))
-    return float((values**power * weights).sum() / weights.sum())
+    return float((function(values) * weights).sum() / weights.sum())

@@ -10,9 +10,11 @@ from typing import NamedTuple
 from tolstat.common.errors import Fault, gather
 from tolstat.joint import Joint, Operation
 from tolstat.study.axes import ORIENTATIONS, Axis
+from tolstat.study.bonus import REJECT, Bonus
 from tolstat.study.selection import TOLERANCED, Entry
+from tolstat.study.tolerances.accepted import Accepted
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import Site, Toleranced, ToleranceEntry
+from tolstat.study.tolerances.entry import Diameter, SingleEntry, Site, Toleranced, ToleranceEntry
 from tolstat.study.tolerances.kinds import entry
 from tolstat.study.tolerances.zones import axes_of
 
@@ -51,8 +53,16 @@ class Tolerances(NamedTuple):
 
     @property
     def distributions(self) -> dict[str, Distribution]:
-        """Distribution of each quantity that is drawn."""
-        return {name: found for entry in self.entries for name, found in entry.quantities.items()}
+        """Distribution of each quantity that is drawn: of the diameters of pins and holes that are accepted."""
+        found = {name: own for entry in self.entries for name, own in entry.quantities.items()}
+        for bonus in self.rejecting:
+            found[bonus.diameter] = Accepted(found[bonus.diameter], bonus)
+        return found
+
+    @property
+    def rejecting(self) -> list[Bonus]:
+        """Maximum material requirements by which parts are rejected."""
+        return [axis.bonus for axis in self.axes.values() if axis.bonus is not None and axis.bonus.rule == REJECT]
 
 
 def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: str, faults: list[Fault]) -> Tolerances:
@@ -78,8 +88,9 @@ def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: st
     every = {name for _, names in table for name in names}
     shared = {name for name in every if _partners(name) & every}
     directions: dict[str, ToleranceEntry] = {}
+    diameters: dict[str, Diameter] = {}
     found: dict[int, Toleranced] = {}
-    for number in sorted(range(len(table)), key=lambda i: _is_position(table[i][1])):  # their directions come first
+    for number in sorted(range(len(table)), key=lambda i: _is_position(table[i][1])):  # what they depend on comes first
         one, names = table[number]
         models = []
         with gather(faults):
@@ -88,7 +99,9 @@ def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: st
                 if site is not None:
                     direction = next((directions[own] for own in _partners(name) if own in directions), None)
                     site = site._replace(shared=name in shared, direction=direction if _is_position([name]) else None)
+                    site = site._replace(diameter=diameters.get(name) if _is_position([name]) else None)
                     models.append((site, entry(one.value, site, place, one.path)))
+                    diameters |= _diameter(*models[-1])
                     directions |= {name: models[-1][1]} if name.endswith(ORIENTATIONS) else {}
         if models and len(models) == len(names):
             found[number] = Toleranced(one.pattern, one.value, tuple(models))
@@ -114,6 +127,14 @@ def nominal_value(name: str, operation: Operation | None) -> float | None:
     if name.startswith("operation."):
         return None if operation is None else float(getattr(operation, name.removeprefix("operation.")))
     return 1.0 if name == "material.E_factor" else 0.0
+
+
+def _diameter(site: Site, model: ToleranceEntry) -> dict[str, Diameter]:
+    """Tolerance of a diameter, by the name of the position that its bonus is for; empty for other errors."""
+    feature, _, key = site.name.partition(".")
+    if key != "diameter" or not isinstance(model, SingleEntry):
+        return {}
+    return {f"{feature}.position": Diameter(model.band(site), model.build(site))}
 
 
 def _is_position(names: list[str]) -> bool:

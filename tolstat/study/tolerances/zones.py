@@ -12,13 +12,15 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from tolstat.common import units
+from tolstat.common import json_schema, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import dotted, refuse
 from tolstat.study import axes
 from tolstat.study.axes import ORIENTATIONS, PAIRS, Axis
+from tolstat.study.bonus import REJECT, Bonus
+from tolstat.study.tolerances.accepted import Accepted
 from tolstat.study.tolerances.distributions import Distribution, Normal, TruncatedNormal, Uniform, sigma_of
 from tolstat.study.tolerances.entry import (
     Meaning,
@@ -29,30 +31,57 @@ from tolstat.study.tolerances.entry import (
     ToleranceEntry,
     Truncate,
 )
-from tolstat.study.tolerances.moments import mean, mean_square, outside
+from tolstat.study.tolerances.moments import average, mean, mean_square, outside
 from tolstat.study.tolerances.radial import Disc, Rayleigh
 
 
 class Zone(NamedTuple):
-    """Size of a zone: width or diameter, m, and whether it is a diameter."""
+    """Size of a zone: width or diameter, m, whether it is a diameter, and whether it grows by a bonus (Ⓜ)."""
 
     size: float
     round: bool
+    grows: bool = False
+
+
+MARKS = ("Ⓜ", "(M)")
+"""Sign of the maximum material requirement behind the size of a zone."""
 
 
 def _read(value: object) -> Zone:
+    mark = next((mark for mark in MARKS if isinstance(value, str) and value.rstrip().endswith(mark)), None)
+    if mark is not None:
+        value = str(value).rstrip().removesuffix(mark)
     round_ = units.is_diameter(value)
-    return Zone(units.positive(units.diameter(value) if round_ else units.to_si(value, "m")), round_)
+    size = units.diameter(value) if round_ else units.to_si(value, "m")
+    return Zone(units.positive(size), round_, mark is not None)
 
 
 class ZoneEntry(ToleranceEntry):
     """Entry with a zone that the axis lies in over a length."""
 
-    zone: Annotated[Zone, BeforeValidator(_read)]
-    over: PositiveLength
-    distribution: Literal["normal", "uniform"]
-    cp: PositiveNumber | None = None
-    truncate: Truncate | None = None
+    zone: Annotated[
+        Zone,
+        BeforeValidator(_read),
+        WithJsonSchema(json_schema.quantity("m", "⌀0.1 mm")),
+        Field(description="size of the zone; ⌀ or dia before the number say that it is a diameter"),
+    ]
+    over: Annotated[
+        PositiveLength, Field(description="length of the pin or hole that the drawing tolerances", examples=["22 mm"])
+    ]
+    distribution: Annotated[
+        Literal["normal", "uniform"],
+        Field(description="`uniform`: by area in a circle; `normal`: in a circle bivariate", examples=["normal"]),
+    ]
+    cp: Annotated[
+        PositiveNumber | None,
+        Field(description="for normal: sigma of a coordinate is zone / (6 Cp); 1 unless given", examples=[1.33]),
+    ] = None
+    truncate: Annotated[
+        Truncate | None,
+        Field(
+            description="for normal: whether parts outside the zone are sorted out; true unless given", examples=[False]
+        ),
+    ] = None
 
     @abstractmethod
     def names(self, site: Site) -> tuple[str, ...]:
@@ -82,7 +111,14 @@ class ZoneEntry(ToleranceEntry):
 
     def quantities(self, site: Site) -> dict[str, Distribution]:
         """See `ToleranceEntry.quantities`."""
+        self.bonus(site)
         return dict.fromkeys(self.names(site), self.build())
+
+    def bonus(self, site: Site) -> Bonus | None:
+        """Return the bonus of the zone; None if it has none."""
+        if self.zone.grows:
+            raise refuse("a bonus is modelled for the position of a pin or hole only", "remove Ⓜ")
+        return None
 
     def number(self) -> str:
         """Return what the number of the entry is, with its value."""
@@ -105,7 +141,37 @@ def _round(entry: ZoneEntry) -> None:
 
 
 class PositionEntry(ZoneEntry):
-    """Position: a cylinder around the ideal axis."""
+    """Position: a cylinder around the ideal axis, in which both of its ends lie."""
+
+    material_condition: Annotated[
+        Literal["reject", "fills"] | None,
+        Field(
+            description="bonus by maximum material: parts outside the grown zone are rejected (`reject`, also where "
+            "`zone` ends in Ⓜ), or the process fills it (`fills`)",
+            examples=["fills"],
+        ),
+    ] = None
+
+    def bonus(self, site: Site) -> Bonus | None:
+        """See `ZoneEntry.bonus`."""
+        rule = self.material_condition or (REJECT if self.zone.grows else None)
+        if rule is None:
+            return None
+        feature = site.name.partition(".")[0]
+        kind = feature.rstrip("1234")
+        if feature in PAIRS:
+            remedy = 'give the positions of single features a bonus, "pin*.position"'
+            raise refuse("the common axis of a pair has no diameter, and no bonus", remedy)
+        if site.shared:
+            raise refuse("a bonus beside a zone of direction is not modelled", "remove one of the two")
+        if self.truncate is not None:
+            raise refuse("truncate has no effect beside a bonus: no part is outside the grown zone", "remove it")
+        if site.diameter is None or site.diameter.band is None:
+            remedy = f'add fit, or "{kind}*.diameter" with plus_minus, or lower and upper'
+            raise refuse(f"the bonus needs the limits of {feature}.diameter", remedy)
+        lower, upper = site.diameter.band
+        sigma = math.inf if self.distribution == "uniform" else sigma_of(-self.band, self.band, 0.0, self.cp or 1.0)
+        return Bonus(rule, f"{feature}.diameter", upper if kind == "pin" else lower, self.band, sigma)
 
     @property
     def band(self) -> float:
@@ -122,6 +188,11 @@ class PositionEntry(ZoneEntry):
         """See `ToleranceEntry.meaning`."""
         end, share = self._deviation(), self._outside()
         feature, number = site.name.partition(".")[0], self.number()
+        if (bonus := self.bonus(site)) is not None and site.diameter is not None:
+            parts = Accepted(site.diameter.distribution, bonus)
+            end = math.sqrt(0.5 * average(parts, bonus.mean_square))
+            rule = f"{100 * (1 - parts.share):.2g} % rejected" if bonus.rule == REJECT else "filled"
+            number = f"⌀{units.shown(self.zone.size, 'm')} Ⓜ, {rule}"
         if isinstance(site.direction, OrientationEntry):
             middle, slope = end * self._room_left(site.direction), site.direction._deviation()
         else:
@@ -140,15 +211,12 @@ class PositionEntry(ZoneEntry):
 
 
 class OrientationEntry(ZoneEntry):
-    """Perpendicularity or angularity: a cylinder, or the space between two planes, along the ideal direction.
+    """Perpendicularity or angularity: a cylinder, or the space between two planes, along the ideal direction."""
 
-    Attributes
-    ----------
-    about : str, optional
-        For two planes: the axis, t or z, of the rotation that they bound.
-    """
-
-    about: Literal["t", "z"] | None = None
+    about: Annotated[
+        Literal["t", "z"] | None,
+        Field(description="for two planes (`zone` without ⌀): axis of the rotation that they bound", examples=["z"]),
+    ] = None
 
     @property
     def band(self) -> float:
@@ -216,11 +284,14 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
         For zones of one axis that contradict each other.
     """
     zones: dict[str, dict[str, tuple[ToleranceEntry, str]]] = {}
+    bonus: dict[str, Bonus | None] = {}
     for entry in entries:
         for site, model in entry.models:
             if axes.is_zone(site.name):
                 feature, _, key = site.name.partition(".")
                 zones.setdefault(feature, {})[key] = (model, dotted(("tolerances", entry.pattern)))
+                if isinstance(model, PositionEntry):
+                    bonus[feature] = model.bonus(site)
     found, faults = {}, []
     for name, own in zones.items():
         position = own.get("position", (None, ""))[0]
@@ -232,7 +303,7 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
                     model, where = own[key]
                     room = position.band if position.bounded else math.inf
                     faults += _contradictions(model, position, f"{place}: {where}")
-        found[name] = Axis(name, over, room, reach if name in PAIRS else math.nan)
+        found[name] = Axis(name, over, room, reach if name in PAIRS else math.nan, bonus.get(name))
     if faults:
         raise InputError(list(dict.fromkeys(faults)))
     return found

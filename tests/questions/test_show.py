@@ -1,0 +1,293 @@
+"""Drawings of a joint: drawn places against the kernel's axes, senses of errors against `perturb`, the command."""
+
+import re
+import shutil
+from itertools import combinations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from matplotlib.text import Annotation
+from typer.testing import CliRunner
+
+from tests.support import naive, synthetic
+from tests.support.environment import ROOT
+from tolstat import joint as joints
+from tolstat.cli import app
+from tolstat.common.loads import LOADS
+from tolstat.common.tables import HOLES, PINS
+from tolstat.display import drawing
+from tolstat.display.asked import Asked
+from tolstat.display.joint_drawing import error_kinds, front, one_joint, side
+from tolstat.display.joint_drawing.geometry import FRONT, KINDS, SIDE
+from tolstat.joint import nominal_errors, perturb
+from tolstat.kernel.mechanics import bushing
+from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, FRAME, PIN, TRIAD
+from tolstat.questions.show import query, rendering, section, source
+from tolstat.store import ResultStore
+
+ALPHA = 0.3
+OPERATION = joints.Operation.model_construct(alpha=ALPHA, speed=50.0, torque=100.0)
+SLIM = {
+    "cross": {"R": "40 mm", "r_b": "20 mm"},
+    "pin": {"l": "25 mm", "d": "18 mm"},
+    "contact": {"D_P": "20 mm", "D_H": "20.05 mm", "z": "16 mm"},
+    "arm": {"l_f": "30 mm"},
+}
+"""A joint with pins a quarter as thick as those of the paper's."""
+
+
+def drawn(draw, *args, size=(4.9, 4.9), **kwargs):
+    """Names of what is drawn, with its points: corners of parts, tail and tip of arrows."""
+    figure = Figure(figsize=size)
+    with drawing.settings():
+        draw(figure.add_axes((0, 0, 1, 1)), *args, **kwargs)
+        FigureCanvasAgg(figure).draw()
+    found = {}
+    for artist in figure.findobj(lambda one: one.get_gid() is not None and isinstance(one, (Annotation, Polygon))):
+        ends = isinstance(artist, Annotation)
+        found[artist.get_gid()] = np.array([artist.xyann, artist.xy]) if ends else artist.get_xy()[:-1]
+    return found, figure
+
+
+def along(arrow):
+    """Unit vector from the tail to the tip of an arrow."""
+    way = arrow[1] - arrow[0]
+    return way / np.hypot(*way)
+
+
+def axes_of_parts():
+    """Axes e, t, z of pins and arms in ground axes at the input angle 0, from the kernel's triads, (8, 3, 3)."""
+    frames = naive.frames(0.0, ALPHA)
+    return np.array([TRIAD[body] @ frames[FRAME[body]].T for body in range(PIN, ARM + 4)])
+
+
+def test_front_view_has_pins_in_the_holes_of_the_kernels_arms(cirelli):
+    found, _ = drawn(front.draw, query.dimensions(cirelli, ALPHA))
+    for k, arm in enumerate(ARM_OF_PIN):
+        e, t, _ = TRIAD[PIN + k]
+        middle = found[f"front.pin{k + 1}"].mean(axis=0)
+        assert middle == pytest.approx(cirelli.cross.R * e[:2])
+        hole = np.mean([found[f"front.arm{arm + 1}.{i}"].mean(axis=0) for i in (1, 2)], axis=0)
+        assert hole == pytest.approx(middle)
+        for letter, axis in (("e", e), ("t", t)):
+            assert along(found[f"front.pin{k + 1}.{letter}"]) == pytest.approx(axis[:2])
+        assert found[f"cross{k + 1}"].mean(axis=0) == pytest.approx(cirelli.cross.r_b * e[:2])
+    assert FRONT.towards == pytest.approx(TRIAD[PIN, 2])
+
+
+def test_side_view_has_the_output_fork_at_the_misalignment(cirelli):
+    found, _ = drawn(side.draw, query.dimensions(cirelli, ALPHA))
+    axes = axes_of_parts()
+    for k in (0, 1):
+        e, _, z = axes[4 + k]
+        assert along(found[f"side.arm{k + 1}.e"]) == pytest.approx(SIDE.of(e))
+        marker = cirelli.cross.R * e - cirelli.arm.l_f * z
+        assert found[f"fork{k + 1}"].mean(axis=0) == pytest.approx(SIDE.of(marker))
+    output = np.array([np.sin(ALPHA), 0.0, np.cos(ALPHA)])  # docs/model.md, Frames
+    assert found["fork4"].mean(axis=0) == pytest.approx(SIDE.of(cirelli.arm.l_f * output))
+    assert SIDE.towards == pytest.approx(axes[0, 0])  # pin 1 is in front
+    # on the near side a shaft that turns forward moves the way of its axis times the direction towards the reader
+    for name, sense in (("side.omega", 1.0), ("side.torque", -1.0)):
+        shaft = np.array([0.0, 0.0, 1.0]) if name == "side.omega" else output
+        assert along(found[name]) @ SIDE.of(np.cross(shaft, SIDE.towards)) * sense > 0.8
+
+
+def test_markers_are_those_of_the_kernels_bushings(cirelli, params):
+    """`bushing.markers` gives places in axes of the base: hub, input shaft, output shaft."""
+    d, frames = query.dimensions(cirelli, ALPHA), naive.frames(0.0, ALPHA)
+    assert d.triads == pytest.approx(axes_of_parts())
+    for i, base in enumerate(BUSHING_BASE):
+        _, on_base = bushing.markers(i, params(ALPHA)[0])
+        assert d.markers[i] == pytest.approx(frames[FRAME[base]] @ np.array(on_base))
+
+
+@pytest.fixture(scope="module")
+def arrows(cirelli):
+    return drawn(error_kinds.draw, query.positive(cirelli), (0.076, 0.0762), 0.022)[0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", ["pin", "hole"])
+def test_arrow_of_an_error_has_the_sense_that_perturb_gives_it(cirelli, arrows, kind, name):
+    """A small positive error of pin 1 or hole 4, in axes of its frame, against the arrow on the drawing."""
+    feature = {"pin": "pin1", "hole": "hole4"}[name]
+    errors = nominal_errors(1, OPERATION)
+    errors[f"{feature}.{kind}"] = 1e-5
+    row, before = (perturb(cirelli, table)[0] for table in (errors, nominal_errors(1, OPERATION)))
+    if kind == "diameter":
+        wider = (row["clearance"][0] - before["clearance"][0]) * (1.0 if name == "hole" else -1.0)
+        for i, sign in ((1, -1.0), (2, 1.0)):
+            assert along(arrows[f"diameter.{name}.arrow.{i}"])[0] * sign * np.sign(wider) == pytest.approx(1.0)
+        return
+    place, part = (0, "pin") if name == "pin" else (3, "hole")
+    field = f"{part}_{'axis' if kind.startswith('tilt') else 'point'}"
+    change = row[field][place] - before[field][place]
+    e, t, z = TRIAD[PIN if name == "pin" else ARM + 3]
+    right, up = (z, e) if kind in ("offset_z", "tilt_t") else (-t, e)
+    expected = np.array([change @ right, change @ up])
+    assert along(arrows[f"{kind}.{name}.arrow"]) @ expected / np.hypot(*expected) == pytest.approx(1.0, abs=0.02)
+    assert np.cross(right, up) == pytest.approx(z if right is not z else t)
+
+
+def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_errors):
+    errors = nominal_errors(1, OPERATION)
+    for name, value in random_errors(5).items():
+        errors[name.replace("__", ".")] = value
+    par, (pin, z) = perturb(cirelli, errors)[0], (cirelli.contact.D_P, cirelli.contact.z)
+    pairs = query.pairs(cirelli, errors)
+    factor = one_joint.enlargement(pairs, pin, z)
+    found, _ = drawn(one_joint.draw, pairs, pin, z)
+    for i, arm in enumerate(ARM_OF_PIN):
+        e, t, own_z = TRIAD[PIN + i]
+        for way, right in (("along_z", -t), ("along_t", own_z)):
+            inner_left, outer_left, outer_right, inner_right = found[f"{PINS[i]}.{way}"]
+            left, other = (found[f"{HOLES[arm]}.{way}.{k}"] for k in (1, 2))
+            for end, s in ((0, -0.5 * z), (1, 0.5 * z)):
+                apart = (
+                    par["pin_point"][i] + s * par["pin_axis"][i] - par["hole_point"][arm] - s * par["hole_axis"][arm]
+                )
+                drawn_left = (inner_left, outer_left)[end][0] - left[end][0]
+                drawn_right = other[end][0] - (inner_right, outer_right)[end][0]
+                assert drawn_left == pytest.approx(factor * (par["clearance"][i] + apart @ right), abs=2e-8 * factor)
+                assert drawn_right == pytest.approx(factor * (par["clearance"][i] - apart @ right), abs=2e-8 * factor)
+            shift = 0.25 * (inner_left + outer_left + outer_right + inner_right)[1]
+            assert shift == pytest.approx(factor * par["pin_point"][i] @ e, abs=1e-9)
+
+
+def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
+    fitting = joints.load("cirelli2021", {"contact": {"D_H": "76 mm"}}, "test")
+    pairs = query.pairs(fitting, nominal_errors(1, OPERATION))
+    assert one_joint.enlargement(pairs, 0.076, 0.022) == 1.0
+    assert drawn(one_joint.draw, pairs, 0.076, 0.022)
+
+
+@pytest.mark.parametrize("alpha", [-20.0, 0.0, 15.0, 32.0])
+@pytest.mark.parametrize("over", [{}, SLIM], ids=["paper", "slim"])
+def test_labels_are_inside_and_apart(over, alpha):
+    d = query.dimensions(joints.load("cirelli2021", over, "test"), np.radians(alpha))
+    for view in (front, side):
+        _, figure = drawn(view.draw, d, marked=("cross1", "cross3", "fork4", "pin1"))
+        renderer = figure.canvas.get_renderer()
+        texts = [text for text in figure.findobj(mpl.text.Text) if text.get_text() and text.get_visible()]
+        boxes = {text.get_text() + str(i): text.get_window_extent(renderer) for i, text in enumerate(texts)}
+        assert len(boxes) > 15
+        for name, box in boxes.items():
+            assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1, name
+            assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1, name
+        over_each_other = [(a, b) for a, b in combinations(boxes, 2) if boxes[a].overlaps(boxes[b])]
+        assert over_each_other == []
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def call(*args):
+    return CliRunner().invoke(app, ["show", *map(str, args)])
+
+
+def texts_and_outlines(path):
+    """Texts of an SVG in their order, and the numbers of the outlines that have a name with a dot."""
+    text = path.read_text(encoding="utf-8")
+    named = re.findall(r'<g id="([\w]+\.[\w.]+)">\s*<path d="([^"]*)"', text)
+    return re.findall(r"<!-- (.*?) -->", text), {
+        name: np.array(re.findall(r"-?[\d.]+", path), float) for name, path in named
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "options"), [("joint", ()), ("joint_narrow", ("--columns", 1)), ("errors", ("--errors",))]
+)
+def test_drawings_in_the_documents_are_up_to_date(here, name, options):
+    """If this fails: ``tolstat show cirelli2021 --out docs/joint.svg``, and as parametrized the others."""
+    assert call("cirelli2021", "--out", f"{name}.svg", *options).exit_code == 0
+    made, kept = (texts_and_outlines(folder / f"{name}.svg") for folder in (here, ROOT / "docs"))
+    assert made[0] == kept[0]
+    assert len(made[0]) > 20
+    assert made[1].keys() == kept[1].keys()
+    assert len(kept[1]) > 10
+    for outline, points in made[1].items():
+        assert points == pytest.approx(kept[1][outline], abs=0.05), outline
+
+
+@pytest.mark.parametrize("given", ["cirelli2021", "joint.toml", "small.toml", "small.h5"])
+def test_joint_file_study_and_result_file_are_drawn(here, given):
+    synthetic.store(here)
+    shutil.copy(ROOT / "data" / "joints" / "cirelli2021.toml", here / "joint.toml")
+    done = call(given, "--out", "new/joint.svg")
+    assert done.exit_code == 0, done.stderr
+    assert "cross.R          72.82 mm" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert done.stderr == "wrote new/joint.svg\n"
+    ids = re.findall(r' id="([^"]*)"', (here / "new" / "joint.svg").read_text(encoding="utf-8"))
+    assert {"front.pin1", "side.arm4", "cross1", "fork4"} <= set(ids)
+    assert len(ids) == len(set(ids))
+
+
+def test_row_prints_the_errors_of_the_file(here):
+    path = synthetic.store(here)
+    done = call(path, "--row", 17)
+    assert done.exit_code == 0, done.stderr
+    assert (here / "row17.svg").read_text(encoding="utf-8").startswith("<?xml")
+    lines = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()[1:]}
+    with ResultStore.open(path) as store:
+        errors = store.errors(slice(17, 18))
+        shown = source.read(path, 17)
+    assert shown.errors == errors
+    for name in (*PINS, *HOLES):
+        assert float(lines[name][1]) == pytest.approx(1e3 * errors[f"{name}.offset_t"][0], abs=5e-5)
+        assert float(lines[name][5]) == pytest.approx(1e3 * errors[f"{name}.diameter"][0], abs=5e-5)
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (("cirelli", "--row", 3), "cirelli: has no rows"),
+        (("cirelli",), "did you mean 'cirelli2021'"),
+        (("none.toml",), "none.toml: cannot be read"),
+        (("none.h5",), "none.h5: is neither a file nor"),
+        (("small.h5", "--row", 1000), "has rows 0 to 60, not 1000"),
+        (("small.h5", "--alpha", "3 deg"), "--alpha: is used with a joint file only"),
+        (("cirelli2021", "--alpha", "3"), "--alpha: '3' has no unit"),
+        (("cirelli2021", "--alpha", "95 deg"), "--alpha: a Cardan joint cannot turn"),
+        (("cirelli2021", "--out", "joint.txt"), "--out joint.txt: is not a picture"),
+        (("small.h5", "--errors", "--row", 2), "--errors: cannot be used together with --row"),
+    ],
+)
+def test_what_cannot_be_drawn_is_exit_code_2_and_writes_nothing(here, args, said):
+    synthetic.store(here)
+    before = sorted(here.iterdir())
+    done = call(*args)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert said in done.stderr
+    assert sorted(here.iterdir()) == before
+
+
+def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
+    with ResultStore.open(synthetic.store(tmp_path)) as store:
+        view, asked = store.view(), Asked(store.path)
+        panels = section.legend(view, asked)
+        (part,) = section.sections(view, asked)
+        worst = {int(view.rows(int(np.argmax(LOADS[name].of(view.results))))) for name in view.leading}
+    places = {name.partition(".")[0] for name in view.leading} - {"psi"}
+    assert f"Marked: {', '.join(sorted(places))}." in panels[0].description
+    keys = [panel.key for panel in part.blocks[0].panels]
+    assert keys[-1] == "error-kinds"
+    assert set(keys[:-1]) == {f"drawn-{row}" for row in worst}
+    assert asked.notes == []
+
+
+def test_figures_of_the_package(cirelli):
+    import tolstat
+
+    figure = tolstat.draw_joint(cirelli, ALPHA)
+    assert figure.texts[0].get_text() == cirelli.description
+    assert tolstat.draw_errors is rendering.draw_errors
+    assert len(tolstat.draw_row(cirelli, nominal_errors(1, OPERATION), "one").axes) == 1

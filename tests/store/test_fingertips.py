@@ -1,0 +1,124 @@
+"""What a store looks like at the prompt: loads by name, the nominal joint apart, short texts, nothing that writes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import tolstat
+from tests.support import synthetic
+from tolstat.analysis.quantile import Quantile
+from tolstat.common.errors import InputError
+from tolstat.common.loads import LOADS
+from tolstat.common.shown import short, shown
+from tolstat.store import Reader, ResultStore
+
+MAX_REPR = 250
+WRITING = {name for name in vars(ResultStore) if not name.startswith("_")}
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return synthetic.store(tmp_path_factory.mktemp("store"), failed=2, unsettled=3)
+
+
+@pytest.fixture
+def store(path):
+    with tolstat.open(path) as opened:
+        yield opened
+
+
+def test_loads_have_names_and_rows_of_the_campaign(store):
+    load, table = LOADS["fork2.T"], store.results()
+    series = store.loads["fork2.T"]
+    assert (series.name, series.index.name, series.attrs["units"]) == ("fork2.T", "row", "N*m")
+    assert series.index.tolist() == list(range(1, 61))
+    assert series.isna().sum() == 5
+    np.testing.assert_array_equal(series[:55], load.of(table)[1:56])
+    assert list(store.loads) == [*LOADS]
+    assert len(store.loads) == len(LOADS)
+    assert "psi" in store.loads
+    assert pd.DataFrame(dict(store.loads)).shape == (60, len(LOADS))
+    assert store.nominal["fork2.T"] == load.of(table)[0]
+    assert store.nominal.index.tolist() == [*LOADS]
+    assert store.loads._ipython_key_completions_() == tuple(LOADS)
+    with pytest.raises(InputError, match="did you mean"):
+        store.loads["fork2.t"]
+
+
+def test_a_slice_without_the_nominal_joint(tmp_path):
+    source = tmp_path / "a.toml"
+    source.write_text(synthetic.STUDY, encoding="utf-8")
+    study = tolstat.load(source)
+    ResultStore.create(tmp_path / "a.h5", study, tolstat.draw(study, range(20, 30)), rows=range(20, 30)).close()
+    with tolstat.open(tmp_path / "a.h5") as opened:
+        assert opened.loads["psi"].index.tolist() == list(range(20, 30))
+        assert opened.loads["psi"].isna().all()
+        assert opened.nominal.isna().all()
+        assert opened.to_pandas().index.tolist() == list(range(20, 30))
+        assert not opened.to_pandas(nominal=True)["nominal"].any()
+
+
+def test_what_is_opened_for_reading_cannot_write(store):
+    assert type(store) is Reader
+    assert {"create", "write", "finish", "update_study", "begin_retry"} <= WRITING
+    assert not WRITING & set(dir(store))
+    assert store._file.mode == "r"
+    view = store.view()
+    load = view.load("cross1.F")
+    kept = [load.values, *load.ends, load.status, load.is_valid, load.sample.valid, view.nominal, view.mode_share]
+    kept += [view.results, view.first_without_load, next(view.error_blocks(()))]
+    assert not any(array.flags.writeable for array in kept)
+    with pytest.raises(ValueError, match="read-only"):
+        view.load("cross1.F").values[0] = 0.0
+
+
+def test_texts_at_the_prompt_are_short(path, store):
+    view = store.view()
+    load = view.load("cross1.F")
+    assert repr(store) == "<result file 'small.h5': 60 joints (55 ok, 3 not_settled, 2 newton_failed)>"
+    assert repr(view.study) == "<study 'small': 60 joints (random), 4 toleranced errors, 7 limits>"
+    assert repr(load).startswith("<load 'cross1.F': 55 of 60 joints valid, 6")
+    assert repr(load).endswith(" N, limit 700 N>")
+    results = [store, store.loads, view, view.study, load, load.above(700.0), load.quantile(0.5), store.counts()]
+    results += [tolstat.worst_joints(view, "cross1.F", 3)]
+    for result in results:
+        assert len(repr(result)) <= MAX_REPR
+        assert "\n" not in repr(result)
+        assert result._repr_html_().startswith("<table>")
+    closed = tolstat.open(path)
+    closed.close()
+    assert repr(closed) == "<result file 'small.h5', closed>"
+    assert "closed" in closed._repr_html_()
+
+
+def test_values_are_shown_in_a_few_characters():
+    frame = pd.DataFrame({"a": range(3)})
+    values = [
+        1 / 3,
+        np.float32(2.0),
+        True,
+        None,
+        "a" * 100,
+        np.zeros(3),
+        np.zeros((9, 2)),
+        frame,
+        frame["a"],
+        [1.0, 2.0],
+    ]
+    texts = ["0.3333", "2", "True", "None", repr("a" * 57 + "..."), "[0, 0, 0]", "<array 9 x 2>", "<table 3 x 1>"]
+    assert [short(value) for value in values] == [*texts, "<table 3>", "[1, 2]"]
+    assert short(dict.fromkeys(range(9))) == "<9 entries>"
+    quantile = Quantile(0.5, 3, 0, 0, 1.0, 0.5, 2.0, 0.5, 2.0)
+    assert short([quantile] * 3) == "<3 Quantile>"
+
+    @shown
+    class Pair(tuple):
+        _fields = ("text", "table")
+        text, table = "<b>", frame
+
+    assert repr(Pair()) == "Pair(text='<b>', table=<table 3 x 1>)"
+    html = Pair()._repr_html_()
+    assert "&lt;b&gt;" in html
+    assert "<td>2</td>" in html

@@ -1,0 +1,109 @@
+"""JSON schema of the input models: what an editor needs to complete and check the keys of a file.
+
+`study.schema` assembles the schemas of whole files from these parts. Keywords of this package: ``x-unit``, the SI unit
+of a quantity, ``"error"`` for that of the error that an entry is for; ``x-table``, the name of a table of
+`study.schema` that stands in place of the property.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, get_args
+
+import annotated_types
+from pydantic import AfterValidator
+from pydantic.fields import FieldInfo
+
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+PURE = rf"^\s*{NUMBER}\s*%?\s*$"
+"""Pattern of a text that is a number, for quantities without unit."""
+_SIGN = r"(?:±|\+/?[-−]|[⌀ØøΦφ∅]|[Dd]ia(?:meter|\.)?)?"
+WITH_UNIT = rf"^\s*{_SIGN}\s*{NUMBER}\s*(?:1\s*/|[eE][^\d+-]|[A-DF-Za-df-zµμ°′'%/(])"
+"""Pattern of the beginning of a quantity with a unit. It accepts more than is read: the unit is checked by `units`.
+Without look-around, which some editors' regular expressions lack."""
+
+
+def quantity(unit: str, example: str) -> dict[str, Any]:
+    """JSON schema of a quantity as a file writes it.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit; of unit ``"1"`` are bare numbers, of all others texts with a number and a unit.
+    example : str
+        How such a value is written.
+    """
+    if unit == "1":
+        return {"type": ["number", "string"], "pattern": PURE, "x-unit": unit}
+    return {"type": "string", "pattern": WITH_UNIT, "x-unit": unit, "examples": [example]}
+
+
+def sign(own: Mapping[str, Any]) -> dict[str, Any]:
+    """Keyword that refuses a minus sign in the text of a quantity that must not be negative."""
+    if "string" not in str(own.get("type", own)) or 0 not in (own.get("minimum"), own.get("exclusiveMinimum")):
+        return {}
+    return {"not": {"type": "string", "pattern": r"^\s*-"}}
+
+
+def complete(schema: dict[str, Any], fields: Mapping[str, FieldInfo], signs: Mapping[Callable[..., Any], str]) -> None:
+    """Add to the JSON schema of a model what pydantic leaves out of it.
+
+    Parameters
+    ----------
+    schema : dict
+        Schema of the model, changed in place: bounds of quantities, defaults that are made by a function; titles and
+        null, which TOML does not have, are removed.
+    fields : mapping
+        Fields of the model.
+    signs : mapping
+        Validators of the sign of a quantity, to the keyword for numbers that says the same.
+    """
+    schema.pop("title", None)
+    for name, field in fields.items():
+        own = schema["properties"][field.alias or name]
+        own.pop("title", None)
+        _remove_null(own)
+        own |= _bounds(field, signs, own)
+        own |= _default(field)
+        if own.get("default", 0) is None:
+            del own["default"]
+
+
+def _remove_null(own: dict[str, Any]) -> None:
+    rest = [inner for inner in own.get("anyOf", []) if inner != {"type": "null"}]
+    if len(rest) == 1:
+        del own["anyOf"]
+        own |= rest[0] | own
+    elif rest:
+        own["anyOf"] = rest
+
+
+def _default(field: FieldInfo) -> dict[str, Any]:
+    made: Any = field.default_factory() if field.default_factory else None  # type: ignore[call-arg]
+    return {"default": made} if made else {}
+
+
+def _bounds(field: FieldInfo, signs: Mapping[Callable[..., Any], str], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Bounds of a quantity, or of a quantity that may be left out."""
+    found: dict[str, Any] = {}
+    for item in _metadata(field.annotation, field.metadata):
+        match item:
+            case annotated_types.Gt(gt=bound):
+                found["exclusiveMinimum"] = bound
+            case annotated_types.Ge(ge=bound):
+                found["minimum"] = bound
+            case annotated_types.Lt(lt=bound):
+                found["exclusiveMaximum"] = bound
+            case annotated_types.Le(le=bound):
+                found["maximum"] = bound
+            case AfterValidator(func=func) if func in signs:
+                found[signs[func]] = 0
+    return found | sign({**own, **found})
+
+
+def _metadata(annotation: Any, metadata: list[Any]) -> Iterator[Any]:
+    """Metadata of an annotation, and of those inside it that it is a union of."""
+    yield from metadata
+    for inner in get_args(annotation):
+        if hasattr(inner, "__metadata__"):
+            yield from inner.__metadata__

@@ -1,0 +1,210 @@
+"""Tables of a result file: read column by column, checked against their checksums."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common import selected_results, tables
+from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common.tables import Status, Variant
+from tolstat.store import checks, integrity
+from tolstat.store.numbering import Numbering
+from tolstat.store.result_file import BLOCK, RUN_AGAIN, descriptions, store_error
+
+
+class CheckedTables(Numbering):
+    """Tables of an open result file, row i for joint i; part of `Reader`, which has the attributes."""
+
+    path: Path
+    n: int
+    columns: tuple[Column, ...]
+    case_names: tuple[str, ...]
+    variants: tuple[Variant, ...]
+    _file: h5py.File
+
+    def status(self, rows: slice = slice(None)) -> NDArray[np.uint8]:
+        """Status of the joints, (n,), or of a slice of file slots; joints whose row is damaged are PENDING.
+
+        Raises
+        ------
+        StoreError
+            When a status is unknown to this version.
+        """
+        if self._file.mode != "r":
+            return self._status(rows)  # opening for writing has already marked damaged rows as pending
+        first, last, _ = rows.indices(self.n)
+        blocks = (slice(begin, min(begin + BLOCK, last)) for begin in range(first, last, BLOCK))
+        return np.concatenate([np.empty(0, np.uint8), *map(self._status_if_intact, blocks)])
+
+    def damaged(self) -> NDArray[np.intp]:
+        """File slots whose results do not match their checksums, as after an interrupted write or a disk fault."""
+        found = [np.empty(0, np.intp)]
+        for first in range(0, self.n, BLOCK):
+            rows = slice(first, first + BLOCK)
+            done = self._status(rows) != Status.PENDING
+            if done.any():
+                found.append(first + np.flatnonzero(done & ~self._intact(rows, self._results(rows))))
+        return np.concatenate(found)
+
+    def pending(self) -> NDArray[np.intp]:
+        """File slots still to be simulated, ascending."""
+        return np.concatenate([np.empty(0, np.intp), *self.pending_blocks()])
+
+    def pending_blocks(self) -> Iterator[NDArray[np.intp]]:
+        """Yield the file slots still to be simulated, ascending, in non-empty arrays of at most `BLOCK`."""
+        for first in range(0, self.n, BLOCK):
+            found = np.flatnonzero(self.status(slice(first, first + BLOCK)) == Status.PENDING)
+            if found.size:
+                yield found + first
+
+    def design(self) -> NDArray[np.void]:
+        """Variant, case and group of every joint, (n,) table DESIGN.
+
+        Raises
+        ------
+        StoreError
+            When the study does not list its joints, or the table is damaged.
+        """
+        if "design" not in self._file:
+            remedy = 'give the result file of a study with sampling.method = "cases"'
+            raise store_error(self.path, "has no list of cases and variants", remedy)
+        table = self._described("design", slice(None))
+        for name, end in (("variant", len(self.variants)), ("case", len(self.case_names))):
+            if table[name].min() < 0 or table[name].max() >= end:
+                found = f"is damaged: design/{name} is not between 0 and {end - 1}"
+                raise store_error(self.path, found, RUN_AGAIN)
+        self._check_errors(slice(None), self._errors(slice(None)))
+        return table
+
+    def origin(self, rows: slice = slice(None)) -> NDArray[np.void]:
+        """How every joint was drawn, (n,) table with the columns `draw_records.columns`, or of a slice of file slots.
+
+        Raises
+        ------
+        StoreError
+            When the sampling method has no such table, or it is damaged.
+        """
+        if "origin" not in self._file:
+            remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
+            raise store_error(self.path, "has no record of how its joints were drawn", remedy)
+        self.errors(rows)  # checks this table too: it enters the checksums of the errors
+        return self._described("origin", rows)
+
+    def errors(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
+        """Errors of every joint, (n,) table ERROR, or of a slice of file slots.
+
+        With `fields` the table has these only: all fields are read and checked in blocks, the others then dropped.
+
+        Raises
+        ------
+        StoreError
+            When the errors are damaged.
+        """
+        if fields is not None:
+            return self._in_blocks(self.errors, rows, tables.ERROR, fields)
+        table = self._errors(rows)
+        self._check_errors(rows, table)
+        return table
+
+    def results(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
+        """Results of every joint, (n,) table RESULT, or of a slice of file slots.
+
+        A joint whose row is damaged is PENDING. Results of pending joints are NaN (integers 0), as are columns that
+        the campaign does not keep. With `fields` the table has these only, as in `errors`.
+
+        Raises
+        ------
+        StoreError
+            When a status is unknown to this version.
+        """
+        if fields is not None:
+            return self._in_blocks(self.results, rows, tables.RESULT, fields)
+        table = self._results(rows)
+        broken = (table["status"] == Status.PENDING) | ~self._intact(rows, table)
+        for field in tables.RESULT_FIELDS:
+            table[field.name][broken] = np.nan if np.dtype(field.dtype).kind == "f" else 0
+        self._check_status(table["status"])
+        return table
+
+    def attempt(self, rows: slice = slice(None)) -> NDArray[np.int32]:
+        """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``."""
+        return np.asarray(self.column("ledger", "attempt", rows))
+
+    def column(self, group: str, name: str, rows: Any) -> NDArray[Any]:
+        """Read a dataset at an index or slice of its rows.
+
+        Raises
+        ------
+        StoreError
+            When it cannot be read.
+        """
+        try:
+            return np.asarray(self._file[group][name][rows])
+        except checks.DAMAGE_ERRORS as error:
+            if not self._file:
+                raise
+            raise store_error(self.path, f"is damaged: {group}/{name} cannot be read", RUN_AGAIN) from error
+
+    def _status(self, rows: slice) -> NDArray[np.uint8]:
+        found = np.asarray(self.column("results", "status", rows))
+        self._check_status(found)
+        return found
+
+    def _status_if_intact(self, rows: slice) -> NDArray[np.uint8]:
+        found = self._status(rows)
+        # any(): PENDING is 0; copy(): a view would keep the whole table of the block in memory
+        return self.results(rows)["status"].copy() if found.any() else found
+
+    def _check_status(self, found: NDArray[np.uint8]) -> None:
+        if found.size and found.max() > max(Status):
+            raise store_error(self.path, f"is damaged: a joint has the unknown status {found.max()}", RUN_AGAIN)
+
+    def _described(self, group: str, rows: slice) -> NDArray[np.void]:
+        return self._read(group, *descriptions(self._file)[group], rows)
+
+    def _errors(self, rows: slice) -> NDArray[np.void]:
+        return self._read("errors", ERROR_COLUMNS, tables.ERROR, rows)
+
+    def _results(self, rows: slice) -> NDArray[np.void]:
+        table = self._read("results", self.columns, tables.RESULT, rows)
+        selected_results.blank_others(table, self.columns)
+        return table
+
+    def _intact(self, rows: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:
+        """Whether rows match their checksums, (m,); checksums are read after the values, the order of writing."""
+        attempt, errors, held = (self.column("ledger", c.name, rows) for c in LEDGER_COLUMNS)
+        return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
+
+    def _check_errors(self, rows: slice, errors: NDArray[np.void]) -> None:
+        first = self.row(rows.indices(self.n)[0])
+        described = [(c, self._read(name, c, dtype, rows)) for name, (c, dtype) in descriptions(self._file).items()]
+        right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", rows)
+        if not right.all():
+            found = f"is damaged: the errors of row {first + int(np.argmin(right))} do not match their checksum"
+            raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
+
+    def _in_blocks(
+        self, read: Callable[[slice], NDArray[np.void]], rows: slice, dtype: np.dtype[np.void], fields: Sequence[str]
+    ) -> NDArray[np.void]:
+        """Selected fields of a table; all fields are read and checked, `BLOCK` rows at a time."""
+        first, last, _ = rows.indices(self.n)
+        table = np.empty(max(0, last - first), [(name, dtype[name]) for name in fields])
+        for begin in range(first, last, BLOCK) if fields else ():
+            block = read(slice(begin, min(begin + BLOCK, last)))
+            for name in fields:
+                table[name][begin - first : begin - first + len(block)] = block[name]
+        return table
+
+    def _read(self, group: str, columns: tuple[Column, ...], dtype: Any, rows: slice) -> NDArray[np.void]:
+        first, last, _ = rows.indices(self.n)
+        table = np.zeros(max(0, last - first), dtype)
+        # The status is read first among the results: the values that it declares valid were written before it.
+        for c in columns:
+            c.of(table)[:] = self.column(group, c.name, slice(first, last))
+        return table

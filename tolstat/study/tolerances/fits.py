@@ -1,0 +1,238 @@
+"""``fit`` of ``[tolerances]``: the diameters of all pins and holes by one fit of ISO 286, such as H7/f7.
+
+The nominal diameters are the middles of the two tolerance zones, so that half of a zone is the tolerance on both sides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+
+from tolstat.common import strict
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.strict import Strict
+from tolstat.common.tables import HOLES, PINS
+from tolstat.study import selection
+from tolstat.study.selection import Entry
+from tolstat.study.tolerances import iso286, kinds
+from tolstat.study.tolerances.distributions import Distribution, Normal
+from tolstat.study.tolerances.entry import PositiveLength, PositiveNumber, Site
+
+KEY = "fit"
+PATH = ("tolerances", KEY)
+"""Key of ``[tolerances]``, and its path."""
+HOLE, PIN = "hole*.diameter", "pin*.diameter"
+"""Errors that a fit gives tolerances to."""
+PAIRS = len(PINS)
+EXAMPLE = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
+_KEYS_OF = {"cpk": "normal", "truncate": "normal", "a": "beta", "b": "beta"}
+"""Keys of one distribution, which others do not have."""
+NEGLIGIBLE = 1e-12
+"""Probability of a misfit that is not told."""
+_POINTS = 4000
+"""Number of midpoints in probability of each diameter."""
+
+
+def _check_size(basic: float) -> float:
+    if not 0.0 < 1e3 * basic <= iso286.LARGEST:
+        raise strict.refuse("{input} is outside the tables of ISO 286", f"give at most {iso286.LARGEST:g} mm")
+    return basic
+
+
+def _check_code(code: str) -> str:
+    try:
+        iso286.parse(code)
+    except ValueError as error:
+        remedy = 'write for example "H7/f7", or give tolerances of hole*.diameter and pin*.diameter in place of fit'
+        raise strict.refuse(str(error), remedy) from error
+    return code
+
+
+class FitEntry(Strict):
+    """``fit`` of ``[tolerances]``: basic size and classes of a fit, and how diameters scatter in their zones."""
+
+    basic: Annotated[
+        PositiveLength, AfterValidator(_check_size), Field(description="basic size of the fit", examples=["76 mm"])
+    ]
+    code: Annotated[
+        str, AfterValidator(_check_code), Field(description="class of hole and pin by ISO 286", examples=["H7/f7"])
+    ]
+    distribution: Annotated[
+        Literal["normal", "uniform", "triangular", "beta"],
+        Field(description="distribution of the diameters, centred in their zones", examples=["normal"]),
+    ]
+    cpk: Annotated[
+        PositiveNumber | None, Field(description="Cpk of both diameters, for normal; 1 unless given", examples=[1.33])
+    ] = None
+    truncate: Annotated[
+        bool | None,
+        Field(strict=True, description="whether parts outside the zone are sorted out, for normal", examples=[True]),
+    ] = None
+    a: Annotated[PositiveNumber | None, Field(description="shape, for beta", examples=[2.0])] = None
+    b: Annotated[PositiveNumber | None, Field(description="shape, for beta", examples=[4.0])] = None
+
+    @field_validator(*_KEYS_OF)
+    @classmethod
+    def _has_effect(cls, value: object, info: ValidationInfo) -> object:
+        kind = info.data.get("distribution")
+        if value is not None and kind is not None and kind != _KEYS_OF[str(info.field_name)]:
+            raise strict.refuse(f'has no effect with distribution = "{kind}"', "remove it")
+        return value
+
+    @property
+    def zones(self) -> iso286.Zones:
+        """Tolerance zones of hole and pin, um."""
+        return iso286.zones(iso286.parse(self.code), round(1e3 * self.basic, 9))
+
+    def scatter(self, zone: iso286.Zone) -> dict[str, Any]:
+        """Return the entry of a diameter: half of its zone on both sides of the nominal diameter."""
+        return {"plus_minus": _written(zone.half)} | self.model_dump(exclude={"basic", "code"}, exclude_none=True)
+
+
+class Fit(NamedTuple):
+    """A fit that goes together.
+
+    Attributes
+    ----------
+    entry : FitEntry
+        As written.
+    misfit : float
+        Probability that a pin is larger than its hole; above zero for a distribution that reaches beyond its zone.
+    """
+
+    entry: FitEntry
+    misfit: float
+
+    @property
+    def diameters(self) -> dict[str, str]:
+        """Nominal diameters, as keys of ``joint.contact``."""
+        middles = (zone.middle for zone in self.entry.zones)
+        return {
+            key: _written(1e6 * self.entry.basic + middle) for key, middle in zip(("D_H", "D_P"), middles, strict=True)
+        }
+
+    @property
+    def meaning(self) -> list[str]:
+        """Lines of text: zones of the fit, and the share of joints that do not go together if there are any."""
+        zones = self.entry.zones
+        hole, pin = (f"{_signed(zone.lower)} to {_signed(zone.upper)} um" for zone in zones)
+        found = f"fit {self.entry.code} at {1e3 * self.entry.basic:g} mm: hole {hole}, pin {pin}"
+        lines = [f"{found}, clearance {zones.least:g} to {zones.largest:g} um"]
+        if self.misfit > NEGLIGIBLE:
+            lines.append(f"fit: {_percent(self.misfit_joints)} of the joints do not go together")
+        return lines
+
+    @property
+    def misfit_joints(self) -> float:
+        """Share of joints of which at least one pair does not go together, if the diameters are independent."""
+        return _any_pair(self.misfit)
+
+
+def read(table: object, place: str) -> Fit | None:
+    """Read the fit of ``[tolerances]``.
+
+    Parameters
+    ----------
+    table : object
+        ``[tolerances]`` as parsed from TOML.
+    place : str
+        File name shown in faults.
+
+    Returns
+    -------
+    Fit or None
+        None where the table has no fit.
+
+    Raises
+    ------
+    InputError
+        With the faults of the entry; for a transition or interference fit, with the share of joints that would not go
+        together.
+    """
+    if not isinstance(table, Mapping) or KEY not in table:
+        return None
+    data, where = table[KEY], f"{place}: {strict.dotted(PATH)}"
+    if not isinstance(data, Mapping):
+        raise InputError([Fault(where, f"{data!r} is not a fit", f"write {EXAMPLE}")])
+    entry = strict.validate(FitEntry, data, place, prefix=PATH)
+    zones = entry.zones
+    deviations = []
+    for feature, zone in zip((HOLES[0], PINS[0]), zones, strict=True):
+        site = Site(f"{feature}.diameter", "m", 0.0, Path())
+        deviations.append(kinds.entry(entry.scatter(zone), site, place, PATH).quantities(site)[site.name])
+    hole, pin = deviations
+    share = larger(pin, hole, 1e-6 * (zones.hole.middle - zones.shaft.middle))
+    if zones.kind != "clearance":
+        raise InputError([_refusal(entry, zones, share, f"{where}.code")])
+    return Fit(entry, share)
+
+
+def _refusal(entry: FitEntry, zones: iso286.Zones, share: float, where: str) -> Fault:
+    article = "an" if zones.kind == "interference" else "a"
+    found = (
+        f"{entry.code} is {article} {zones.kind} fit, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
+        f"{_percent(_any_pair(share))} of the joints do not go together ({_percent(share)} of the pairs)"
+    )
+    return Fault(where, found, "give a clearance fit, such as H7/g6, H7/f7 or H8/e8")
+
+
+def _signed(value: float) -> str:
+    return f"{value:+g}" if value else "0"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
+
+
+def _any_pair(share: float) -> float:
+    return -math.expm1(PAIRS * math.log1p(-share)) if share < 1.0 else 1.0
+
+
+def entries(table: Mapping[str, Any], fit: Fit | None) -> Iterator[Entry]:
+    """Entries of ``[tolerances]``, with those of the holes' and of the pins' diameters in place of the fit.
+
+    Parameters
+    ----------
+    table : mapping
+        ``[tolerances]`` as parsed from TOML.
+    fit : Fit or None
+        The fit that `read` found in it; without one, the key is left out.
+    """
+    for key, value in table.items():
+        if key != KEY:
+            yield from selection.entries({key: value}, "tolerances")
+        elif fit is not None:
+            for pattern, zone in zip((HOLE, PIN), fit.entry.zones, strict=True):
+                yield Entry(pattern, PATH, fit.entry.scatter(zone))
+
+
+def larger(pin: Distribution, hole: Distribution, clearance: float) -> float:
+    """Probability that a pin is larger than its hole.
+
+    Parameters
+    ----------
+    pin, hole : Distribution
+        Independent deviations of the two diameters (m).
+    clearance : float
+        Difference of the nominal diameters, hole less pin (m).
+
+    Returns
+    -------
+    float
+        In closed form for two normal distributions, otherwise from equally probable values of each.
+    """
+    if isinstance(pin, Normal) and isinstance(hole, Normal):
+        mean = clearance + hole.mean - pin.mean
+        return 0.5 * math.erfc(mean / (math.sqrt(2.0) * math.hypot(hole.sigma, pin.sigma)))
+    u = (np.arange(_POINTS) + 0.5) / _POINTS
+    return float(np.mean(np.searchsorted(np.sort(hole.ppf(u)), pin.ppf(u) - clearance)) / _POINTS)
+
+
+def _written(value: float) -> str:
+    """Length in um as a quantity in mm."""
+    return f"{round(1e-3 * value, 9):.12g} mm"

@@ -1,0 +1,136 @@
+"""Tolerance zones of ISO 286: limit deviations of a hole or shaft from its basic size, from the published tables."""
+
+from __future__ import annotations
+
+import csv
+import re
+from functools import cache
+from typing import Any, NamedTuple
+
+from tolstat.common.files import data_dir
+
+GRADES, DEVIATIONS = "iso286_grades.csv", "iso286_deviations.csv"
+"""Files of the data folder."""
+CLEARANCE, TRANSITION = ("c", "d", "e", "f", "g", "h"), ("js", "k", "m", "n", "p", "r", "s")
+"""Letters of shafts that lie at or below the basic size, and of shafts that reach above it."""
+HOLES = (*(letter.upper() for letter in CLEARANCE), "JS")
+"""Letters of holes: those whose deviations are the shaft's with the opposite sign at every size and grade."""
+GRADE_NAMES = ("01", *map(str, range(19)))
+LARGEST = 500.0
+"""Largest basic size of the tables, mm."""
+_K_GRADES = ("4", "5", "6", "7")
+_CODE = re.compile(r"\s*([A-Z]+)\s*(\d+)\s*/\s*([a-z]+)\s*(\d+)\s*")
+
+
+class Zone(NamedTuple):
+    """Tolerance zone of a diameter: lower and upper limit deviation from the basic size, um."""
+
+    lower: float
+    upper: float
+
+    @property
+    def middle(self) -> float:
+        """Middle of the zone, um."""
+        return 0.5 * (self.lower + self.upper)
+
+    @property
+    def half(self) -> float:
+        """Half its width, um."""
+        return 0.5 * (self.upper - self.lower)
+
+
+class Zones(NamedTuple):
+    """Tolerance zones of a fit."""
+
+    hole: Zone
+    shaft: Zone
+
+    @property
+    def least(self) -> float:
+        """Smallest clearance within the zones (difference of the diameters), um; negative if parts can interfere."""
+        return self.hole.lower - self.shaft.upper
+
+    @property
+    def largest(self) -> float:
+        """Largest clearance within the zones, um."""
+        return self.hole.upper - self.shaft.lower
+
+    @property
+    def kind(self) -> str:
+        """``"clearance"``, ``"transition"`` or ``"interference"``."""
+        return "clearance" if self.least >= 0.0 else "transition" if self.largest > 0.0 else "interference"
+
+
+class Code(NamedTuple):
+    """Letters and grades of a hole and a shaft."""
+
+    hole: str
+    hole_grade: str
+    shaft: str
+    shaft_grade: str
+
+
+def parse(code: str) -> Code:
+    """Read the code of a fit, ``"H7/f7"``: class of the hole, then of the shaft.
+
+    Raises
+    ------
+    ValueError
+        For a code that the tables do not have; the text names what they have.
+    """
+    found = _CODE.fullmatch(code)
+    if found is None:
+        raise ValueError(f"{code!r} is not the class of a hole, a slash and the class of a shaft")
+    read = Code(*found.groups())
+    for kind, letter, letters in (("hole", read.hole, HOLES), ("shaft", read.shaft, CLEARANCE + TRANSITION)):
+        if letter not in letters:
+            raise ValueError(f"the tables have no {kind} {letter}, only {', '.join(letters)}")
+    for grade in (read.hole_grade, read.shaft_grade):
+        if grade not in GRADE_NAMES:
+            raise ValueError(f"there is no grade IT{grade}, only IT01, IT0, IT1 to IT18")
+    return read
+
+
+def zones(code: Code, size: float) -> Zones:
+    """Tolerance zones of a fit.
+
+    Parameters
+    ----------
+    code : Code
+        As `parse` reads it.
+    size : float
+        Basic size, mm: above 0, at most `LARGEST`.
+
+    Returns
+    -------
+    Zones
+        Limit deviations, um.
+    """
+    mirrored = _shaft(code.hole.lower(), code.hole_grade, size)
+    return Zones(Zone(0.0 - mirrored.upper, 0.0 - mirrored.lower), _shaft(code.shaft, code.shaft_grade, size))
+
+
+def _shaft(letter: str, grade: str, size: float) -> Zone:
+    """Zone of a shaft."""
+    width = _row(GRADES, size)[f"IT{grade}"]
+    if letter == "js":
+        return Zone(-0.5 * width, 0.5 * width)
+    deviation = _row(DEVIATIONS, size)[letter]
+    if letter in CLEARANCE:
+        return Zone(deviation - width, deviation)
+    if letter == "k" and grade not in _K_GRADES:
+        deviation = 0.0
+    return Zone(deviation, deviation + width)
+
+
+def _row(name: str, size: float) -> dict[str, float]:
+    """Row of a table for a basic size, mm: column to number."""
+    return next(row for row in table(name) if size <= row["up_to_mm"] * (1 + 1e-12))
+
+
+@cache
+def table(name: str) -> tuple[dict[str, float], ...]:
+    """Read a table of the data folder: rows by ascending size, numbers by column (mm, um)."""
+    with (data_dir() / name).open(encoding="utf-8", newline="") as file:
+        rows: Any = csv.DictReader(line for line in file if not line.startswith("#"))
+        return tuple({column: float(text) for column, text in row.items()} for row in rows)

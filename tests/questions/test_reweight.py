@@ -199,7 +199,7 @@ def test_command_prints_a_table_and_json(tmp_path):
 
 def test_a_campaign_without_a_valid_load_is_refused(tmp_path):
     path = campaign(tmp_path)
-    with ResultStore.open(path, "r+") as store:
+    with ResultStore.open_to_write(path) as store:
         results = store.results()
         results["status"] = Status.NEWTON_FAILED
         store.write(np.arange(store.n), Simulation(results, {}))

@@ -120,6 +120,11 @@ def empty(ax: Axes, text: str) -> None:
     ax.set(xticks=[], yticks=[])
 
 
+def rows_left(labels: Sequence[str]) -> float:
+    """Room for the labels of a panel of horizontal rows, inches."""
+    return max(1.2, 0.064 * max(map(len, labels), default=0) + 0.12)
+
+
 def rows_height(count: int) -> float:
     """Height of a panel of horizontal rows, inches."""
     return 0.235 * count + BOTTOM + TOP + 0.1

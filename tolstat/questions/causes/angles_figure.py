@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 LINES = 4
 """Number of errors whose share is drawn."""
+LONG = 16
+"""Names with more letters do not fit side by side."""
 ORIGIN = {
     "stored": "from the histories in the file",
     "harmonics": "restored from the harmonics in the file",
@@ -105,5 +107,6 @@ def shares(ax: Axes, angle: AgainstAngle) -> None:
             ax.fill_between(theta, low, high, color=style.COLOURS[i], alpha=0.15, lw=0)
         ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
         ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(high), high, share), initial=0.0)))
-    ax.set(ylim=(0.0, 1.3 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
-    ax.legend(loc="upper right", ncols=2, columnspacing=1.2, handlelength=2.6)
+    long = any(len(name) > LONG for name in angle.names[:LINES])
+    ax.set(ylim=(0.0, (1.6 if long else 1.3) * max(ceiling, 1.0)), ylabel="share of the variance [%]")
+    ax.legend(loc="upper right", ncols=1 if long else 2, columnspacing=1.2, handlelength=2.6)

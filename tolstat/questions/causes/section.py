@@ -116,7 +116,7 @@ def _tornado_panel(causes: Causes, quantity: str) -> Panel:
         f"Largest first-order indices: {top}; all errors alone {100 * causes.additive:.0f} %",
         partial(_tornado, causes=causes, quantity=quantity),
         (4.9, drawing.rows_height(len(part)) + 0.25),
-        1.2,
+        drawing.rows_left(list(part["error"])),
     )
 
 

@@ -87,7 +87,7 @@ def _errors_panel(table: pd.DataFrame) -> Panel:
         f"Probability that a joint without a valid result has the larger error than a settled one. {said}",
         partial(_errors, table=table),
         (4.9, drawing.rows_height(len(top)) + 0.2),
-        1.2,
+        drawing.rows_left(list(top["error"])),
     )
 
 

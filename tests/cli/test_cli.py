@@ -303,7 +303,7 @@ def test_what_a_command_tells(tmp_path):
     assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (0, "", "")
     lines = log.read_text(encoding="utf-8").splitlines()
     assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ (INFO|DEBUG) ", line) for line in lines)
-    assert lines[-1].endswith(f" INFO wrote {tmp_path / 'a.csv'}: 61 joints")
+    assert lines[-1].endswith(f" INFO wrote {tmp_path / 'a.csv'}: 60 joints")
     assert re.search(r" DEBUG reading the file: \d+\.\d\d s$", lines[-2])
     loud = call("export", path, "--csv", tmp_path / "a.csv", "--verbose", "--log", log)
     assert re.search(r"^reading the file: \d+\.\d\d s$", loud.stderr, flags=re.MULTILINE)
@@ -332,7 +332,7 @@ def test_an_option_means_the_same_in_all_commands():
         assert len(meaning[name]) == 1, (name, meaning[name])
     assert meaning["--by"] == {"LOAD"}
     assert meaning["--json"] == {""}
-    assert meaning["--out"] <= {"CSV", "FILE", "DIR", "STUDY", "OUT", "DIR|PAGE.html", ""}
+    assert meaning["--out"] <= {"CSV", "FILE", "DIR", "STUDY", "OUT", "PICTURE", "JSON", "DIR|PAGE.html", ""}
 
 
 def test_completion_knows_the_commands_and_loads_nothing_heavy():

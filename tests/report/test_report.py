@@ -243,7 +243,7 @@ def test_same_file_same_bytes(tmp_path):
 
 def test_folder_that_cannot_be_made_and_file_that_is_not_ours(tmp_path):
     path = synthetic.store(tmp_path)
-    assert report.write(path, tmp_path / "new")[0].parent == tmp_path / "new"
+    assert report.write_report(path, tmp_path / "new")[0].parent == tmp_path / "new"
     with pytest.raises(InputError, match="another folder"):
         report.build(path, path / "nowhere")
     (tmp_path / "other.h5").write_text("not HDF5")

@@ -29,7 +29,7 @@ from tolstat.study.tolerances import distributions
 HEAD = """
 [joint]
 base = "own.toml"
-bushing.stiffness = "beam"
+material.E = "210 GPa"
 
 [operation]
 alpha = "15 deg"

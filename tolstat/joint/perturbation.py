@@ -112,9 +112,8 @@ def perturb(joint: Joint, errors: Table) -> Table:
 
 def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that do not depend on the errors, at factor 1 on E."""
-    pin_mass, pin_inertia = joint.pin.body(joint.material.rho)
-    arm_mass, arm_inertia = joint.arm.body(joint.material.rho)
-    stations = joint.contact.springs(joint.material)
+    pin, arm = joint.pin, joint.arm
+    stations = joint.contact.springs()
     n_stations = len(stations.s)
     padding = (0, MAX_STATIONS - n_stations)
     xi = joint.bushing.xi
@@ -125,15 +124,15 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "l_f": joint.arm.l_f,
         "hub_mass": joint.hub.mass,
         "hub_inertia": joint.hub.inertia,
-        "pin_mass": pin_mass,
-        "pin_inertia": pin_inertia,
-        "arm_mass": arm_mass,
-        "arm_inertia": arm_inertia,
+        "pin_mass": pin.mass,
+        "pin_inertia": pin.inertia,
+        "arm_mass": arm.mass,
+        "arm_inertia": arm.inertia,
         "k_cross": joint.k_cross,
-        "c_cross": material.bushing_damping(joint.k_cross, pin_mass, pin_inertia, xi),
+        "c_cross": material.bushing_damping(joint.k_cross, pin.mass, np.array(pin.inertia), xi),
         "k_fork": joint.k_fork,
-        "c_fork": material.bushing_damping(joint.k_fork, arm_mass, arm_inertia, xi),
-        "c_d": joint.contact.normal_damping(joint.pin, joint.material),
+        "c_fork": material.bushing_damping(joint.k_fork, arm.mass, np.array(arm.inertia), xi),
+        "c_d": joint.contact.c_d,
         "c_t": joint.contact.c_t,
         "delta_d": joint.contact.delta_d,
         "n_stations": n_stations,

@@ -12,7 +12,7 @@ from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import merged, overridden
+from tolstat.joint.overrides import laid_over
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
 from tolstat.study.listed import CaseEntry, Range, VariantEntry
@@ -199,12 +199,12 @@ class _Variants:
         return [cases.index(name) for name in names]
 
     def _expanded(self, entry: VariantEntry, run: list[int], at: Section) -> list[Listed]:
-        keys = overridden(self._study, entry.joint)
+        keys = laid_over(self._study, entry.joint)
         made = [self._joint(keys, (*at, "joint"))]
         ranges = dict(_ranges(entry.vary, (*at, "vary"), self._place))
         if ranges:
             members = self._members(entry, keys, ranges, (*at, "vary"))
-            made = [self._joint(merged(keys, own), (*at, "vary")) for own in members]
+            made = [self._joint(laid_over(keys, own), (*at, "vary")) for own in members]
         operation, solver = self._settings(entry, at)
         own = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
         own |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
@@ -237,7 +237,7 @@ class _Variants:
         """Keys of each joint of a family, as a joint file writes them."""
         assert entry.points is not None
         ends = [{key: getattr(r, end) for key, r in ranges.items()} for end in ("start", "stop")]
-        start, stop = (self._joint(merged(keys, nested(end)), at) for end in ends)
+        start, stop = (self._joint(laid_over(keys, nested(end)), at) for end in ends)
         low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
         faults = []
         for key in ranges:
@@ -262,9 +262,9 @@ class _Variants:
         return joint.load(keys["base"], overrides, self._place, self._folder, strict.dotted(at))
 
     def _values(self, made: Joint, written: list[str]) -> dict[str, Any]:
-        nominal = dict(flat(self._nominal.joint.model_dump(exclude={"description"})))
-        values = dict(flat(made.model_dump(exclude={"description"})))
-        return {key: value for key, value in values.items() if key in written or nominal.get(key) != value}
+        nominal, values = (dict(flat(joint.given())) for joint in (self._nominal.joint, made))
+        keys = [key for key in nominal | values if key != "description"]
+        return {key: values.get(key) for key in keys if key in written or nominal.get(key) != values.get(key)}
 
 
 def _tables(section: Any, name: str, place: str) -> list[Any]:

@@ -157,7 +157,7 @@ class Study(Case):
         same rows with the same results.
         """
         parts = {
-            "joint": self.joint.model_dump(mode="json", exclude={"description"}),
+            "joint": {k: v for k, v in self.joint.given("json").items() if k != "description"},
             "operation": self.operation.model_dump(),
             "solver": self.solver.model_dump(),
             "errors": self.errors,

@@ -8,6 +8,7 @@ used; 128 + N stopped by signal N (130 after Ctrl-C). Modules that load slowly a
 from __future__ import annotations
 
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -102,11 +103,18 @@ def say(text: str) -> None:
 
 
 def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
-    """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`."""
+    """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`.
+
+    Of several joints with a warning about the same key the first is printed, and how many others there are.
+    """
     places = [f"variant {variant.family!r}: joint" for variant in variants] or ["joint"]
-    faults = (f"{place}.{fault}" for place, joint in zip(places, joints, strict=True) for fault in joint.warnings())
-    for fault in dict.fromkeys(faults):
-        say(f"warning: {path}: {fault}")
+    found: dict[str, list[Fault]] = {}
+    for place, joint in zip(places, joints, strict=True):
+        for fault in joint.warnings():
+            found.setdefault(fault.place, []).append(replace(fault, place=f"{place}.{fault.place}"))
+    for first, *others in found.values():
+        more = f" (and {len(others)} more joints)" if others else ""
+        say(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
 def tell(report: Report) -> None:

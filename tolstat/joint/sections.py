@@ -6,11 +6,11 @@ out: `Joint` fills it in by the formula of `derived.DERIVED`.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BaseModel, Field
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
@@ -59,6 +59,22 @@ PIN_CHI, ARM_CHI = 1.11, 1.2
 def follows(key: str, meaning: str) -> Any:
     """Field of a key of `DERIVED`: its meaning, and the formula that it follows by."""
     return Field(description=f"{meaning}; when left out: {DERIVED[key].formula}")
+
+
+def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
+    """SI unit of each quantity of a model, by dotted key; lists of quantities are left out."""
+    found: dict[str, str] = {}
+    for key, field in model.model_fields.items():
+        kinds = [field.annotation, *field.metadata]
+        while kinds:
+            kind = kinds.pop()
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                found |= quantities(kind, f"{before}{key}.")
+            elif isinstance(kind, units.Quantity):
+                found[f"{before}{key}"] = kind.unit
+            elif get_origin(kind) is not tuple:
+                kinds += [*get_args(kind), *getattr(kind, "__metadata__", ())]
+    return found
 
 
 class Material(Strict):

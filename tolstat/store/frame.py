@@ -11,6 +11,7 @@ from tolstat.common import draw_records
 from tolstat.common.columns import ERROR_COLUMNS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import Status
+from tolstat.store import recorded
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,6 +28,8 @@ def to_pandas(store: Reader, units: bool = False) -> pd.DataFrame:
 
     errors, results = store.errors(), store.results()
     data: dict[tuple[str, str], NDArray[Any]] = _design(store) if store.case_names else {}
+    if store.variants and not store.case_names:
+        data |= recorded.swept(store)
     drawn = draw_records.columns(store.sampling)
     if drawn:
         origin = store.origin()

@@ -17,12 +17,17 @@ from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean, dotted
 from tolstat.common.tables import ERROR_FIELDS, HOLES, PINS
 from tolstat.common.units import to_si
+from tolstat.joint import HOLE_OF_PIN
 
 UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 """SI unit of every error, in the order of the table."""
 
 RADIAL_UNITS = {f"{feature}.offset_radial": "m" for feature in PINS + HOLES}
 """SI unit of each radial offset, which stands for two columns of the table, offset_t and offset_z, drawn together."""
+
+_DIAMETERS = {f"{pin}.clearance": (f"{pin}.diameter", f"{hole}.diameter") for pin, hole in HOLE_OF_PIN.items()}
+EXCLUDES = _DIAMETERS | {of: (name,) for name, diameters in _DIAMETERS.items() for of in diameters}
+"""Errors that say in another way what an error says: the clearance of a pin, and the diameters of pin and hole."""
 
 
 class Entry(NamedTuple):
@@ -196,17 +201,18 @@ class Assignments:
         Raises
         ------
         InputError
-            When an earlier entry sets one of them.
+            When an earlier entry sets one of them, or the clearance of a pin is set beside one of its two diameters.
         """
         claimed = [column for name in names for column in columns_of(name)]
         clashes = {self._owner[c].path: c for c in claimed if c in self._owner}
         self._owner.update((c, entry) for c in claimed if c not in self._owner)
-        if clashes:
+        both = {self._owner[o].path: (c, o) for c in claimed for o in EXCLUDES.get(c, ()) if o in self._owner}
+        if clashes or both:
             where = f"{self._place}: {dotted(entry.path)}"
             remedy = "remove one of the two, or narrow the pattern"
-            raise InputError(
-                [Fault(where, f"{column} is set by {dotted(path)} already", remedy) for path, column in clashes.items()]
-            )
+            found = [f"{column} is set by {dotted(path)} already" for path, column in clashes.items()]
+            found += [f"{c} is given beside {other} of {dotted(path)}" for path, (c, other) in both.items()]
+            raise InputError([Fault(where, text, remedy) for text in found])
 
 
 def columns_of(name: str) -> tuple[str, ...]:

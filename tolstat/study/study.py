@@ -15,12 +15,14 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
+from tolstat.study import listing
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.proposal import Proposal
+from tolstat.study.swept import Swept
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 
@@ -76,6 +78,8 @@ class Study(Case):
         How many, and how they are drawn.
     sweep : tuple of SweepAxis
         Axes of a grid, the last varying fastest; empty unless ``sampling.method`` is ``sweep``.
+    swept : Swept, optional
+        The joints of a sweep of dimensions; None for other sweeps and methods.
     listed : Design, optional
         The joints listed one by one; None unless ``sampling.method`` is ``cases``.
     limits : dict
@@ -94,6 +98,7 @@ class Study(Case):
     copula: Copula = field(default_factory=Copula)
     proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
+    swept: Swept | None = None
     listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
@@ -102,17 +107,19 @@ class Study(Case):
     @property
     def joints(self) -> tuple[Joint, ...]:
         """Nominal joint of each variant."""
-        return self.listed.joints if self.listed else (self.joint,)
+        of = self.listed or self.swept
+        return of.joints if of else (self.joint,)
 
     @property
     def solvers(self) -> tuple[Solver, ...]:
         """Numerical settings of each of `joints`."""
-        return self.listed.solvers if self.listed else (self.solver,)
+        return self.listed.solvers if self.listed else (self.solver,) * len(self.joints)
 
     @property
     def variants(self) -> tuple[Variant, ...]:
-        """Variant of each of `joints`; empty where joints are not listed."""
-        return self.listed.variants if self.listed else ()
+        """Variant of each of `joints`; empty where all rows have the study's joint."""
+        of = self.listed or self.swept
+        return of.variants if of else ()
 
     @property
     def case_names(self) -> tuple[str, ...]:
@@ -121,8 +128,9 @@ class Study(Case):
 
     @property
     def design(self) -> NDArray[np.void]:
-        """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where joints are not listed."""
-        return self.listed.table if self.listed else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
+        """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where all rows have the study's joint."""
+        of = self.listed or self.swept
+        return of.table if of else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
     @property
     def samples(self) -> int:
@@ -156,7 +164,7 @@ class Study(Case):
         Limits, comments and the file's name do not belong to it. Two studies of equal identity have the
         same rows with the same results.
         """
-        parts = {
+        parts: dict[str, Any] = {
             "joint": {k: v for k, v in self.joint.given("json").items() if k != "description"},
             "operation": self.operation.model_dump(),
             "solver": self.solver.model_dump(),
@@ -171,6 +179,8 @@ class Study(Case):
             parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
         if self.groups:
             parts["groups"] = [[group.label, list(group.names)] for group in self.groups]
+        if self.swept:
+            parts["swept"] = [variant.values for variant in self.swept.variants]
         return dict(flat(parts | (self.listed.identity() if self.listed else {})))
 
 
@@ -249,6 +259,9 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         moved = groups(file.data.get("tolerances", {}), tolerances, copula, sampling.groups)
     if sampling is not None and sampling.method == "cases":
         listed = file.listed(joint, operation, solver)
+    joints_swept = None
+    if sampling is not None and sampling.method == "sweep" and joint and operation and solver:
+        joints_swept = file.swept(listing.Nominal(joint, operation, solver), sweep, sampling.nominal_first)
     if sampling is not None:
         file.check_method(sampling, sweep)
     if output is not None:
@@ -275,6 +288,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         copula=copula,
         proposals=proposals,
         sweep=sweep,
+        swept=joints_swept,
         listed=listed,
         limits=limits,
         fatigue=fatigue,

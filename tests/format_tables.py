@@ -1,7 +1,7 @@
-"""The tables of docs/result_format.md and docs/model.md, and the page of the present schema in docs/schemas/.
+"""The tables of docs/result_format.md, docs/model.md and docs/study.md, and the page of the present schema.
 
-They are made from `tolstat.common.tables` and `tolstat.joint.contact`. ``python -m tests.format_tables`` brings the
-documents up to date; a test compares.
+They are made from `tolstat.common.tables`, `tolstat.joint.contact` and the input models (`study_reference`).
+``python -m tests.format_tables`` brings the documents up to date; a test compares.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from tests import study_reference
 from tolstat.common import draw_records, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
 from tolstat.joint.contact import LAWS
 
 DOCS = Path(__file__).parent.parent / "docs"
-FORMAT, MODEL = DOCS / "result_format.md", DOCS / "model.md"
+FORMAT, MODEL, STUDY = DOCS / "result_format.md", DOCS / "model.md", DOCS / "study.md"
 SCHEMA = DOCS / "schemas" / f"schema{tables.SCHEMA_VERSION}.md"
 PAGE = """# Columns of a result file of schema {version}
 
@@ -80,6 +81,7 @@ def documents() -> dict[Path, str]:
     return {
         FORMAT: updated(FORMAT.read_text(encoding="utf-8"), content),
         MODEL: updated(MODEL.read_text(encoding="utf-8"), {"laws": law_table()}),
+        STUDY: updated(STUDY.read_text(encoding="utf-8"), study_reference.tables()),
         SCHEMA: PAGE.format(version=tables.SCHEMA_VERSION, **page),
     }
 

@@ -99,11 +99,14 @@ def test_a_note_says_that_it_is_a_record(path: Path) -> None:
     assert path.read_text(encoding="utf-8").startswith("Record of ")
 
 
-def test_blocks_of_the_study_make_a_study(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("page", "added"), [("tolerances.md", "joint"), ("study.md", "sampling")])
+def test_blocks_of_the_study_make_a_study(tmp_path: Path, page: str, added: str) -> None:
     study = tmp_path / "study.toml"
-    joint = '[joint]\nbase = "cirelli2021"\n\n[operation]\nalpha = "15 deg"\nspeed = "500 rpm"\ntorque = "100 N*m"\n'
-    study.write_text("\n".join([joint, *blocks(DOCS / "tolerances.md", "toml")]), encoding="utf-8")
-    assert tolstat.load(study).limits["cross1.F"] == 1500.0
+    sections = {"joint": 'base = "cirelli2021"', "sampling": "n = 8"}
+    operation = '[operation]\nalpha = "15 deg"\nspeed = "500 rpm"\ntorque = "100 N*m"\n'
+    text = [operation, *blocks(DOCS / page, "toml"), f"[{added}]\n{sections[added]}"]
+    study.write_text("\n".join(text), encoding="utf-8")
+    assert tolstat.load(study).sampling.n in (8, 1024)
 
 
 @pytest.fixture(scope="module")

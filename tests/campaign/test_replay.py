@@ -128,7 +128,7 @@ def test_command(file: Path, tmp_path: Path) -> None:
     assert summary["equal"]
     trace = pd.read_csv(tmp_path / "trace.csv")
     load = np.sqrt((trace[["fork1.F_e", "fork1.F_t", "fork1.F_z"]] ** 2).sum(axis=1)).max()
-    assert load == pytest.approx(summary["max"]["fork1"]["F"], rel=1e-6)
+    assert load == pytest.approx(summary["max"]["fork1.F"]["joint"], rel=1e-6)
     path = tmp_path / "changed.h5"
     shutil.copy(file, path)
     with h5py.File(path, "r+") as changed:

@@ -327,8 +327,9 @@ def test_dead_worker_is_no_fault_of_the_input(study, monkeypatch):
 
 def simulated(status, load):
     """Make a stand-in for a simulated case."""
-    loads = {name: {"F": load, "T": load} for name in BUSHINGS}
-    facts = {"status": status, "settled": status == "ok", "closure": load, "max": loads}
+    change = None if load is None else 0.5
+    loads = {name: {"unit": "N", "joint": load, "without_errors": 1.0, "change": change} for name in BUSHINGS}
+    facts = {"status": status, "status_without_errors": "ok", "closure": load, "max": loads}
     trace = pd.DataFrame({"theta": [0.0, 180.0], "tau": [1.0, 0.1 + 0.2]})
     return SimpleNamespace(summary=lambda: facts, to_pandas=lambda: trace, remedy=lambda: "try more")
 
@@ -349,14 +350,14 @@ def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monke
     assert (tmp_path / "trace.csv").read_text() == "theta,tau\n0.0,1.0\n180.0,0.30000000000000004\n"
     lines = call("simulate", case).stdout.splitlines()
     assert lines[0] == "status: ok"
-    assert lines[-1].split() == ["fork4", "1.5", "1.5"]
+    assert lines[-1].split() == ["fork4", "N", "1.5", "1", "+50.0", "%"]
 
 
 def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch):
     monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("newton_failed", None))
     done = call("simulate", case)
     assert done.exit_code == 0
-    assert done.stdout.splitlines()[-1].split() == ["fork4", "-", "-"]
+    assert done.stdout.splitlines()[-1].split() == ["fork4", "N", "-", "1", "-"]
     assert "warning: newton_failed: a step failed" in done.stderr
     assert "hint: try more" in done.stderr
 

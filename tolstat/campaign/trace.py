@@ -1,4 +1,4 @@
-"""Simulate one joint with full histories, for ``tolstat simulate``."""
+"""Simulate one joint, beside the joint without errors, with full histories, for ``tolstat simulate``."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign.remedy import remedy
+from tolstat.common import loads
 from tolstat.common.tables import BUSHINGS, CONTACTS, PINS, Motion, Options, Simulation, Status
 from tolstat.solver.simulation import simulate_rows, warm_up
 
@@ -27,30 +28,32 @@ class CaseResult(NamedTuple):
     Attributes
     ----------
     simulation : Simulation
-        One row, with full histories.
+        The joint: one row, with full histories.
     alpha : float
         Misalignment, rad.
     wall_s : float
-        Time that the simulation took, without compilation, s.
+        Time that both simulations took together, without compilation, s.
     options : Options
         Solver options of the simulation.
+    nominal : ndarray, (1,), dtype RESULT, optional
+        Results of the joint without errors.
     """
 
     simulation: Simulation
     alpha: float
     wall_s: float
     options: Options
+    nominal: NDArray[np.void] | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return key results as plain Python values; None for those that a failed joint does not have.
 
-        ``max`` holds the largest moduli of each bushing's force (N) and torque (N m) over the last revolution.
+        ``max`` holds the largest value of each load that can have a limit, by name: its ``unit`` and the value in this
+        joint (``joint``); where the joint without errors was simulated, too, also the value there
+        (``without_errors``) and the relative difference (``change``).
         """
         row = self.simulation.results[0]
-        largest = {
-            name: {"F": _number(row["F_max"][i]), "T": _number(row["T_max"][i])} for i, name in enumerate(BUSHINGS)
-        }
-        return {
+        facts = {
             "status": Status(row["status"]).label,
             "settled": bool(row["settled"]),
             "closure": _number(row["closure"]),
@@ -62,8 +65,19 @@ class CaseResult(NamedTuple):
             "newton_iterations": int(row["newton_iterations"]),
             "halvings": int(row["halvings"]),
             "wall_s": self.wall_s,
-            "max": largest,
         }
+        if self.nominal is not None:
+            facts["status_without_errors"] = Status(self.nominal[0]["status"]).label
+        return facts | {"max": {load.name: self._largest(load) for load in loads.LOADS.values()}}
+
+    def _largest(self, load: loads.Load) -> dict[str, Any]:
+        own = float(load.of(self.simulation.results)[0])
+        found = {"unit": load.unit, "joint": _number(own)}
+        if self.nominal is None:
+            return found
+        ideal = float(load.of(self.nominal)[0])
+        change = own / ideal - 1.0 if ideal else math.nan
+        return found | {"without_errors": _number(ideal), "change": _number(change)}
 
     def remedy(self) -> str:
         """Return what to do about a joint that is not ok; empty for one that is."""
@@ -100,7 +114,7 @@ class CaseResult(NamedTuple):
 
 
 def simulate_case(case: Case) -> CaseResult:
-    """Simulate the joint of a case file.
+    """Simulate the joint of a case file, and the same joint without errors.
 
     Parameters
     ----------
@@ -113,15 +127,17 @@ def simulate_case(case: Case) -> CaseResult:
     """
     from tolstat.joint import nominal_errors, perturb
 
-    errors = nominal_errors(1, case.operation)
+    errors = nominal_errors(2, case.operation)
     for name, value in case.errors.items():
-        errors[name] = value
+        errors[name][0] = value
     params = perturb(case.joint, errors)
     warm_up()
     begin = time.perf_counter()
     options = case.solver.options()
-    simulation = simulate_rows(params, options, "full")
-    return CaseResult(simulation, float(errors["operation.alpha"][0]), time.perf_counter() - begin, options)
+    both = simulate_rows(params, options, "full")
+    wall_s = time.perf_counter() - begin
+    own = Simulation(both.results[:1], {name: values[:1] for name, values in both.histories.items()})
+    return CaseResult(own, float(errors["operation.alpha"][0]), wall_s, options, both.results[1:])
 
 
 def _number(value: float) -> float | None:

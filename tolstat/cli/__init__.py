@@ -9,7 +9,7 @@ from tolstat.cli._app import app, main
 __all__ = ["COMMANDS", "app", "main"]
 
 COMMANDS = (
-    *("simulate", "plan", "run", "extend", "merge", "status", "verify", "replay", "export", "report"),
+    *("new", "schema", "simulate", "plan", "run", "extend", "merge", "status", "verify", "replay", "export", "report"),
     *questions.COMMANDS,
 )
 """Files of this package, each with a function of the same name; on the command line ``-`` stands for ``_``."""

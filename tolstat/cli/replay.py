@@ -25,8 +25,8 @@ def replay(
 ) -> None:
     """Simulate one joint again and compare with the file.
 
-    Uses the joint, errors and settings stored in FILE. Prints the largest force and torque of each bushing, and whether
-    all stored values are identical to the last bit, as they must be on the same machine with the same versions. If they
+    Uses the joint, errors and settings stored in FILE. Prints the largest value of each load, and whether all stored
+    values are identical to the last bit, as they must be on the same machine with the same versions. If they
     differ, prints the versions that differ and ends with exit code 1.
 
     Example: tolstat replay iso2768_f.h5 --row 17 --out trace.csv

@@ -21,12 +21,12 @@ def simulate(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
-    """Simulate one joint and print its largest loads.
+    """Simulate one joint, with and without its errors.
 
-    Prints status and course of the simulation, and for each bushing the largest force (N) and torque (N m) of the last
-    revolution.
+    Prints status and course of the simulation, and the largest value of each load in the last revolution beside that of
+    the joint without errors: forces and torques of the bushings, contact forces of the pins, and psi.
 
-    Example: tolstat simulate case.toml --out trace.csv
+    Example: tolstat simulate studies/tilted_pin.toml --out loads.csv
     """
     from tolstat import study
     from tolstat.campaign import trace
@@ -50,12 +50,23 @@ def case_text(summary: dict[str, Any]) -> str:
     from tolstat.display.text import align
 
     def value(load: float | None) -> str:
-        return "-" if load is None else f"{load:.6g}"
+        return "-" if load is None else f"{load:.5g}"
 
-    rows = [["bushing", "max |F| [N]", "max |T| [N m]"]]
-    rows += [[name, value(load["F"]), value(load["T"])] for name, load in summary["max"].items()]
+    beside = "status_without_errors" in summary
+    rows = [["load", "unit", "this joint", *(["without errors", "change"] if beside else [])]]
+    for name, load in summary["max"].items():
+        unit = "" if load["unit"] == "1" else load["unit"].replace("*", " ")
+        rows.append([name, unit, value(load["joint"])])
+        if beside:
+            rows[-1] += [value(load["without_errors"]), _per_cent(load["change"])]
     facts = "\n".join(f"{name}: {value}" for name, value in summary.items() if name != "max")
     return f"{facts}\n{align(rows)}"
+
+
+def _per_cent(change: float | None) -> str:
+    if change is None:
+        return "-"
+    return "0.0 %" if abs(change) < 5e-4 else f"{100 * change:+.1f} %"
 
 
 def warn_unless_ok(summary: dict[str, Any], remedy: str) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, get_args
 
 import annotated_types
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BaseModel
 from pydantic.fields import FieldInfo
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -37,6 +37,13 @@ def quantity(unit: str, example: str) -> dict[str, Any]:
     return {"type": "string", "pattern": WITH_UNIT, "x-unit": unit, "examples": [example]}
 
 
+def sign(own: Mapping[str, Any]) -> dict[str, Any]:
+    """Keyword that refuses a minus sign in the text of a quantity that must not be negative."""
+    if "string" not in str(own.get("type", own)) or 0 not in (own.get("minimum"), own.get("exclusiveMinimum")):
+        return {}
+    return {"not": {"type": "string", "pattern": r"^\s*-"}}
+
+
 def complete(schema: dict[str, Any], fields: Mapping[str, FieldInfo], signs: Mapping[Callable[..., Any], str]) -> None:
     """Add to the JSON schema of a model what pydantic leaves out of it.
 
@@ -57,8 +64,8 @@ def complete(schema: dict[str, Any], fields: Mapping[str, FieldInfo], signs: Map
         _remove_null(own)
         own |= _bounds(field, signs, own)
         own |= _default(field)
-        if own.get("default", 0) is None:
-            del own["default"]
+        if own.get("default", 0) is None or isinstance(field.default, BaseModel):
+            own.pop("default", None)
 
 
 def _remove_null(own: dict[str, Any]) -> None:
@@ -90,10 +97,7 @@ def _bounds(field: FieldInfo, signs: Mapping[Callable[..., Any], str], own: Mapp
                 found["maximum"] = bound
             case AfterValidator(func=func) if func in signs:
                 found[signs[func]] = 0
-    text = "string" in str(own)
-    if text and {found.get("minimum", -1), found.get("exclusiveMinimum", -1)} & {0}:
-        found["not"] = {"type": "string", "pattern": r"^\s*-"}
-    return found
+    return found | sign({**own, **found})
 
 
 def _metadata(annotation: Any, metadata: list[Any]) -> Iterator[Any]:

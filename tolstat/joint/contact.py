@@ -205,7 +205,7 @@ class Contact(Strict):
     clearance: Annotated[
         units.Length,
         NOT_NEGATIVE,
-        follows("contact.clearance", "radial clearance of the pin in its hole"),
+        follows("contact.clearance", "radial clearance of the pin in its hole", "0.1 mm"),
     ] = FOLLOWS
     z: Annotated[Length, Field(description="length of the contact")]
     k1u: Annotated[QuadraticStiffness, follows("contact.k1u", "quadratic coefficient of uniform contact")] = FOLLOWS

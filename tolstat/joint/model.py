@@ -34,7 +34,7 @@ class Joint(Strict):
     pin: Pin
     arm: Arm
     cross: Cross
-    hub: Annotated[Hub, Field(default_factory=Hub)]
+    hub: Hub = Hub()
     shaft: Shaft
     bushing: Bushing
     contact: Contact

@@ -50,15 +50,18 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
 Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
 
 
+PIN_INERTIA = ["5.78e-5 kg*m^2", "6.42e-5 kg*m^2", "6.42e-5 kg*m^2"]
+ARM_INERTIA = ["1.40e-4 kg*m^2", "5.31e-5 kg*m^2", "1.11e-4 kg*m^2"]
+"""Examples: those of the joint of Cirelli et al. (2021)."""
 FOLLOWS: Any = None
 """Default of a key that follows from others where it is left out."""
 PIN_CHI, ARM_CHI = 1.11, 1.2
 """Shear factors of a circular and of a rectangular section, Cirelli et al. (2021), above Table 3."""
 
 
-def follows(key: str, meaning: str) -> Any:
+def follows(key: str, meaning: str, *examples: Any) -> Any:
     """Field of a key of `DERIVED`: its meaning, and the formula that it follows by."""
-    return Field(description=f"{meaning}; when left out: {DERIVED[key].formula}")
+    return Field(description=f"{meaning}; when left out: {DERIVED[key].formula}", examples=list(examples) or None)
 
 
 def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
@@ -82,7 +85,9 @@ class Material(Strict):
 
     E: Annotated[Stress, Field(description="Young's modulus")]
     G: Annotated[Stress, Field(description="shear modulus")]
-    nu: Annotated[Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio")]
+    nu: Annotated[
+        Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
+    ]
     rho: Annotated[Density, Field(description="density")]
 
 
@@ -96,7 +101,7 @@ class Pin(Strict):
     J: Annotated[AreaMoment, follows("pin.J", "area moment of the section")] = FOLLOWS
     Jp: Annotated[AreaMoment, follows("pin.Jp", "polar moment of the section")] = FOLLOWS
     mass: Annotated[Mass, follows("pin.mass", "mass")] = FOLLOWS
-    inertia: Annotated[Triple, follows("pin.inertia", "moments of inertia about e, t, z")] = FOLLOWS
+    inertia: Annotated[Triple, follows("pin.inertia", "moments of inertia about e, t, z", PIN_INERTIA)] = FOLLOWS
 
 
 class Arm(Strict):
@@ -106,15 +111,19 @@ class Arm(Strict):
     """
 
     l_f: Annotated[Length, Field(description="length of the beam, from its fork to the hole's centre")]
-    width: Annotated[Length | None, Field(description="side of a rectangular section along t")] = None
-    depth: Annotated[Length | None, Field(description="side of a rectangular section along e, the hole's axis")] = None
+    width: Annotated[Length | None, Field(description="side of a rectangular section along t", examples=["58 mm"])] = (
+        None
+    )
+    depth: Annotated[
+        Length | None, Field(description="side of a rectangular section along e, the hole's axis", examples=["21 mm"])
+    ] = None
     chi: Annotated[Number, Field(description="shear factor of the section")] = ARM_CHI
     A: Annotated[Area, follows("arm.A", "area of the section")] = FOLLOWS
     Jx: Annotated[AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
     Jy: Annotated[AreaMoment, follows("arm.Jy", "area moment about y, the local e")] = FOLLOWS
     Jp: Annotated[AreaMoment, follows("arm.Jp", "polar moment of the section")] = FOLLOWS
-    mass: Annotated[Mass, follows("arm.mass", "mass")] = FOLLOWS
-    inertia: Annotated[Triple, follows("arm.inertia", "moments of inertia about e, t, z")] = FOLLOWS
+    mass: Annotated[Mass, follows("arm.mass", "mass", "0.3516 kg")] = FOLLOWS
+    inertia: Annotated[Triple, follows("arm.inertia", "moments of inertia about e, t, z", ARM_INERTIA)] = FOLLOWS
 
 
 class Hub(Strict):
@@ -165,5 +174,5 @@ class Bushing(Strict):
     """Bushings, the elasticity of pins and arms: three springs and three torsion springs each, eq. (8)."""
 
     xi: Annotated[Ratio, Field(description="damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
-    cross: Annotated[PinBushing, Field(description="stiffness of a pin's bushing")] = PinBushing()
-    fork: Annotated[ArmBushing, Field(description="stiffness of an arm's bushing")] = ArmBushing()
+    cross: Annotated[PinBushing, Field(description="Stiffness of a pin's bushing")] = PinBushing()
+    fork: Annotated[ArmBushing, Field(description="Stiffness of an arm's bushing")] = ArmBushing()

@@ -20,7 +20,7 @@ Exponent = Annotated[units.Number, Field(ge=1, le=30)]
 
 
 class Settings(Strict):
-    """Evaluation of load cycles; affects no result. `read` converts the S–N lines."""
+    """Evaluation of load cycles; affects no result."""
 
     exponents: list[Exponent] = Field(
         default_factory=lambda: [3.0, 5.0, 10.0],

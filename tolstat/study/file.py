@@ -18,7 +18,7 @@ from tolstat.study import fatigue, listing, proposal, selection, swept
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
-from tolstat.study.selection import RADIAL_UNITS, UNITS, Assignments, Entry
+from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
 from tolstat.study.swept import KEYS, Swept
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
 from tolstat.study.tolerances.distributions import Distribution
@@ -122,10 +122,10 @@ class StudyFile:
         scatter: dict[str, Distribution] = {}
         for entry in self._entries("tolerances"):
             with gather(self._faults):
-                selected = selection.resolve(entry, UNITS | RADIAL_UNITS, self.place)
+                selected = selection.resolve(entry, TOLERANCED, self.place)
                 with gather(self._faults):
                     self._claims.claim(entry, selected)
-                self._toleranced |= {name: (UNITS | RADIAL_UNITS)[name] for name in selected}
+                self._toleranced |= {name: TOLERANCED[name] for name in selected}
                 for name in selected:
                     center = nominal_value(name, operation)
                     if center is not None:

@@ -25,6 +25,9 @@ UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 RADIAL_UNITS = {f"{feature}.offset_radial": "m" for feature in PINS + HOLES}
 """SI unit of each radial offset, which stands for two columns of the table, offset_t and offset_z, drawn together."""
 
+TOLERANCED = UNITS | RADIAL_UNITS
+"""SI unit of all that ``[tolerances]`` can select."""
+
 _DIAMETERS = {f"{pin}.clearance": (f"{pin}.diameter", f"{hole}.diameter") for pin, hole in HOLE_OF_PIN.items()}
 EXCLUDES = _DIAMETERS | {of: (name,) for name, diameters in _DIAMETERS.items() for of in diameters}
 """Errors that say in another way what an error says: the clearance of a pin, and the diameters of pin and hole."""

@@ -105,13 +105,11 @@ class Banded(HalfBand):
     lower: Annotated[
         Value | None,
         Field(
-            description="lower limit of the band: a deviation; of operating point and `E_factor` the value itself",
+            description="lower limit of the band",
             examples=["0 mm"],
         ),
     ] = None
-    upper: Annotated[Value | None, Field(description="upper limit of the band, as `lower`", examples=["0.030 mm"])] = (
-        None
-    )
+    upper: Annotated[Value | None, Field(description="upper limit of the band", examples=["0.030 mm"])] = None
 
     def band(self, site: Site) -> tuple[float, float] | None:
         """Lower and upper limit; None where none is given."""

@@ -1,0 +1,187 @@
+"""The tables of docs/study.md: keys of study, joint and case files, from the schemas that editors use."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.loads import LOADS
+from tolstat.common.selected_results import OPTIONAL_FIELDS
+from tolstat.common.tables import ERROR_FIELDS, LOAD_KINDS
+from tolstat.joint.contact import Station
+from tolstat.study.costs import CostEntry
+from tolstat.study.fatigue import LineEntry
+from tolstat.study.listed import Range
+from tolstat.study.model import SweepEntry
+from tolstat.study.schema import files
+from tolstat.study.schema.parts import of_model
+from tolstat.study.selection import TOLERANCED
+from tolstat.study.tolerances.entry import Banded
+from tolstat.study.tolerances.kinds import kinds_of
+
+BAND = tuple(Banded.model_fields)
+BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
+
+
+def key_table(properties: Mapping[str, Any], required: Iterable[str] = ()) -> str:
+    """Markdown table of keys: type, unit, default, meaning, example."""
+    lines = ["| key | type | unit | default | meaning | example |", "|---|---|---|---|---|---|"]
+    for key, own in properties.items():
+        if own.get("type") == "object" and "x-table" not in own:
+            continue
+        needed = "needed" if key in required else f"`{json.dumps(own['default'])}`" if "default" in own else ""
+        example = f"`{key} = {toml(own['examples'][0])}`"
+        unit = {"1": "", "error": "of the error"}.get(of_unit(own), of_unit(own))
+        lines.append(f"| `{key}` | {kind(own)} | {unit} | {needed} | {own['description']} | {example} |")
+    return "\n".join(lines)
+
+
+def of_unit(own: Mapping[str, Any]) -> str:
+    """SI unit of a key; empty for one that is no quantity."""
+    return str(own.get("x-unit") or own.get("items", {}).get("x-unit") or _first(own).get("x-unit", ""))
+
+
+def _first(own: Mapping[str, Any]) -> Mapping[str, Any]:
+    return (own.get("prefixItems") or [{}])[0]  # type: ignore[no-any-return]
+
+
+def kind(own: Mapping[str, Any]) -> str:
+    """Type of a key in words, with its bounds."""
+    if "enum" in own:
+        return ", ".join(f'`"{word}"`' for word in own["enum"])
+    bounds = "".join(f", {sign} {own[bound]:g}" for bound, sign in BOUNDS.items() if own.get(bound, 1e10) < 1e10)
+    if "x-table" in own:
+        return "quantity" if own["x-table"] == "quantity" else "number or table" if "anyOf" in own else "table"
+    if own.get("type") == "array":
+        inner = _first(own) or own["items"]
+        number = "three " if "prefixItems" in own else ""
+        return f"list of {number}{kind(inner).partition(',')[0]}s".replace("quantitys", "quantities")
+    if "x-unit" in own and own["x-unit"] != "1":
+        return f"quantity{bounds}"
+    words = {"string": "text", "integer": "integer", "boolean": "true, false", "object": "table"}
+    return words.get(own.get("type", ""), "number") + bounds if isinstance(own.get("type"), str) else f"number{bounds}"
+
+
+def toml(value: Any) -> str:
+    """Value as TOML writes it."""
+    if isinstance(value, Mapping):
+        inner = (f"{k if k.isidentifier() else json.dumps(k)} = {toml(v)}" for k, v in value.items())
+        return "{ " + ", ".join(inner) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(value)
+
+
+def model_table(model: Any) -> str:
+    """Table of the keys of a model."""
+    made = of_model(model)
+    return key_table(made["properties"], made.get("required", ()))
+
+
+def sections() -> str:
+    """Table of the sections of study and case."""
+    lines = ["| section | in a study | in a case | what it says |", "|---|---|---|---|"]
+    for name, section in files.SECTIONS.items():
+        header = f"[[{name}]]" if section.repeated else f"[{name}]"
+        state = "needed" if section.required else "any number" if section.repeated else "optional"
+        case = state if section.in_case else "–"
+        lines.append(f"| `{header}` | {state} | {case} | {section.schema()['description']} |")
+    return "\n".join(lines)
+
+
+def joint_tables() -> Iterator[str]:
+    """Sections of a joint file."""
+    made = files.joint()
+    yield key_table(made["properties"])
+    yield from _joint_sections(made, "")
+    yield f"`contact.stations`: {of_model(Station)['description']}\n\n{model_table(Station)}"
+
+
+def _joint_sections(made: Mapping[str, Any], before: str) -> Iterator[str]:
+    for name, own in made["properties"].items():
+        if own.get("type") == "object":
+            keys = key_table(own["properties"], own.get("required", ()))
+            yield f"### `[{before}{name}]`\n\n{own['description']}\n\n{keys}"
+            yield from _joint_sections(own, f"{name}.")
+
+
+def distributions() -> Iterator[str]:
+    """Entries of [tolerances], one after another."""
+    of: dict[str, tuple[Any, list[str]]] = {}
+    for name in TOLERANCED:
+        for word, model in kinds_of(name).items():
+            of.setdefault(word, (model, []))[1].append(name)
+    for word, (model, names) in of.items():
+        made = of_model(model)
+        own = {key: v for key, v in made["properties"].items() if key not in (*BAND, "distribution")}
+        band = [f"`{key}`" for key in BAND if key in made["properties"]]
+        text = f"#### `{word}`\n\n{made['description']}"
+        if len(names) < len(TOLERANCED) / 2:
+            text += f" For {', '.join(f'`{key}`' for key in dict.fromkeys(n.partition('.')[2] for n in names))} only."
+        text += f" Band: {', '.join(band)}." if band else ""
+        yield text + (f"\n\n{key_table(own, made['required'])}" if own else "")
+
+
+def errors() -> str:
+    """Table of the names of errors."""
+    lines = ["| name | unit | meaning |", "|---|---|---|"]
+    meanings: dict[tuple[str, str, str], list[str]] = {}
+    for field in ERROR_FIELDS:
+        feature, _, half = field.name.partition(".")
+        text = field.description.replace("the pin's", "the").replace("the pin axis", "the axis")
+        text = text.replace("the hole's", "the").replace("the hole axis", "the axis")
+        meanings.setdefault((half, field.unit, text), []).append(feature)
+    for (half, unit, text), features in meanings.items():
+        first, last = features[0], features[-1]
+        names = f"`{first}.{half}`" + (f" … `{last}.{half}`" if last != first else "")
+        lines.append(f"| {names} | {'' if unit == '1' else unit} | {text} |")
+    return "\n".join(lines)
+
+
+def loads() -> str:
+    """Table of the loads that can have a limit."""
+    lines = ["| load | unit | meaning |", "|---|---|---|"]
+    for of in LOAD_KINDS:
+        names = [name for name, load in LOADS.items() if load.kind == of.name]
+        text = f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "")
+        lines.append(f"| {text} | {'' if of.unit == '1' else of.unit} | largest {of.meaning} |")
+    return "\n".join(lines)
+
+
+def results() -> str:
+    """Sentence with the names of the result columns that can be left out."""
+    found: dict[str, list[str]] = {}
+    for column in RESULT_COLUMNS:
+        if column.field in OPTIONAL_FIELDS:
+            found.setdefault(column.field, []).append(column.name)
+    return (
+        "Columns: "
+        + ", ".join(f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "") for names in found.values())
+        + "."
+    )
+
+
+def tables() -> dict[str, str]:
+    """Each table of the page, by the name in its comment."""
+    with_keys = {
+        name: section.schema()
+        for name, section in files.SECTIONS.items()
+        if "patternProperties" not in section.schema()
+    }
+    found = {name: key_table(made["properties"], made.get("required", ())) for name, made in with_keys.items()}
+    entries = {"sweep": SweepEntry, "range": Range, "line": LineEntry, "cost": CostEntry}
+    return (
+        found
+        | {name: model_table(model) for name, model in entries.items()}
+        | {
+            "sections": sections(),
+            "joint file": "\n\n".join(joint_tables()),
+            "band": key_table(of_model(Banded)["properties"]),
+            "distributions": "\n\n".join(distributions()),
+            "error names": errors(),
+            "loads": loads(),
+            "result names": results(),
+        }
+    )

@@ -1,0 +1,246 @@
+"""JSON schemas of whole files, made from the registries of errors, loads, distributions and from the input models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+from tolstat.common import json_schema, strict
+from tolstat.common.files import data_dir
+from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.tables import CHANNELS
+from tolstat.common.units import EXAMPLES
+from tolstat.joint import Joint, Operation
+from tolstat.study.fatigue import LineEntry, Settings
+from tolstat.study.listed import CaseEntry, Range, VariantEntry
+from tolstat.study.model import Output, Sampling, Solver, SweepEntry
+from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
+from tolstat.study.schema.names import table
+from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
+from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.swept import KEYS
+from tolstat.study.tolerances.correlation import Correlation
+from tolstat.study.tolerances.kinds import kinds_of
+
+DEFAULT_JOINT = "cirelli2021"
+"""Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
+ERRORS = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
+"""Unit of each error that can be given a value."""
+
+
+class Section(NamedTuple):
+    """A table of a study.
+
+    Attributes
+    ----------
+    schema : callable
+        Returns its JSON schema.
+    repeated : bool
+        Whether the file has it any number of times, ``[[case]]``.
+    required : bool
+        Whether every study needs it.
+    in_case : bool
+        Whether a case file has it, too.
+    """
+
+    schema: Callable[[], Schema]
+    repeated: bool = False
+    required: bool = False
+    in_case: bool = False
+
+
+@cache
+def joint() -> Schema:
+    """JSON schema of a joint file, with the values of the default joint as examples."""
+    values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml")
+    made = with_examples(of_model(Joint), values)
+    return {"title": "Joint of tolstat"} | made | {"description": "Nominal joint."}
+
+
+def overrides() -> Schema:
+    """JSON schema of a table that names a joint file and replaces some of its keys."""
+    base: Schema = {
+        "type": "string",
+        "description": "name of a joint that comes with tolstat, or path of a joint file from the folder of this file",
+        "examples": [DEFAULT_JOINT],
+    }
+    own = {key: value for key, value in overriding(joint()).items() if key != "title"}
+    text = "Joint file, and keys that replace some of its own, such as contact.D_P."
+    return own | {"description": text, "properties": {"base": base} | own["properties"]}
+
+
+def errors() -> Schema:
+    """JSON schema of errors with given values."""
+    text = "Errors that every joint has, by name or pattern: deviations from nominal."
+    return table({name: _quantity(unit) for name, unit in ERRORS.items()}) | {"description": text}
+
+
+def tolerances() -> Schema:
+    """JSON schema of the errors that scatter: the entry of each error is one of its kinds."""
+    made = {name: {"x-table": _tolerance(name, unit)} for name, unit in TOLERANCED.items()}
+    return table(made) | {"description": "How errors scatter, by name or pattern."}
+
+
+def _of_unit(name: str, unit: str) -> str:
+    """Name of the definition of an entry for errors of a unit."""
+    return f"{name}_{unit.replace('*', '_').replace('/', '_per_')}"
+
+
+def _quantity(unit: str) -> Schema:
+    return {"x-table": _of_unit("quantity", unit)}
+
+
+def _tolerance(name: str, unit: str) -> str:
+    """Name of the definition of the tolerance of an error."""
+    return _of_unit("_".join(kinds_of(name)), unit)
+
+
+def sweep() -> Schema:
+    """JSON schema of the axes of a grid of errors and keys of the joint."""
+    text = "Errors by name or pattern, and keys of the joint, that take equally spaced values; several make a grid."
+    made: dict[str, Schema] = {
+        name: {"x-table": _of_unit(SweepEntry.__name__, unit)} for name, unit in (UNITS | KEYS).items()
+    }
+    return table(made) | {"description": text}
+
+
+def grid() -> Schema:
+    """JSON schema of the lists of values that all cases and variants are run at."""
+    made = {name: {"type": "array", "minItems": 1, "items": _quantity(unit)} for name, unit in UNITS.items()}
+    text = "Values at which all cases are run, by name or pattern; several entries make a grid."
+    return table(made) | {"description": text}
+
+
+def limits() -> Schema:
+    """JSON schema of the limits of loads."""
+    text = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
+    made: dict[str, Schema] = {name: {"x-table": _of_unit("limit", unit)} for name, unit in UNIT_OF_LOAD.items()}
+    return table(made) | {"description": text}
+
+
+def _positive(unit: str) -> Schema:
+    quantity = json_schema.quantity(unit, EXAMPLES[unit]) | {"exclusiveMinimum": 0}
+    return quantity | json_schema.sign(quantity)
+
+
+def numbers(low: float, high: float) -> Schema:
+    """JSON schema of numbers by name or pattern of errors that scatter."""
+    return table({name: {"type": "number", "minimum": low, "maximum": high} for name in TOLERANCED})
+
+
+SECTIONS: dict[str, Section] = {
+    "joint": Section(lambda: overrides() | {"required": ["base"]}, required=True, in_case=True),
+    "operation": Section(lambda: of_model(Operation), required=True, in_case=True),
+    "solver": Section(lambda: of_model(Solver), in_case=True),
+    "errors": Section(errors, in_case=True),
+    "tolerances": Section(tolerances),
+    "correlation": Section(lambda: of_model(Correlation), repeated=True),
+    "sampling": Section(lambda: of_model(Sampling), required=True),
+    "proposal": Section(lambda: of_model(ProposalEntry), repeated=True),
+    "sweep": Section(sweep),
+    "grid": Section(grid),
+    "case": Section(lambda: of_model(CaseEntry), repeated=True),
+    "variant": Section(lambda: of_model(VariantEntry), repeated=True),
+    "limits": Section(limits),
+    "fatigue": Section(lambda: of_model(Settings)),
+    "output": Section(lambda: of_model(Output)),
+}
+"""Tables of a study, in the order of the reference."""
+
+
+def tables() -> dict[str, Schema]:
+    """JSON schemas of the tables that stand in place of a property with ``x-table``."""
+    widen = numbers(1 / MAX_WIDEN, MAX_WIDEN)
+    found: dict[str, Schema] = {
+        "errors": errors(),
+        "overrides": overrides(),
+        "vary": ranges(joint(), {"x-table": "range"}),
+        "range": of_model(Range),
+        "operation": overriding(of_model(Operation)),
+        "solver": of_model(Solver),
+        "widen": {"anyOf": [{"type": "number", "minimum": 1 / MAX_WIDEN, "maximum": MAX_WIDEN}, widen]},
+        "shift": numbers(-MAX_SHIFT, MAX_SHIFT),
+        "quantity": {"type": ["string", "number"]},
+        "lines": table({name: {"x-table": _of_unit(LineEntry.__name__, unit)} for name, unit in CHANNELS.items()}),
+    }
+    for name, unit in TOLERANCED.items():
+        kinds = [for_unit(of_model(model), unit) for model in kinds_of(name).values()]
+        found.setdefault(_tolerance(name, unit), {"anyOf": kinds})
+    for unit in dict.fromkeys((UNITS | KEYS).values()):
+        found[_of_unit(SweepEntry.__name__, unit)] = for_unit(of_model(SweepEntry), unit)
+    for unit in dict.fromkeys(UNITS.values()):
+        found[_of_unit("quantity", unit)] = json_schema.quantity(unit, EXAMPLES[unit])
+    for unit in dict.fromkeys(UNIT_OF_LOAD.values()):
+        found[_of_unit("limit", unit)] = _positive(unit)
+    line = of_model(LineEntry)
+    for unit in dict.fromkeys(CHANNELS.values()):
+        size = {key: value for key, value in line["properties"]["S0"].items() if key != "x-table"} | _positive(unit)
+        found[_of_unit(LineEntry.__name__, unit)] = line | {"properties": line["properties"] | {"S0": size}}
+    return found
+
+
+def study() -> Schema:
+    """JSON schema of a study."""
+    return _file("Study of tolstat", SECTIONS)
+
+
+def case() -> Schema:
+    """JSON schema of a case file."""
+    return _file("Case of tolstat: one joint", {name: s for name, s in SECTIONS.items() if s.in_case})
+
+
+def _file(title: str, sections: dict[str, Section]) -> Schema:
+    properties = {}
+    for name, section in sections.items():
+        made = section.schema()
+        listed = {"type": "array", "items": made, "description": made.get("description", "")}
+        properties[name] = listed if section.repeated else made
+    return {
+        "title": title,
+        "type": "object",
+        "properties": properties,
+        "required": [name for name, section in sections.items() if section.required],
+        "additionalProperties": False,
+    }
+
+
+KINDS: dict[str, Callable[[], Schema]] = {"study": study, "joint": joint, "case": case}
+"""Files that have a JSON schema."""
+
+
+def schema(kind: str) -> Schema:
+    """JSON schema of a file, draft 7, for editors.
+
+    Parameters
+    ----------
+    kind : str
+        ``"study"``, ``"joint"`` or ``"case"``.
+
+    Returns
+    -------
+    dict
+    """
+    made: Schema = finished(KINDS[kind]())
+    definitions = {name: finished(part) for name, part in tables().items()}
+    used: dict[str, Any] = {}
+    for name in _referred(made, definitions):
+        used[name] = definitions[name]
+    return {"$schema": DRAFT} | made | ({"definitions": used} if used else {})
+
+
+def _referred(part: Any, definitions: dict[str, Schema], known: tuple[str, ...] = ()) -> dict[str, None]:
+    """Names of the definitions that a schema refers to, itself or by others."""
+    found: dict[str, None] = {}
+    if isinstance(part, list):
+        for item in part:
+            found |= _referred(item, definitions, known)
+    elif isinstance(part, dict):
+        if isinstance(part.get("$ref"), str):
+            name = part["$ref"].rpartition("/")[2]
+            if name not in known:
+                found[name] = None
+                found |= _referred(definitions[name], definitions, (*known, name))
+        for value in part.values():
+            found |= _referred(value, definitions, known)
+    return found

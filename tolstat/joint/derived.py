@@ -295,11 +295,12 @@ def expected(joint: Any, given: Set[str], changed: Set[str], stay: Set[str]) -> 
         Key to SI value, words that say what gives it, and the key that may be given instead, or nothing.
     """
     found: dict[str, Any] = {}
-    for key in ("hub.mass", "hub.inertia"):
-        rule = DERIVED[key]
-        value = rule.value(joint) if key in stay and changed & set(rule.follows) else None
-        if value is not None:
-            found[key] = value, f"{rule.formula}, give", ""
+    hub = _hub(joint)
+    if hub is not None and changed & {*DERIVED["hub.mass"].follows, "hub.mass"}:
+        mass, inertia = hub
+        own = joint.hub.mass if "hub.mass" in changed else mass
+        values = {"hub.mass": mass, "hub.inertia": tuple(own / mass * one for one in inertia)}
+        found |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}
     of, d = joint.contact, joint.pin.d
     hole, pin, clearance = BEARING
     if "pin.d" in changed and pin in stay and not math.isclose(of.D_P, d, rel_tol=1e-6):
@@ -308,6 +309,6 @@ def expected(joint: Any, given: Set[str], changed: Set[str], stay: Set[str]) -> 
             found[hole] = d + 2.0 * of.clearance, "pin.d and the clearance of these two give", clearance
     elif changed & {"pin.d", pin} and hole in stay and of.clearance > WIDE * of.D_P:
         found[hole] = of.D_P, "that is much clearance; without any contact.D_P gives", clearance
-    if pin in given and "pin.d" in stay and abs(of.D_P - d) > WIDE * d and of.clearance < WIDE * of.D_P:
+    if pin in given and {hole, clearance} & given and "pin.d" in stay and abs(of.D_P - d) > WIDE * d:
         found["pin.d"] = of.D_P, "contact.D_P gives", ""
     return found

@@ -20,6 +20,8 @@ from tolstat.joint.derived import DERIVED
 from tolstat.joint.overrides import leaves, overridden
 from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
 
+NO_FIT = "the pin does not fit into the hole: D_P, by default pin.d, is not above zero and up to D_H", "give D_P <= D_H"
+
 
 class Joint(Strict):
     """A nominal Cardan joint: the sections of a joint file in SI units.
@@ -34,7 +36,7 @@ class Joint(Strict):
     pin: Pin
     arm: Arm
     cross: Cross
-    hub: Hub = Hub()
+    hub: Hub = Field(default=Hub(), validate_default=True)
     shaft: Shaft
     bushing: Bushing
     contact: Contact
@@ -68,7 +70,7 @@ class Joint(Strict):
         if abs(0.5 * (value.D_H - value.D_P) - value.clearance) > 1e-9:
             raise refuse("D_H, D_P and clearance contradict each other", "remove one of the three")
         if not 0.0 < value.D_P <= value.D_H:
-            raise refuse("the pin does not fit into the hole: D_P is not above zero and up to D_H", "give D_P <= D_H")
+            raise refuse(*NO_FIT)
         return value
 
     @field_validator("contact")
@@ -85,8 +87,6 @@ class Joint(Strict):
         """Refuse a load range in which eq. (3) stops rising, because the logarithms of 2 D / b become negative."""
         if value.law == GIVEN or not info.data.keys() >= {"material", "pin"}:
             return value
-        if ("k1u" in value.model_fields_set) != ("k2u" in value.model_fields_set):
-            raise refuse("k1u and k2u belong together", "give both or neither")
         k1u, k2u, k1p, k2p = value.coefficients()
         if not (k1u >= 0.0 and k2u > 0.0):
             raise refuse("the fit to eq. (3) gives no stiffening contact", "give a smaller contact.fit_load")
@@ -131,10 +131,15 @@ class Joint(Strict):
 
 def _lacking(keys: list[str], section: BaseModel) -> tuple[str, str]:
     """Fault and remedy of a section without `keys`, which cannot be derived."""
+    if isinstance(section, Hub):
+        found = "the pins overlap in the hub: its mass and inertia do not follow from pin.d and cross.r_b"
+        return found, "give pin.l, from the hub to the middle of the hole, or hub.mass and hub.inertia"
     if isinstance(section, Contact):
         if section.D_H is None:
             return "missing key", "give clearance, the radial clearance, or D_H"
-        if section.D_P > 0.0 and not section.D_H > section.D_P:
+        if not 0.0 < section.D_P <= section.D_H:
+            return NO_FIT
+        if section.D_H == section.D_P:
             return "eq. (3) has no value without clearance", "give a clearance above zero, or k1u and k2u"
     names = [key.rpartition(".")[2] for key in keys]
     sources = dict.fromkeys(of for key in keys for of in DERIVED[key].follows if of not in keys)

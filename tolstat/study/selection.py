@@ -209,7 +209,8 @@ class Assignments:
         claimed = [column for name in names for column in columns_of(name)]
         clashes = {self._owner[c].path: c for c in claimed if c in self._owner}
         self._owner.update((c, entry) for c in claimed if c not in self._owner)
-        both = {self._owner[o].path: (c, o) for c in claimed for o in EXCLUDES.get(c, ()) if o in self._owner}
+        pairs = [(c, o) for c in claimed for o in EXCLUDES.get(c, ()) if o in self._owner]
+        both = {self._owner[o].path: (c, o) for c, o in reversed(pairs)}  # the first of each entry
         if clashes or both:
             where = f"{self._place}: {dotted(entry.path)}"
             remedy = "remove one of the two, or narrow the pattern"

@@ -127,7 +127,7 @@ BOTH = {
         "sweep.pin*.clearance: pin1.clearance is given beside hole4.diameter",
     ),
     "sweep": (("cross.R = { from", "pin2.diameter = { from"), "pin2.diameter is given beside pin2.clearance"),
-    "one pattern": (('"pin*.clearance"', '"pin*.[cd]*"'), "pin1.clearance is given beside pin1.diameter"),
+    "one pattern": (('"pin*.clearance"', '"pin*.[cd]*"'), "pin1.diameter is given beside pin1.clearance"),
 }
 
 

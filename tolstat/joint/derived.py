@@ -71,16 +71,16 @@ def _beam(body: str, l: str, bending: tuple[str, str]) -> dict[str, Rule]:  # no
         keys = tuple(f"material.{key}" if key in "EG" else f"{body}.{key}" for key in of)
         return Rule((*keys, f"{body}.{l}"), formula, value, unit)
 
-    shear = (("G", "A", "chi"), f"G A/(chi {l}), eq. (10)", "N/m")
+    shear = (("G", "A", "chi"), f"G A/(chi {l}), eqs. (9)-(11)", "N/m")
     return {
         f"bushing.{section}.{name}": rule(name, *entry)
         for name, entry in {
             "k_x": shear,
             "k_y": shear,
-            "k_z": (("E", "A"), f"E A/{l}, eq. (9)", "N/m"),
-            "k_bx": (("E", about_x), f"E {about_x}/{l}, eq. (11)", "N*m/rad"),
-            "k_by": (("E", about_y), f"E {about_y}/{l}, eq. (11)", "N*m/rad"),
-            "k_tz": (("G", "Jp"), f"G Jp/{l}, eq. (11)", "N*m/rad"),
+            "k_z": (("E", "A"), f"E A/{l}, eqs. (9)-(11)", "N/m"),
+            "k_bx": (("E", about_x), f"E {about_x}/{l}, eqs. (9)-(11)", "N*m/rad"),
+            "k_by": (("E", about_y), f"E {about_y}/{l}, eqs. (9)-(11)", "N*m/rad"),
+            "k_tz": (("G", "Jp"), f"G Jp/{l}, eqs. (9)-(11)", "N*m/rad"),
         }.items()
     }
 

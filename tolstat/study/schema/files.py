@@ -66,7 +66,7 @@ def overrides() -> Schema:
         "examples": [DEFAULT_JOINT],
     }
     own = {key: value for key, value in overriding(joint()).items() if key != "title"}
-    text = "Joint file, and keys that replace some of its own, such as contact.D_P."
+    text = "Joint file, and keys that replace some of its own, such as contact.clearance."
     return own | {"description": text, "properties": {"base": base} | own["properties"]}
 
 

@@ -64,6 +64,8 @@ def random_errors() -> Callable[[int], dict[str, float]]:
             for axis in "tz":
                 errors[f"{feature}__tilt_{axis}"] = rng.normal(0, 2e-3)
             errors[f"{feature}__diameter"] = rng.normal(0, 5e-6)
+        for i in (1, 2, 3, 4):
+            errors[f"pin{i}__clearance"] = rng.normal(0, 5e-6)
         return errors
 
     return draw

@@ -14,6 +14,7 @@ from tests import study_reference
 from tolstat.common import draw_records, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
 from tolstat.joint.contact import LAWS
+from tolstat.joint.derived import DERIVED
 from tolstat.store import axes
 from tolstat.store.new_file import SESSION
 
@@ -84,6 +85,16 @@ def law_table() -> str:
     return "\n".join(lines)
 
 
+def derived_table() -> str:
+    """Markdown table of the keys of a joint that follow from others."""
+    lines = ["| key | follows from | formula |", "|---|---|---|"]
+    for key, rule in DERIVED.items():
+        section = key.partition(".")[0]
+        sources = ", ".join(f"`{of.removeprefix(f'{section}.')}`" for of in rule.follows)
+        lines.append(f"| `{key}` | {sources} | {rule.formula} |")
+    return "\n".join(lines)
+
+
 def updated(text: str, content: dict[str, str]) -> str:
     """`text` of a document with its tables made anew; each is between a comment with its name and one of its end."""
     for name, table in content.items():
@@ -102,7 +113,7 @@ def documents() -> dict[Path, str]:
     page = {"errors": field_table(ERROR_COLUMNS), "results": field_table(RESULT_COLUMNS)}
     return {
         FORMAT: updated(FORMAT.read_text(encoding="utf-8"), content),
-        MODEL: updated(MODEL.read_text(encoding="utf-8"), {"laws": law_table()}),
+        MODEL: updated(MODEL.read_text(encoding="utf-8"), {"laws": law_table(), "derived": derived_table()}),
         STUDY: updated(STUDY.read_text(encoding="utf-8"), study_reference.tables()),
         SCHEMA: PAGE.format(version=tables.SCHEMA_VERSION, **page),
     }

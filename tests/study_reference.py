@@ -106,7 +106,8 @@ def joint_tables() -> Iterator[str]:
 def _joint_sections(made: Mapping[str, Any], before: str) -> Iterator[str]:
     for name, own in made["properties"].items():
         if own.get("type") == "object":
-            yield f"### `[{before}{name}]`\n\n{own['description']}\n\n{key_table(own['properties'], own['required'])}"
+            keys = key_table(own["properties"], own.get("required", ()))
+            yield f"### `[{before}{name}]`\n\n{own['description']}\n\n{keys}"
             yield from _joint_sections(own, f"{name}.")
 
 

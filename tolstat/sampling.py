@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Table = NDArray[np.void]
 
 
+ERROR_NAMES = tuple(field.name for field in ERROR_FIELDS)
 BLOCK = 1 << 16
 """Number of rows drawn at a time: a table of 27 MB."""
 
@@ -210,10 +211,10 @@ def dimensions() -> dict[str, int]:
 
 
 def _fill_grid(samples: Table, axes: Sequence[SweepAxis], numbers: range) -> None:
-    """Set the points of the product grid of the axes; the last axis varies fastest."""
+    """Set the points of the product grid of the axes, the last of which varies fastest; dimensions are no errors."""
     index = np.unravel_index(np.arange(numbers.start, numbers.stop), [axis.points for axis in axes])
     for axis, at in zip(axes, index, strict=True):
-        for name in axis.names:
+        for name in set(axis.names).intersection(ERROR_NAMES):
             samples[name] = np.linspace(axis.start, axis.stop, axis.points)[at]
 
 

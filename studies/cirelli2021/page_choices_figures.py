@@ -38,7 +38,7 @@ def contact(study: PaperStudy) -> Figure:
     force = np.linspace(0.0, load, 200)[1:]
     exact = material.contact_displacement(force / of.z, of.D_H, of.D_P, steel.E, steel.nu)
     k1, k2 = material.fit_contact(load, of.z, of.D_H, of.D_P, steel.E, steel.nu)
-    k1u, k2u, k1p, k2p = of.stiffness(steel)
+    k1u, k2u, k1p, k2p = of.coefficients()
     with style.settings():
         figure, axes = page("Figure 5. Contact force against displacement", 1, 2, 3.4)
         pairs = ((1.0, (k1, k2), (k1u, k2u)), (ratio, material.point_coefficients(k1, k2, ratio), (k1p, k2p)))

@@ -10,6 +10,7 @@ from studies.cirelli2021 import page_checks as paper_checks
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_source import PaperStudy
 from tolstat.joint import Joint, ideal, material, rccc
+from tolstat.joint.derived import DERIVED
 
 FIT_LOAD, H = 20e3, 6.9
 """Load range of the fit (N) and ratio of eq. (4) where a joint file gives none."""
@@ -87,7 +88,7 @@ def contact(joint: Joint) -> list[Row]:
     if of.D_H > of.D_P:
         fit = material.fit_contact(load, of.z, of.D_H, of.D_P, steel.E, steel.nu)
         fitted = (*fit, *material.point_coefficients(*fit, ratio))
-    rows = zip(TABLE_2.items(), of.stiffness(steel), fitted, strict=True)
+    rows = zip(TABLE_2.items(), of.coefficients(), fitted, strict=True)
     return [Row(f"{name} [{'N/m²' if '1' in name else 'N/m'}]", (p, own, fit)) for (name, p), own, fit in rows]
 
 
@@ -95,22 +96,22 @@ def stiffness(joint: Joint) -> list[Row]:
     """Table 3: printed, of the joint, and by eqs. (9)-(11); of a cross bushing, then of a fork bushing."""
     axes = ("k_z", "k_x", "k_y", "k_tz", "k_bx", "k_by"), ("k_y", "k_x", "k_z", "k_by", "k_bx", "k_tz")
     used = [dict(zip(names, k, strict=True)) for names, k in zip(axes, (joint.k_cross, joint.k_fork), strict=True)]
-    beams = (joint.pin.beam(joint.material), joint.arm.beam(joint.material))
+    rules = [{name: DERIVED[f"bushing.{part}.{name}"] for name in TABLE_3} for part in ("cross", "fork")]
     rows = []
     for name, printed in TABLE_3.items():
         values: list[float] = []
         for side in (0, 1):
-            values += [printed[side], float(used[side][name]), float(getattr(beams[side], name))]
+            values += [printed[side], float(used[side][name]), rules[side][name].value(joint)]
         rows.append(Row(f"{name} [{'N/m' if name[2] in 'xyz' else 'N m/rad'}]", tuple(values)))
     return rows
 
 
 def bushings(joint: Joint) -> list[Row]:
     """Eqs. (8) and (12): diagonals of [K] and [C] along and about (e, t, z); cross, then fork; SI."""
-    xi, rho = joint.bushing.xi, joint.material.rho
+    xi = joint.bushing.xi
     columns = []
-    for k, (mass, inertia) in ((joint.k_cross, joint.pin.body(rho)), (joint.k_fork, joint.arm.body(rho))):
-        columns += [k, material.bushing_damping(k, mass, inertia, xi)]
+    for k, body in ((joint.k_cross, joint.pin), (joint.k_fork, joint.arm)):
+        columns += [k, material.bushing_damping(k, body.mass, np.array(body.inertia), xi)]
     names = [f"{word} {axis}" for word in ("along", "about") for axis in "etz"]
     return [Row(name, tuple(float(c[i]) for c in columns)) for i, name in enumerate(names)]
 
@@ -133,7 +134,7 @@ def damping(study: PaperStudy) -> list[Row]:
     pairs = (("ρ in SI", paper_checks.RHO), ("ρ as printed", paper_checks.PRINTED_RHO))
     for name, rho in pairs:
         rows.append(Row(name, (rho, paper_checks.omega(rho), paper_checks.contact_damping(rho))))
-    own = study.joint.contact.normal_damping(study.joint.pin, study.joint.material)
+    own = study.joint.contact.c_d
     rows.append(Row("printed", (float("nan"), float("nan"), paper_checks.PRINTED_CD)))
     rows.append(Row("this joint", (study.joint.material.rho, float("nan"), own)))
     return rows

@@ -114,8 +114,7 @@ def output_inertia(joint: Joint) -> float:
     """
     total = joint.shaft.Js
     for body in (joint.arm, joint.pin):
-        mass, inertia = body.body(joint.material.rho)
-        total += 2.0 * (mass * joint.cross.R**2 + float(inertia[2]))
+        total += 2.0 * (body.mass * joint.cross.R**2 + body.inertia[2])
     return total
 
 

@@ -30,7 +30,7 @@ from tolstat.study.tolerances.radial import Rayleigh
 HEAD = """
 [joint]
 base = "own.toml"
-bushing.stiffness = "beam"
+material.E = "210 GPa"
 
 [operation]
 alpha = "15 deg"

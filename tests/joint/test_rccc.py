@@ -347,7 +347,7 @@ def test_elastic_reference_joints_carry_the_couple_of_the_linkage(cirelli, error
         couple += torque + np.cross(cirelli.cross.r_b * local[0], force)
 
     linkage = rccc.solve(cirelli, errors(**error), theta)
-    mass, inertia = cirelli.arm.body(cirelli.material.rho)
+    mass, inertia = cirelli.arm.mass, cirelli.arm.inertia
     about_shaft = cirelli.shaft.Js + 2 * (mass * cirelli.cross.R**2 + inertia[2])
     slope = -np.cos(alpha) * np.sin(alpha) ** 2 * np.sin(2 * theta) / (1 - (np.sin(alpha) * np.cos(theta)) ** 2) ** 2
     external = np.zeros((180, 3, 6))

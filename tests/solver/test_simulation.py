@@ -12,7 +12,7 @@ import pytest
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
 from tolstat import joint, study
 from tolstat.campaign import trace
-from tolstat.common.tables import RESULT, RESULTANT, SIMULATED, Method, Mode, Options, Start, Status
+from tolstat.common.tables import RESULT, RESULTANT, SIMULATED, Fidelity, Method, Mode, Options, Start, Status
 from tolstat.joint import ideal
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.work import FORCE, make_work
@@ -173,6 +173,14 @@ class TestSymmetries:
         here = self.loads(params, errors)
         # both count their samples in their own sense of rotation
         self.assert_same(here[:, [1, 0, 2, 3, 4, 5, 7, 6]] * [1, -1, 1, -1, 1, -1], there)
+
+
+def test_the_clearance_of_each_pin_is_a_result_whatever_becomes_of_the_joint(params):
+    par = np.concatenate([params(), params(pin2__clearance=2e-5, hole1__diameter=2e-5), params(pin4__clearance=-2e-4)])
+    results = simulate_rows(par, Options(fidelity=int(Fidelity.IDEAL))).results
+    assert results["status"].tolist() == [Status.OK, Status.OK, Status.OUTSIDE_MODEL]
+    expected = 1e-4 + np.array([[0, 0, 0, 0], [0, 2e-5, 1e-5, 0], [0, 0, 0, -2e-4]])
+    np.testing.assert_allclose(results["clearance"], expected, rtol=1e-9)
 
 
 def test_ramp_and_static_start_settle_to_the_same_revolution(params):

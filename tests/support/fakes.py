@@ -45,11 +45,13 @@ SPECS = {
 
 
 class Dump(dict):
-    """A mapping with pydantic's way of writing itself."""
+    """A mapping with the ways of pydantic and of a joint of writing itself."""
 
     def model_dump(self, mode: str = "json") -> dict[str, Any]:
         """Return the mapping itself."""
         return dict(self)
+
+    given = model_dump
 
 
 @dataclass(frozen=True)

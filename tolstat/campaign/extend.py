@@ -145,7 +145,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         _check_one_campaign(stores)
         attrs = stores[0].attributes()
         attrs.pop("stop", None)
-        design = np.concatenate([s.design()[a:] for s, a in _shares(stores)]) if stores[0].case_names else None
+        design = np.concatenate([s.design()[a:] for s, a in _shares(stores)]) if stores[0].variants else None
         errors = (block for store, begin in _shares(stores) for block in _blocks(store, store.errors, begin))
         origin = (block for store, begin in _shares(stores) for block in _blocks(store, store.origin, begin))
         drawn = origin if columns(stores[0].sampling) else None

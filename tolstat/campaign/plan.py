@@ -310,7 +310,7 @@ def _file_bytes(
     """Predict the size of the result file from one in memory with the pilot's joints."""
     specs = history_specs(options, study.output.histories, study.output.harmonics)
     n = len(errors)
-    design = study.design[:n] if study.case_names else None
+    design = study.design[:n] if study.variants else None
     origin = origin_blocks(study, range(n))
     with h5py.File("pilot", "w", driver="core", backing_store=False, block_size=512) as file:
         fill(file, attributes(study, specs, dimensions(), options, choice), range(n), [errors], design, origin)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -148,11 +149,18 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
-    """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`."""
+    """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`.
+
+    Of several joints with a warning about the same key the first is printed, and how many others there are.
+    """
     places = [f"variant {variant.family!r}: joint" for variant in variants] or ["joint"]
-    faults = (f"{place}.{fault}" for place, joint in zip(places, joints, strict=True) for fault in joint.warnings())
-    for fault in dict.fromkeys(faults):
-        warn(f"warning: {path}: {fault}")
+    found: dict[str, list[Fault]] = {}
+    for place, joint in zip(places, joints, strict=True):
+        for fault in joint.warnings():
+            found.setdefault(fault.place, []).append(replace(fault, place=f"{place}.{fault.place}"))
+    for first, *others in found.values():
+        more = f" (and {len(others)} more joints)" if others else ""
+        warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
 def tell(report: Report) -> None:

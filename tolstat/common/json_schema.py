@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, get_args
 
 import annotated_types
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BaseModel
 from pydantic.fields import FieldInfo
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -65,8 +65,8 @@ def complete(schema: dict[str, Any], fields: Mapping[str, FieldInfo], signs: Map
         _remove_null(own)
         own |= _bounds(field, signs, own)
         own |= _default(field)
-        if own.get("default", 0) is None:
-            del own["default"]
+        if own.get("default", 0) is None or isinstance(field.default, BaseModel):
+            own.pop("default", None)
 
 
 def _remove_null(own: dict[str, Any]) -> None:

@@ -18,7 +18,11 @@ from tolstat.common.tables import LOAD_KINDS
 
 KEY = "output.results"
 """Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
-OPTIONAL_FIELDS = ("mode_share", *(field.name for kind in LOAD_KINDS for field in kind.statistics().values()))
+OPTIONAL_FIELDS = (
+    "mode_share",
+    "clearance",
+    *(field.name for kind in LOAD_KINDS for field in kind.statistics().values()),
+)
 """Fields of the results that a study may leave out."""
 NAMES = tuple(c.name for c in RESULT_COLUMNS)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tolstat.common.fields import Field, Kind, dtype_of
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
 PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
@@ -240,6 +240,7 @@ def _error_fields() -> tuple[Field, ...]:
             "1",
             "factor on Young's modulus: bushings, their damping, contact coefficients",
         ),
+        *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in PINS),
     ]
     return tuple(fields)
 
@@ -301,6 +302,13 @@ RESULT_FIELDS = (
     ),
     *(field for kind in LOAD_KINDS if not kind.places for field in kind.statistics().values()),
     *(field for kind in LOAD_KINDS for field in kind.ends()),
+    Field(
+        "clearance",
+        "m",
+        "radial clearance of the pin in its hole",
+        shape=(len(PINS),),
+        columns=tuple(f"{pin}.radial_clearance" for pin in PINS),
+    ),
 )
 
 DESIGN_FIELDS = (

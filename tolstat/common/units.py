@@ -277,17 +277,18 @@ class Quantity:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return the schema: parse on validation, write value and unit on JSON dump."""
 
-        def write(value: float) -> str | float:
-            return value if self.unit == "1" else f"{value!r} {self.unit}"
-
         def read(value: object, info: core_schema.ValidationInfo) -> float:
             si = isinstance(value, float) and bool(info.context and info.context.get("si"))
             return to_si(value, "1" if si else self.unit, self.mark)
 
         return core_schema.with_info_plain_validator_function(
             read,
-            serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
+            serialization=core_schema.plain_serializer_function_ser_schema(self.written, when_used="json"),
         )
+
+    def written(self, value: float) -> str | float:
+        """Return an SI value as a file writes it: ``"0.0001 m"``."""
+        return value if self.unit == "1" else f"{value!r} {self.unit}"
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema of the quantity as a file writes it."""

@@ -16,19 +16,17 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from tolstat.common import units
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
-from tolstat.joint import material
 from tolstat.joint.sections import (
+    FOLLOWS,
     NOT_NEGATIVE,
     POSITIVE,
     Array,
     Diameter,
     Length,
-    Material,
     Number,
-    Pin,
     Ratio,
     Stiffness,
-    require,
+    follows,
 )
 
 QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
@@ -92,7 +90,7 @@ class Law(NamedTuple):
     Attributes
     ----------
     stations : callable
-        Contact section and material -> stations, at the material's nominal Young's modulus.
+        Contact section -> stations, at the material's nominal Young's modulus.
     rows : tuple of tuple of str
         Lines of the table of laws in docs/model.md: where stations are, their k1 and k2, their weight.
     needs : tuple of str
@@ -103,15 +101,15 @@ class Law(NamedTuple):
         Whether a station has what two ends in point contact leave of uniform contact; it must not be negative.
     """
 
-    stations: Callable[[Contact, Material], Stations]
+    stations: Callable[[Contact], Stations]
     rows: tuple[tuple[str, str, str], ...]
     needs: tuple[str, ...] = ()
     from_coefficients: bool = True
     middle: bool = False
 
 
-def _mode(contact: Contact, of: Material) -> Stations:
-    k1u, k2u, k1p, k2p = contact.stiffness(of)
+def _mode(contact: Contact) -> Stations:
+    k1u, k2u, k1p, k2p = contact.coefficients()
     ends = contact.ends()
     return Stations(
         np.array([ends[0], 0.0, ends[1]]),
@@ -121,27 +119,27 @@ def _mode(contact: Contact, of: Material) -> Stations:
     )
 
 
-def _uniform(contact: Contact, of: Material) -> Stations:
-    k1u, k2u, _, _ = contact.stiffness(of)
+def _uniform(contact: Contact) -> Stations:
+    k1u, k2u, _, _ = contact.coefficients()
     one = np.ones(2)
     return Stations(contact.ends(), 0.5 * k1u * one, 0.5 * k2u * one, one)
 
 
-def _point(contact: Contact, of: Material) -> Stations:
-    _, _, k1p, k2p = contact.stiffness(of)
+def _point(contact: Contact) -> Stations:
+    _, _, k1p, k2p = contact.coefficients()
     one = np.ones(2)
     return Stations(contact.ends(), k1p * one, k2p * one, one)
 
 
-def _sliced(contact: Contact, of: Material) -> Stations:
+def _sliced(contact: Contact) -> Stations:
     assert contact.n_stations is not None
-    k1u, k2u, _, _ = contact.stiffness(of)
+    k1u, k2u, _, _ = contact.coefficients()
     x, weight = np.polynomial.legendre.leggauss(contact.n_stations)
     weight = weight[::-1]
     return Stations(0.5 * contact.z * x[::-1], 0.5 * k1u * weight, 0.5 * k2u * weight, weight)
 
 
-def _given(contact: Contact, of: Material) -> Stations:
+def _given(contact: Contact) -> Stations:
     assert contact.stations is not None
     own = sorted(contact.stations, key=lambda station: -station.s_over_z)
     return Stations(
@@ -177,23 +175,10 @@ LAWS = {
 FROM_COEFFICIENTS = tuple(name for name, law in LAWS.items() if law.from_coefficients)
 """Laws whose stations follow from the coefficients."""
 COEFFICIENTS = (
-    *("coefficients", "k1u", "k2u", "k1p", "k2p", "H", "fit_load"),
+    *("k1u", "k2u", "k1p", "k2p", "H", "fit_load"),
     *dict.fromkeys(key for name in FROM_COEFFICIENTS for key in LAWS[name].needs),
 )
 """Keys that define the stations of all laws but `GIVEN`."""
-NEEDED = {
-    **{
-        key: ("law", tuple(name for name, law in LAWS.items() if key in law.needs), DEFAULT)
-        for key in dict.fromkeys(key for law in LAWS.values() for key in law.needs)
-    },
-    "k1u": ("coefficients", ("printed",), "fitted"),
-    "k2u": ("coefficients", ("printed",), "fitted"),
-    "fit_load": ("coefficients", ("fitted",), "printed"),
-    "c_d": ("damping", ("given",), "beam"),
-    "xi": ("damping", ("beam",), "given"),
-}
-"""Keys required by a selector: the selector, its values that require the key, a value that does not."""
-
 if TYPE_CHECKING:
     LawName = str
 else:
@@ -211,9 +196,11 @@ def _has_middle(info: ValidationInfo) -> bool:
 
 
 class Contact(Strict):
-    """Contact of the pins in their holes."""
+    """Contact of the pins in their holes.
 
-    # validators require keys that may be None where they are needed; methods assert it for the type checker
+    Of `D_H`, `D_P` and `clearance` two define the third.
+    """
+
     law: Annotated[LawName, Field(description="set of contact stations, see the contact laws of the joint model")]
     n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = Field(
         default=None, validate_default=True, description="stations of a pin, for law `sliced`"
@@ -224,46 +211,26 @@ class Contact(Strict):
         description="stations of one's own, for law `stations`",
         examples=[[{"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0}]],
     )
-    D_H: Annotated[Diameter, Field(description="diameter of the hole")]
-    D_P: Annotated[
-        Diameter, Field(description="diameter of the pin, not above `D_H`; the radial clearance is (D_H - D_P)/2")
-    ]
+    D_H: Annotated[Diameter, follows("contact.D_H", "diameter of the hole")] = FOLLOWS
+    D_P: Annotated[Diameter, follows("contact.D_P", "diameter of the pin in the hole, not above `D_H`")] = FOLLOWS
+    clearance: Annotated[
+        units.Length,
+        NOT_NEGATIVE,
+        follows("contact.clearance", "radial clearance of the pin in its hole", "0.1 mm"),
+    ] = FOLLOWS
     z: Annotated[Length, Field(description="length of the contact")]
-    coefficients: Literal["printed", "fitted"] | None = Field(
-        default=None,
-        validate_default=True,
-        description="`printed`: k1u to k2p as given here; `fitted`: force fitted to eq. (3) for material and "
-        "diameters over loads up to `fit_load`, point contact by `H`",
-    )
-    k1u: QuadraticStiffness | None = Field(
-        default=None, validate_default=True, description="quadratic coefficient of uniform contact, for `printed`"
-    )
-    k2u: Stiffness | None = Field(
-        default=None, validate_default=True, description="linear coefficient of uniform contact, for `printed`"
-    )
-    k1p: QuadraticStiffness | None = Field(
-        default=None, description="quadratic coefficient of point contact; when left out: k1u/H^2"
-    )
-    k2p: Stiffness | None = Field(default=None, description="linear coefficient of point contact; when left out: k2u/H")
+    k1u: Annotated[QuadraticStiffness, follows("contact.k1u", "quadratic coefficient of uniform contact")] = FOLLOWS
+    k2u: Annotated[Stiffness, follows("contact.k2u", "linear coefficient of uniform contact")] = FOLLOWS
+    k1p: Annotated[QuadraticStiffness, follows("contact.k1p", "quadratic coefficient of point contact")] = FOLLOWS
+    k2p: Annotated[Stiffness, follows("contact.k2p", "linear coefficient of point contact")] = FOLLOWS
     H: Number | None = Field(
         default=None,
         validate_default=True,
         description="displacement in point contact over that in uniform contact at the same force",
     )
-    fit_load: Force | None = Field(
-        default=None, validate_default=True, description="largest load of the fit, for `fitted`"
-    )
-    damping: Annotated[
-        Literal["given", "beam"],
-        Field(
-            description="`given`: by `c_d`; `beam`: 2 xi m omega with omega the pin's first frequency as a "
-            "cantilever, eqs. (6)-(7)"
-        ),
-    ]
-    c_d: Damping | None = Field(default=None, validate_default=True, description="damping of a station, for `given`")
-    xi: Ratio | None = Field(
-        default=None, validate_default=True, description="damping ratio of the contact, for `beam`"
-    )
+    fit_load: Force | None = Field(default=None, description="largest load of the fit of k1u and k2u")
+    c_d: Annotated[Damping, follows("contact.c_d", "damping of a station")] = FOLLOWS
+    xi: Ratio | None = Field(default=None, description="damping ratio of the contact, from which c_d follows")
     c_t: Annotated[
         Damping, Field(description="damping by the lubricant across the clearance; without it a pin whirls for ever")
     ]
@@ -292,19 +259,14 @@ class Contact(Strict):
             raise refuse(f'has no effect with law = "{law}"', 'write law = "stations"')
         return value
 
-    @field_validator("coefficients")
+    @field_validator(*dict.fromkeys(key for law in LAWS.values() for key in law.needs))
     @classmethod
-    def _source(cls, value: str | None, info: ValidationInfo) -> str | None:
-        if value is None and info.data.get("law") not in (None, GIVEN):
-            raise refuse("missing key", 'write coefficients = "printed" or "fitted"')
-        if value == "fitted" and "D_P" in info.data and info.data["D_P"] == info.data.get("D_H"):
-            raise refuse("eq. (3) has no value at D_H = D_P", 'give a clearance, or write "printed"')
-        return value
-
-    @field_validator(*NEEDED)
-    @classmethod
-    def _needed(cls, value: float | None, info: ValidationInfo) -> float | None:
-        require(value, info, *NEEDED[str(info.field_name)])
+    def _needed(cls, value: object, info: ValidationInfo) -> object:
+        law = info.data.get("law")
+        if value is None and law is not None and info.field_name in LAWS[law].needs:
+            raise refuse(
+                f'missing key, needed with law = "{law}"', f'add {info.field_name}, or write law = "{DEFAULT}"'
+            )
         return value
 
     @field_validator("k1p", "k2p")
@@ -313,8 +275,7 @@ class Contact(Strict):
         """Refuse a negative middle station: uniform less twice the point coefficient."""
         name = str(info.field_name)
         uniform = info.data.get(name.replace("p", "u"))
-        in_use = _has_middle(info) and info.data.get("coefficients") == "printed"
-        if in_use and value is not None and uniform is not None and 2.0 * value > uniform:
+        if _has_middle(info) and value is not None and uniform is not None and 2.0 * value > uniform:
             of = f"{name[:2]}u"
             found = f"2 {name} exceeds {of} = {{{of}}}: the middle station would be negative"
             raise refuse(found, f"give {name} <= {of} / 2, or another law", of)
@@ -323,44 +284,26 @@ class Contact(Strict):
     @field_validator("H")
     @classmethod
     def _point(cls, value: float | None, info: ValidationInfo) -> float | None:
-        fitted = info.data.get("coefficients") == "fitted"
-        given = info.data.get("k1p", 0.0) is not None and info.data.get("k2p", 0.0) is not None
-        if info.data.get("law") == GIVEN or (given and not fitted):
+        k1p, k2p = info.data.get("k1p"), info.data.get("k2p")
+        if info.data.get("law") == GIVEN or (k1p is not None and k2p is not None):
             return value
         if value is None:
             raise refuse("missing key, needed where k1p and k2p are not given", "add H, or both k1p and k2p")
-        least = 2.0 if fitted or info.data.get("k2p") is None else math.sqrt(2.0)  # k2p = k2u/H, k1p = k1u/H^2
+        least = 2.0 if k2p is None else math.sqrt(2.0)  # k2p = k2u/H, k1p = k1u/H^2
         if _has_middle(info) and value < least:
             found = f"{value:g} makes two ends stiffer than uniform contact: the middle station would be negative"
             raise refuse(found, f"give at least {least:.4g}, or another law")
         return value
 
-    def stiffness(self, of: Material) -> tuple[float, float, float, float]:
-        """Coefficients k1u (N/m^2), k2u (N/m), k1p (N/m^2), k2p (N/m): as printed, or fitted to eq. (3).
-
-        Point coefficients follow from the uniform ones by H where they are not given, and always where the
-        uniform ones are fitted. NaN with the law ``"stations"``, which has none.
-        """
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """k1u (N/m^2), k2u (N/m), k1p (N/m^2), k2p (N/m); NaN with the law ``"stations"``, which has none."""
         if not LAWS[self.law].from_coefficients:
             return (math.nan,) * 4
-        k1u, k2u, k1p, k2p = self.k1u, self.k2u, self.k1p, self.k2p
-        if self.coefficients == "fitted":
-            assert self.fit_load is not None
-            k1u, k2u = material.fit_contact(self.fit_load, self.z, self.D_H, self.D_P, of.E, of.nu)
-            k1p = k2p = None
-        assert k1u is not None
-        assert k2u is not None
-        if k1p is None:
-            assert self.H is not None
-            k1p, _ = material.point_coefficients(k1u, k2u, self.H)
-        if k2p is None:
-            assert self.H is not None
-            _, k2p = material.point_coefficients(k1u, k2u, self.H)
-        return k1u, k2u, k1p, k2p
+        return self.k1u, self.k2u, self.k1p, self.k2p
 
-    def springs(self, of: Material) -> Stations:
+    def springs(self) -> Stations:
         """Contact stations of the law (model, section 5), at the nominal Young's modulus of the material."""
-        return LAWS[self.law].stations(self, of)
+        return LAWS[self.law].stations(self)
 
     def ends(self) -> Array:
         """Distance of the pin's ends from P along its axis, m, the outer one first."""
@@ -379,12 +322,3 @@ class Contact(Strict):
             if carrying and max(carrying)[0] > max(damping, default=-1.0):
                 found.append(max(carrying)[1])
         return sorted(set(found))
-
-    def normal_damping(self, pin: Pin, of: Material) -> float:
-        """Damping c_d (N*s/m): as given, or from the pin as a cantilever, eqs. (6)-(7)."""
-        if self.damping == "given":
-            assert self.c_d is not None
-            return self.c_d
-        assert self.xi is not None
-        mass, _ = pin.body(of.rho)
-        return material.contact_damping(self.xi, mass, length=pin.l, A=pin.A, J=pin.J, E=of.E, rho=of.rho)

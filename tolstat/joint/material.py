@@ -202,3 +202,40 @@ def contact_damping(xi: float, mass: float, *, length: float, A: float, J: float
     """
     omega = (math.pi / length) ** 2 * math.sqrt(E * J / (rho * A))
     return 2.0 * xi * mass * omega
+
+
+def circle(d: float) -> tuple[float, float]:
+    """Area pi d^2/4 (m^2) and area moment pi d^4/64 (m^4) of a circle of diameter `d` (m)."""
+    squared = d * d
+    return math.pi / 4.0 * squared, math.pi / 64.0 * squared * squared
+
+
+def rectangle(width: float, depth: float) -> tuple[float, float, float]:
+    """Area (m^2) and area moments (m^4) of a rectangle: for bending along `depth`, and along `width` (m)."""
+    return width * depth, width * depth**3 / 12.0, depth * width**3 / 12.0
+
+
+def crossed_cylinders(rho: float, d: float, length: float) -> tuple[float, tuple[float, float, float]]:
+    """Mass and inertia of two equal cylinders along x and y that cross at their middles.
+
+    Parameters
+    ----------
+    rho : float
+        Density (kg/m^3).
+    d, length : float
+        Diameter and length of each (m).
+
+    Returns
+    -------
+    mass : float
+        kg.
+    inertia : tuple of float
+        About x, y, z through the middle (kg*m^2).
+    """
+    r = 0.5 * d
+    one = rho * circle(d)[0] * length
+    along, across, _ = cylinder_inertia(one, d, length)
+    # the part that both have in common: |x| and |y| up to sqrt(r^2 - z^2)
+    common, flat, upright = rho * 16.0 / 3.0 * r**3, rho * 112.0 / 45.0 * r**5, rho * 128.0 / 45.0 * r**5
+    in_plane = along + across - flat
+    return 2.0 * one - common, (in_plane, in_plane, 2.0 * across - upright)

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
-from tolstat.common import strict
+from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import data_dir
 from tolstat.common.strict import Strict, refuse
-from tolstat.joint.contact import Contact, keys_valid_for
+from tolstat.joint import derived
+from tolstat.joint.contact import COEFFICIENTS, GIVEN, LAWS, Contact
+from tolstat.joint.derived import DERIVED
+from tolstat.joint.overrides import leaves, overridden
 from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
+
+NO_FIT = "the pin does not fit into the hole: D_P, by default pin.d, is not above zero and up to D_H", "give D_P <= D_H"
 
 
 class Joint(Strict):
@@ -30,11 +35,43 @@ class Joint(Strict):
     material: Material
     pin: Pin
     arm: Arm
-    hub: Hub
-    shaft: Shaft
     cross: Cross
+    hub: Hub = Field(default=Hub(), validate_default=True)
+    shaft: Shaft
     bushing: Bushing
     contact: Contact
+    _inherited: tuple[Fault, ...] = ()
+
+    @field_validator("pin", "arm", "cross", "hub", "bushing", "contact")
+    @classmethod
+    def _complete(cls, value: BaseModel, info: ValidationInfo) -> BaseModel:
+        """Fill in the keys that follow from others; refuse a section that lacks one which does not."""
+        name = str(info.field_name)
+        section = derived.completed(name, value, info.data)
+        exempt = [f"contact.{key}" for key in COEFFICIENTS] if getattr(section, "law", None) == GIVEN else []
+        lacking = derived.missing(name, section, info.data, exempt)
+        if lacking:
+            raise refuse(*_lacking(lacking, section))
+        return section
+
+    @field_validator("cross")
+    @classmethod
+    def _holds_the_pins(cls, value: Cross, info: ValidationInfo) -> Cross:
+        if value.r_b is not None and not value.r_b > 0.0:
+            raise refuse("R is not larger than pin.l", "give cross.R > pin.l, or cross.r_b")
+        return value
+
+    @field_validator("contact")
+    @classmethod
+    def _bears(cls, value: Contact, info: ValidationInfo) -> Contact:
+        """Refuse diameters that do not go together."""
+        if "pin" not in info.data:
+            return value
+        if abs(0.5 * (value.D_H - value.D_P) - value.clearance) > 1e-9:
+            raise refuse("D_H, D_P and clearance contradict each other", "remove one of the three")
+        if not 0.0 < value.D_P <= value.D_H:
+            raise refuse(*NO_FIT)
+        return value
 
     @field_validator("contact")
     @classmethod
@@ -48,32 +85,71 @@ class Joint(Strict):
 
     @field_validator("contact")
     @classmethod
-    def _fits_hertz(cls, value: Contact, info: ValidationInfo) -> Contact:
+    def _stiffens(cls, value: Contact, info: ValidationInfo) -> Contact:
         """Refuse a load range in which eq. (3) stops rising, because the logarithms of 2 D / b become negative."""
-        of = info.data.get("material")
-        if value.coefficients == "fitted" and of is not None and not min(value.stiffness(of)) > 0.0:
+        if value.law == GIVEN or not info.data.keys() >= {"material", "pin"}:
+            return value
+        k1u, k2u, k1p, k2p = value.coefficients()
+        if not (k1u >= 0.0 and k2u > 0.0):
             raise refuse("the fit to eq. (3) gives no stiffening contact", "give a smaller contact.fit_load")
+        if LAWS[value.law].middle and (2.0 * k1p > k1u or 2.0 * k2p > k2u):
+            found = "two ends are stiffer than uniform contact: the middle station would be negative"
+            raise refuse(found, "give smaller k1p and k2p, or another law")
         return value
 
     def warnings(self) -> list[Fault]:
         """Settings that can be simulated but are probably not intended, by key path in the joint file."""
         found = "can touch alone with weight 0: nothing damps the whirl of the pin there"
         remedy = "give it a weight, or a station with a weight beyond it"
-        return [Fault(f"contact.stations[{i}]", found, remedy) for i in self.contact.undamped_ends()]
+        stations = [Fault(f"contact.stations[{i}]", found, remedy) for i in self.contact.undamped_ends()]
+        overlap = []
+        if 2.0 * self.cross.r_b < self.pin.d:
+            found = f"{1e3 * self.cross.r_b:.4g} mm is less than half of pin.d: the pins overlap in the hub"
+            overlap = [Fault("cross.r_b", found, "give pin.l, from the hub to the middle of the hole, or cross.r_b")]
+        return [*self._inherited, *overlap, *stations]
+
+    def given(self, mode: Literal["json", "python"] = "python") -> dict[str, Any]:
+        """Sections with the keys that were given, without those that follow from them.
+
+        Parameters
+        ----------
+        mode : str
+            ``python``: SI values; ``json``: quantities as a file writes them.
+        """
+        return self.model_dump(mode=mode, exclude_unset=True)
 
     @property
     def k_cross(self) -> Array:
         """Stiffness of a cross bushing (N/m, N*m/rad), shape (6,): the beam's z, x, y are e, t, z."""
-        given = self.bushing.cross if self.bushing.stiffness == "given" else None
-        k = given or self.pin.beam(self.material)
+        k = self.bushing.cross
         return np.array([k.k_z, k.k_x, k.k_y, k.k_tz, k.k_bx, k.k_by])
 
     @property
     def k_fork(self) -> Array:
         """Stiffness of a fork bushing (N/m, N*m/rad), shape (6,): the beam's y, x, z are e, t, z."""
-        given = self.bushing.fork if self.bushing.stiffness == "given" else None
-        k = given or self.arm.beam(self.material)
+        k = self.bushing.fork
         return np.array([k.k_y, k.k_x, k.k_z, k.k_by, k.k_bx, k.k_tz])
+
+
+def _lacking(keys: list[str], section: BaseModel) -> tuple[str, str]:
+    """Fault and remedy of a section without `keys`, which cannot be derived."""
+    if isinstance(section, Hub):
+        found = "the pins overlap in the hub: its mass and inertia do not follow from pin.d and cross.r_b"
+        return found, "give pin.l, from the hub to the middle of the hole, or hub.mass and hub.inertia"
+    if isinstance(section, Contact):
+        if section.D_H is None:
+            return "missing key", "give clearance, the radial clearance, or D_H"
+        if not 0.0 < section.D_P <= section.D_H:
+            return NO_FIT
+        if section.D_H == section.D_P:
+            return "eq. (3) has no value without clearance", "give a clearance above zero, or k1u and k2u"
+    names = [key.rpartition(".")[2] for key in keys]
+    sources = dict.fromkeys(of for key in keys for of in DERIVED[key].follows if of not in keys)
+    left_out = [of.partition(".")[2] for of in sources if derived.get(section, of.partition(".")[2]) is None]
+    left_out = [name for name in left_out if name in type(section).model_fields]
+    them = "it" if len(names) == 1 else "them"
+    instead = f", or {' and '.join(left_out)}" if left_out else ""
+    return f"missing {'key' if len(names) == 1 else 'keys'} {', '.join(names)}", f"give {them}{instead}"
 
 
 def load(
@@ -112,9 +188,11 @@ def load(
     data = strict.read_toml(path)
     with strict.lines_of(path):
         try:
-            return strict.validate(Joint, overridden(data, overrides), place)
+            joint = strict.validate(Joint, overridden(data, overrides), place)
         except InputError as error:
             raise InputError(_attributed(error.faults, data, path, place, section)) from error
+    joint._inherited = tuple(_inherited(joint, data, overrides, path))
+    return joint
 
 
 def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
@@ -128,25 +206,6 @@ def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
     close = difflib.get_close_matches(str(base), names, n=1)
     known = f"did you mean {close[0]!r}?" if close else f"write one of {', '.join(names)}, or a path to a .toml file"
     raise InputError([Fault(f"{place}.base", f"no joint is named {str(base)!r}", known)])
-
-
-def overridden(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace keys of a joint by those of `over`; where `over` sets a contact law, remove the keys of other laws."""
-    contact, own = data.get("contact"), over.get("contact")
-    if isinstance(contact, Mapping) and isinstance(own, Mapping) and "law" in own:
-        data = {**data, "contact": keys_valid_for(contact, own["law"])}
-    return merged(data, over)
-
-
-def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace keys of `data` by those of `over`, table by table."""
-    result = dict(data)
-    for key, value in over.items():
-        below = result.get(key)
-        if isinstance(below, Mapping) and isinstance(value, Mapping):
-            value = merged(below, value)
-        result[key] = value
-    return result
 
 
 def _attributed(
@@ -163,3 +222,28 @@ def _attributed(
         key = f.place.removeprefix(f"{place}: ")
         attributed.append(own.get((key, f.found)) or Fault(f"{place}: {section}.{key}", f.found, f.remedy))
     return attributed
+
+
+def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], path: Path) -> Iterator[Fault]:
+    """Warn of values of the joint file that an override leaves, although it gives keys that they follow from."""
+    given, held = leaves(over).keys(), leaves(data)
+    changed = derived.changed(given, held)
+    stay = held.keys() - changed - derived.replaced(given, held)
+    for key, (expected, reason, instead) in derived.expected(joint, given, changed, stay).items():
+        text, unit = held[key], derived.UNITS[key]
+        words = [_written(one, unit, like) for one, like in zip(*map(_listed, (expected, text)), strict=True)]
+        new = _quoted(words if isinstance(text, list) else words[0])
+        remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
+        yield Fault(key, f"{_quoted(text)} is inherited from {path.stem}; {reason} {new}", remedy)
+
+
+def _listed(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (list, tuple)) else [value]
+
+
+def _quoted(value: Any) -> str:
+    return f"[{', '.join(value)}]" if isinstance(value, list) else str(value)
+
+
+def _written(value: float, unit: str, like: object) -> str:
+    return str(units.written(value, unit, like, digits=3))

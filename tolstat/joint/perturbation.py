@@ -24,6 +24,9 @@ Table = NDArray[np.void]
 PIN_TRIADS: Array = TRIAD[PIN : PIN + 4]
 """Rows e, t, z of pins 1 to 4 in axes of the cross frame C; shape (4, 3, 3)."""
 
+HOLE_OF_PIN = {pin: HOLES[arm] for pin, arm in zip(PINS, ARM_OF_PIN, strict=True)}
+"""Hole in which each pin turns."""
+
 ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
 """Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
 
@@ -74,9 +77,9 @@ def nominal_errors(n: int, operation: Operation) -> Table:
 def perturb(joint: Joint, errors: Table) -> Table:
     """Turn a table of errors into a table of parameters of the mechanical model.
 
-    Position errors, tilts and diameters affect the contacts only: they change no marker, mass, inertia or stiffness.
-    The factor on E scales stiffness and contact coefficients in proportion and bushing damping by its square root,
-    eq. (12); it does not change contact damping.
+    Position errors, tilts, diameters and clearances affect the contacts only: they change no marker, mass, inertia or
+    stiffness. The factor on E scales stiffness and contact coefficients in proportion and bushing damping by its
+    square root, eq. (12); it does not change contact damping.
 
     Parameters
     ----------
@@ -105,16 +108,16 @@ def perturb(joint: Joint, errors: Table) -> Table:
     for i in range(4):
         params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, PINS[i], PIN_TRIADS[i])
         params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, HOLES[i], ARM_TRIADS[i])
-        hole = errors[f"{HOLES[ARM_OF_PIN[i]]}.diameter"]
-        params["clearance"][:, i] = _clearance(joint.contact, hole, errors[f"{PINS[i]}.diameter"])
+        hole = errors[f"{HOLE_OF_PIN[PINS[i]]}.diameter"]
+        pin, own = errors[f"{PINS[i]}.diameter"], errors[f"{PINS[i]}.clearance"]
+        params["clearance"][:, i] = _clearance(joint.contact, hole, pin, own)
     return params
 
 
 def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that do not depend on the errors, at factor 1 on E."""
-    pin_mass, pin_inertia = joint.pin.body(joint.material.rho)
-    arm_mass, arm_inertia = joint.arm.body(joint.material.rho)
-    stations = joint.contact.springs(joint.material)
+    pin, arm = joint.pin, joint.arm
+    stations = joint.contact.springs()
     n_stations = len(stations.s)
     padding = (0, MAX_STATIONS - n_stations)
     xi = joint.bushing.xi
@@ -125,15 +128,15 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "l_f": joint.arm.l_f,
         "hub_mass": joint.hub.mass,
         "hub_inertia": joint.hub.inertia,
-        "pin_mass": pin_mass,
-        "pin_inertia": pin_inertia,
-        "arm_mass": arm_mass,
-        "arm_inertia": arm_inertia,
+        "pin_mass": pin.mass,
+        "pin_inertia": pin.inertia,
+        "arm_mass": arm.mass,
+        "arm_inertia": arm.inertia,
         "k_cross": joint.k_cross,
-        "c_cross": material.bushing_damping(joint.k_cross, pin_mass, pin_inertia, xi),
+        "c_cross": material.bushing_damping(joint.k_cross, pin.mass, np.array(pin.inertia), xi),
         "k_fork": joint.k_fork,
-        "c_fork": material.bushing_damping(joint.k_fork, arm_mass, arm_inertia, xi),
-        "c_d": joint.contact.normal_damping(joint.pin, joint.material),
+        "c_fork": material.bushing_damping(joint.k_fork, arm.mass, np.array(arm.inertia), xi),
+        "c_d": joint.contact.c_d,
         "c_t": joint.contact.c_t,
         "delta_d": joint.contact.delta_d,
         "n_stations": n_stations,
@@ -158,11 +161,12 @@ def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
     return np.asarray(point), axis
 
 
-def _clearance(contact: Contact, hole: Array, pin: Array) -> Array:
-    """Radial clearance (m) from deviations (m) of both diameters, shape (n,); rounding errors about zero become zero.
+def _clearance(contact: Contact, hole: Array, pin: Array, own: Array) -> Array:
+    """Radial clearance (m) from deviations (m) of both diameters and of its own, shape (n,).
 
-    Otherwise a pin meant to fit exactly could have an interference fit of 1e-17 m.
+    Rounding errors about zero become zero: otherwise a pin meant to fit exactly could have an interference fit of
+    1e-17 m.
     """
-    clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin))
+    clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin)) + own
     clearance[np.abs(clearance) < 4.0 * np.finfo(float).eps * contact.D_H] = 0.0
     return np.asarray(clearance)

@@ -1,20 +1,20 @@
-"""The sections of a joint file for its bodies and bushings, and the quantities derived from a single section.
+"""The sections of a joint file for its bodies and bushings.
 
-`data/joints/cirelli2021.toml` says where the value of each key comes from. An optional key that is left
-out is ``None``; the section's methods give the resolved value.
+`data/joints/cirelli2021.toml` says where the value of each key comes from. A key with the default `FOLLOWS` may be left
+out: `Joint` fills it in by the formula of `derived.DERIVED`.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, Field
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
-from tolstat.joint import material
+from tolstat.joint.derived import DERIVED
 
 Array = NDArray[np.float64]
 
@@ -52,12 +52,34 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
 Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
 
 
-def require(value: object, info: ValidationInfo, selector: str, words: tuple[str, ...], instead: str) -> None:
-    """Raise when a key is missing although the key `selector` of its section has one of the values `words`."""
-    word = info.data.get(selector)
-    if value is None and word in words:
-        remedy = f'add {info.field_name}, or write {selector} = "{instead}"'
-        raise refuse(f'missing key, needed with {selector} = "{word}"', remedy)
+PIN_INERTIA = ["5.78e-5 kg*m^2", "6.42e-5 kg*m^2", "6.42e-5 kg*m^2"]
+ARM_INERTIA = ["1.40e-4 kg*m^2", "5.31e-5 kg*m^2", "1.11e-4 kg*m^2"]
+"""Examples: those of the joint of Cirelli et al. (2021)."""
+FOLLOWS: Any = None
+"""Default of a key that follows from others where it is left out."""
+PIN_CHI, ARM_CHI = 1.11, 1.2
+"""Shear factors of a circular and of a rectangular section, Cirelli et al. (2021), above Table 3."""
+
+
+def follows(key: str, meaning: str, *examples: Any) -> Any:
+    """Field of a key of `DERIVED`: its meaning, and the formula that it follows by."""
+    return Field(description=f"{meaning}; when left out: {DERIVED[key].formula}", examples=list(examples) or None)
+
+
+def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
+    """SI unit of each quantity of a model, by dotted key; lists of quantities are left out."""
+    found: dict[str, str] = {}
+    for key, field in model.model_fields.items():
+        kinds = [field.annotation, *field.metadata]
+        while kinds:
+            kind = kinds.pop()
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                found |= quantities(kind, f"{before}{key}.")
+            elif isinstance(kind, units.Quantity):
+                found[f"{before}{key}"] = kind.unit
+            elif get_origin(kind) is not tuple:
+                kinds += [*get_args(kind), *getattr(kind, "__metadata__", ())]
+    return found
 
 
 class Material(Strict):
@@ -75,77 +97,42 @@ class Pin(Strict):
     """Each of the four pins: a round beam along its axis e, clamped at the hub, its mass lumped at its end."""
 
     l: Annotated[Length, Field(description="length of the beam, from the hub to the middle of the contact")]  # noqa: E741
-    A: Annotated[Area, Field(description="area of the section")]
-    J: Annotated[AreaMoment, Field(description="area moment of the section")]
-    Jp: Annotated[
-        AreaMoment | None, Field(description="polar moment of the section; when left out: 2 J, that of a circle")
-    ] = None
-    chi: Annotated[Number, Field(description="shear factor of the section, 1.11 for a circle")]
-    d: Annotated[Diameter, Field(description="diameter of the solid cylinder whose inertia the pin has")]
-    mass: Annotated[Mass | None, Field(description="mass; when left out: rho A l")] = None
-    inertia: Annotated[
-        Triple | None,
-        Field(
-            description="moments of inertia about e, t, z; when left out: those of a solid cylinder of this "
-            "diameter, length and mass",
-            examples=[["5.78e-5 kg*m^2", "6.42e-5 kg*m^2", "6.42e-5 kg*m^2"]],
-        ),
-    ] = None
-
-    def body(self, rho: float) -> tuple[float, Array]:
-        """Mass (kg) and inertia about (e, t, z) (kg*m^2, shape (3,)) at density `rho` (kg/m^3).
-
-        Values that are not given follow from rho A l and from a solid cylinder of diameter d.
-        """
-        mass = rho * self.A * self.l if self.mass is None else self.mass
-        return mass, np.array(self.inertia or material.cylinder_inertia(mass, self.d, self.l))
-
-    def beam(self, of: Material) -> material.BeamStiffness:
-        """Stiffness from geometry, eqs. (9)-(11)."""
-        Jp = 2.0 * self.J if self.Jp is None else self.Jp
-        return material.beam_stiffness(of.E, of.G, length=self.l, A=self.A, Jx=self.J, Jy=self.J, Jp=Jp, chi=self.chi)
+    d: Annotated[Diameter, Field(description="diameter of the beam")]
+    chi: Annotated[Number, Field(description="shear factor of the section")] = PIN_CHI
+    A: Annotated[Area, follows("pin.A", "area of the section")] = FOLLOWS
+    J: Annotated[AreaMoment, follows("pin.J", "area moment of the section")] = FOLLOWS
+    Jp: Annotated[AreaMoment, follows("pin.Jp", "polar moment of the section")] = FOLLOWS
+    mass: Annotated[Mass, follows("pin.mass", "mass")] = FOLLOWS
+    inertia: Annotated[Triple, follows("pin.inertia", "moments of inertia about e, t, z", PIN_INERTIA)] = FOLLOWS
 
 
 class Arm(Strict):
-    """Each of the four arms: a beam along the shaft, clamped at its fork, its mass lumped at the hole's centre."""
+    """Each of the four arms: a beam along the shaft, clamped at its fork, its mass lumped at the hole's centre.
+
+    A rectangular section needs only its `width` and `depth`; for another give `A`, `Jx` and `Jy`.
+    """
 
     l_f: Annotated[Length, Field(description="length of the beam, from its fork to the hole's centre")]
-    A: Annotated[Area, Field(description="area of the section")]
-    Jx: Annotated[AreaMoment, Field(description="area moment about x, the local t")]
-    Jy: Annotated[AreaMoment, Field(description="area moment about y, the local e")]
-    Jp: Annotated[AreaMoment, Field(description="polar moment of the section")]
-    chi: Annotated[Number, Field(description="shear factor of the section, 1.2 for a rectangle")]
-    mass: Annotated[Mass | None, Field(description="mass; when left out: rho A l_f")] = None
-    inertia: Annotated[
-        Triple | None,
-        Field(
-            description="moments of inertia about e, t, z; when left out: those of a box with the area moments "
-            "of the section, l_f long along z",
-            examples=[["1.40e-4 kg*m^2", "5.31e-5 kg*m^2", "1.11e-4 kg*m^2"]],
-        ),
+    width: Annotated[Length | None, Field(description="side of a rectangular section along t", examples=["58 mm"])] = (
+        None
+    )
+    depth: Annotated[
+        Length | None, Field(description="side of a rectangular section along e, the hole's axis", examples=["21 mm"])
     ] = None
-
-    def body(self, rho: float) -> tuple[float, Array]:
-        """Mass (kg) and inertia about (e, t, z) (kg*m^2, shape (3,)) at density `rho` (kg/m^3).
-
-        Values that are not given follow from rho A l_f and from a box with the section's area moments.
-        """
-        mass = rho * self.A * self.l_f if self.mass is None else self.mass
-        box = material.box_inertia(mass, self.A, self.Jx, self.Jy, self.l_f)
-        return mass, np.array(self.inertia or box)
-
-    def beam(self, of: Material) -> material.BeamStiffness:
-        """Stiffness from geometry, eqs. (9)-(11)."""
-        return material.beam_stiffness(
-            of.E, of.G, length=self.l_f, A=self.A, Jx=self.Jx, Jy=self.Jy, Jp=self.Jp, chi=self.chi
-        )
+    chi: Annotated[Number, Field(description="shear factor of the section")] = ARM_CHI
+    A: Annotated[Area, follows("arm.A", "area of the section")] = FOLLOWS
+    Jx: Annotated[AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
+    Jy: Annotated[AreaMoment, follows("arm.Jy", "area moment about y, the local e")] = FOLLOWS
+    Jp: Annotated[AreaMoment, follows("arm.Jp", "polar moment of the section")] = FOLLOWS
+    mass: Annotated[Mass, follows("arm.mass", "mass", "0.3516 kg")] = FOLLOWS
+    inertia: Annotated[Triple, follows("arm.inertia", "moments of inertia about e, t, z", ARM_INERTIA)] = FOLLOWS
 
 
 class Hub(Strict):
     """Middle of the cross, to which the four pins are attached."""
 
-    mass: Annotated[Mass, Field(description="mass")]
-    inertia: Annotated[Triple, Field(description="moments of inertia about x, y, z of the cross")]
+    mass: Annotated[Mass, follows("hub.mass", "mass")] = FOLLOWS
+    inertia: Annotated[Triple, follows("hub.inertia", "moments of inertia about x, y, z of the cross")] = FOLLOWS
 
 
 class Shaft(Strict):
@@ -158,40 +145,36 @@ class Cross(Strict):
     """Main dimensions of the cross."""
 
     R: Annotated[Length, Field(description="distance from the centre of the joint to the middle of pin and hole")]
-    r_b: Annotated[Length, Field(description="distance from the centre of the joint to the marker of a cross bushing")]
+    r_b: Annotated[
+        Length, follows("cross.r_b", "distance from the centre of the joint to the marker of a cross bushing")
+    ] = FOLLOWS
 
 
-class BeamAxes(Strict):
-    """Stiffness of a bushing in beam axes: z along the beam, x the local t, y the third, of a pin z, of an arm e."""
+class PinBushing(Strict):
+    """Stiffness of a pin in beam axes: z along the beam (local e), x the local t, y the local z."""
 
-    k_x: Annotated[Stiffness, Field(description="shear along x")]
-    k_y: Annotated[Stiffness, Field(description="shear along y")]
-    k_z: Annotated[Stiffness, Field(description="tension")]
-    k_bx: Annotated[RotaryStiffness, Field(description="bending about x")]
-    k_by: Annotated[RotaryStiffness, Field(description="bending about y")]
-    k_tz: Annotated[RotaryStiffness, Field(description="torsion")]
+    k_x: Annotated[Stiffness, follows("bushing.cross.k_x", "shear along x")] = FOLLOWS
+    k_y: Annotated[Stiffness, follows("bushing.cross.k_y", "shear along y")] = FOLLOWS
+    k_z: Annotated[Stiffness, follows("bushing.cross.k_z", "tension")] = FOLLOWS
+    k_bx: Annotated[RotaryStiffness, follows("bushing.cross.k_bx", "bending about x")] = FOLLOWS
+    k_by: Annotated[RotaryStiffness, follows("bushing.cross.k_by", "bending about y")] = FOLLOWS
+    k_tz: Annotated[RotaryStiffness, follows("bushing.cross.k_tz", "torsion")] = FOLLOWS
+
+
+class ArmBushing(Strict):
+    """Stiffness of an arm in beam axes: z along the shaft, x the local t, y the local e."""
+
+    k_x: Annotated[Stiffness, follows("bushing.fork.k_x", "shear along x")] = FOLLOWS
+    k_y: Annotated[Stiffness, follows("bushing.fork.k_y", "shear along y")] = FOLLOWS
+    k_z: Annotated[Stiffness, follows("bushing.fork.k_z", "tension")] = FOLLOWS
+    k_bx: Annotated[RotaryStiffness, follows("bushing.fork.k_bx", "bending about x")] = FOLLOWS
+    k_by: Annotated[RotaryStiffness, follows("bushing.fork.k_by", "bending about y")] = FOLLOWS
+    k_tz: Annotated[RotaryStiffness, follows("bushing.fork.k_tz", "torsion")] = FOLLOWS
 
 
 class Bushing(Strict):
     """Bushings, the elasticity of pins and arms: three springs and three torsion springs each, eq. (8)."""
 
-    stiffness: Annotated[
-        Literal["given", "beam"],
-        Field(
-            description="`given`: by the tables `cross` and `fork`, whatever material and dimensions are; "
-            "`beam`: by material and sections of pin and arm, eqs. (9)-(11)"
-        ),
-    ]
     xi: Annotated[Ratio, Field(description="damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
-    cross: BeamAxes | None = Field(
-        default=None, validate_default=True, description="Stiffness of a pin's bushing, needed with `given`"
-    )
-    fork: BeamAxes | None = Field(
-        default=None, validate_default=True, description="Stiffness of an arm's bushing, needed with `given`"
-    )
-
-    @field_validator("cross", "fork")
-    @classmethod
-    def _given(cls, value: BeamAxes | None, info: ValidationInfo) -> BeamAxes | None:
-        require(value, info, "stiffness", ("given",), "beam")
-        return value
+    cross: Annotated[PinBushing, Field(description="Stiffness of a pin's bushing")] = PinBushing()
+    fork: Annotated[ArmBushing, Field(description="Stiffness of an arm's bushing")] = ArmBushing()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tolstat.joint.contact import Station
+from tolstat.common.strict import validate
 from tolstat.joint.model import Joint
-from tolstat.joint.sections import BeamAxes
+from tolstat.joint.overrides import laid_over, leaves
 
 
 def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
@@ -18,32 +18,24 @@ def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
     joint : Joint
         The joint of the study.
     values : mapping
-        `Variant.values`: dotted key of the joint to SI value or string; keys of other sections are ignored.
+        `Variant.values`: dotted key of the joint to SI value or string, None for a key that follows from others; keys
+        of other sections are ignored.
     """
-    sections: dict[str, dict[str, Any]] = {}
+    own = {key: value for key, value in values.items() if key.partition(".")[0] in Joint.model_fields}
+    if not own:
+        return joint
+    kept = {key: value for key, value in leaves(joint.given()).items() if key not in own}
+    new = {key: value for key, value in own.items() if value is not None}
+    return validate(Joint, laid_over(_tables(kept), _tables(new)), "joint", context={"si": True})
+
+
+def _tables(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables from dotted keys."""
+    found: dict[str, Any] = {}
     for key, value in values.items():
-        section, _, name = key.partition(".")
-        if section not in Joint.model_fields:
-            continue
-        sections.setdefault(section, {})[name] = tuple(map(_item, value)) if isinstance(value, list) else value
-    update = {name: _section(getattr(joint, name), own) for name, own in sections.items()}
-    return joint.model_copy(update=update)
-
-
-def _item(value: Any) -> Any:
-    """Convert an item of a list: a contact station, or a number."""
-    return Station.model_construct(**value) if isinstance(value, Mapping) else value
-
-
-def _section(section: Any, values: Mapping[str, Any]) -> Any:
-    """Copy a section with new values; a dotted key belongs to a table in it (the stiffness of a bushing)."""
-    flat = {key: value for key, value in values.items() if "." not in key}
-    tables: dict[str, dict[str, Any]] = {}
-    for key, value in values.items():
-        table, dot, name = key.partition(".")
-        if dot:
-            tables.setdefault(table, {})[name] = value
-    for table, own in tables.items():
-        before = getattr(section, table)
-        flat[table] = before.model_copy(update=own) if before is not None else BeamAxes.model_construct(**own)
-    return section.model_copy(update=flat)
+        *path, name = key.split(".")
+        table = found
+        for part in path:
+            table = table.setdefault(part, {})
+        table[name] = value
+    return found

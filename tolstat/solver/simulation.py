@@ -194,6 +194,7 @@ def simulate_rows(
         results[others], _ = simulate(others, options)
     refinement.refine(results, options, simulate)
     stationary.fill_intervals(results)
+    results["clearance"] = params["clearance"]
     return Simulation(results, kept)
 
 

@@ -69,13 +69,13 @@ class CheckedTables(Numbering):
         Raises
         ------
         StoreError
-            When the study does not list its joints, or the table is damaged.
+            When all rows have the study's joint, or the table is damaged.
         """
         if "design" not in self._file:
-            remedy = 'give the result file of a study with sampling.method = "cases"'
-            raise store_error(self.path, "has no list of cases and variants", remedy)
+            remedy = 'give the result file of a study with sampling.method = "cases", or of a sweep of dimensions'
+            raise store_error(self.path, "has no list of variants", remedy)
         table = self._described("design", slice(None))
-        for name, end in (("variant", len(self.variants)), ("case", len(self.case_names))):
+        for name, end in (("variant", len(self.variants)), ("case", len(self.case_names) or 1)):
             if table[name].min() < 0 or table[name].max() >= end:
                 found = f"is damaged: design/{name} is not between 0 and {end - 1}"
                 raise store_error(self.path, found, RUN_AGAIN)

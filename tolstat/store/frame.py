@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tolstat.common import draw_records
 from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.errors import Fault, InputError
+from tolstat.store import recorded
 from tolstat.store.meanings import LABELS
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
         data["nominal"] = np.arange(store.n) < store.first_sample
     if store.case_names:
         data |= _design(store)
+    elif store.variants:
+        data |= {name: values[rows] for name, values in recorded.swept(store).items()}
     drawn = draw_records.columns(store.sampling)
     if drawn:
         origin = store.origin(rows)

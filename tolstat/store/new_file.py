@@ -72,7 +72,7 @@ def attributes(
     sampling = study.sampling.model_dump(mode="json")
     structured = {
         "identity": study.identity(),
-        "joint": study.joint.model_dump(mode="json"),
+        "joint": study.joint.given("json"),
         "options": to_names(options or study.solver.options()),
         "fidelity": dict(fidelity or {}),
         "design": {"cases": study.case_names, "variants": [variant._asdict() for variant in study.variants]},

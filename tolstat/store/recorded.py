@@ -13,9 +13,11 @@ from tolstat.common.solver_options import from_names, unknown_names
 from tolstat.common.strict import validate
 from tolstat.common.tables import PARAM, Options
 from tolstat.joint import Joint, perturb, varied
+from tolstat.joint.derived import get
 from tolstat.solver import fidelity
 from tolstat.study.design import nested
 from tolstat.study.model import Solver
+from tolstat.study.swept import KEYS
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -66,6 +68,16 @@ def settings(solver: Solver, choice: dict[str, Any]) -> Options:
     return fidelity.apply(options, choice) if solver.fidelity == "auto" else options
 
 
+def swept(store: Reader) -> dict[str, NDArray[np.float64]]:
+    """Dimensions that a sweep varies: dotted key to the value of every joint, (n,), in the unit of `swept.KEYS`."""
+    names = [name for names, *_ in store.identity.get("sweep", []) for name in names if name in KEYS]
+    if not names:
+        return {}
+    nominal, variant = validate(Joint, store.joint, f"{store.path}: joint"), store.design()["variant"]
+    joints = [varied(nominal, one.values) for one in store.variants]
+    return {name: np.array([get(joint, name) for joint in joints])[variant] for name in names}
+
+
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
     """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
     params = np.empty(len(rows), PARAM)
@@ -92,5 +104,5 @@ def variants(study: Study, rows: NDArray[np.intp]) -> NDArray[np.integer]:
 
 
 def _values(store: Reader, row: int) -> dict[str, Any]:
-    """Values that define the variant of file slot `row`; empty if the study lists no variants."""
-    return store.variants[store.design()["variant"][row]].values if store.case_names else {}
+    """Values that define the variant of file slot `row`; empty if all rows have the study's joint."""
+    return store.variants[store.design()["variant"][row]].values if store.variants else {}

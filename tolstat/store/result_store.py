@@ -88,7 +88,7 @@ class ResultStore(Reader):
             check_disk_space(path, size_of_new(len(held), selected_results.columns(study.identity())))
             with atomic_write(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
                 blocks = [errors] if isinstance(errors, np.ndarray) else errors
-                design = study.design[held.start : held.stop] if study.case_names else None
+                design = study.design[held.start : held.stop] if study.variants else None
                 attrs = attributes(study, specs, dimensions or {}, options, fidelity)
                 fill(file, attrs, held, blocks, design, origin)
         except FileExistsError as error:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import merged
+from tolstat.joint.overrides import merged
 from tolstat.study.model import Solver
 
 IDEAL = "ideal"

@@ -14,13 +14,14 @@ from tolstat.common.loads import LOADS, UNIT_OF_LOAD
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import merged
-from tolstat.study import fatigue, listing, proposal, selection
+from tolstat.joint.overrides import merged
+from tolstat.study import fatigue, listing, proposal, selection, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
+from tolstat.study.swept import KEYS, Swept
 from tolstat.study.tolerances import fits, reading
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
 from tolstat.study.tolerances.entry import Site
@@ -129,9 +130,9 @@ class StudyFile:
         return None
 
     def _diameters(self, fit: Fit, overrides: Mapping[str, Any]) -> dict[str, str]:
-        """Nominal diameters of the fit; note diameters that the study sets beside it."""
+        """Nominal diameters of the fit; note diameters and clearance that the study sets beside it."""
         own = overrides.get("contact")
-        for key in fit.diameters:
+        for key in (*fit.diameters, "clearance"):
             if isinstance(own, Mapping) and key in own:
                 self._fault(("joint", "contact", key), "is set by tolerances.fit already", "remove one of the two")
         return fit.diameters
@@ -189,14 +190,22 @@ class StudyFile:
         axes = []
         for entry in self._entries("sweep"):
             with gather(self._faults):
-                names = selection.resolve(entry, UNITS, self.place)
+                errors = selection.select(entry.pattern, UNITS)
+                names = selection.resolve(entry, UNITS if errors else UNITS | KEYS, self.place)
                 with gather(self._faults):
                     self._claims.claim(entry, names)
-                site = Site(names[0], UNITS[names[0]], 0.0, self.path.parent)
+                site = Site(names[0], (UNITS | KEYS)[names[0]], 0.0, self.path.parent)
                 context = {"site": site}
                 read = strict.validate(SweepEntry, entry.value, self.place, prefix=entry.path, context=context)
                 axes.append(SweepAxis(tuple(names), read.start, read.stop, read.points))
         return tuple(axes)
+
+    def swept(self, nominal: listing.Nominal, sweep: tuple[SweepAxis, ...], nominal_first: bool) -> Swept | None:
+        """Joints of a sweep of dimensions; None if it sweeps errors alone."""
+        variants = listing.Variants(self._table("joint"), nominal, self.place, self.path.parent)
+        with gather(self._faults):
+            return swept.read(sweep, variants, nominal.joint, nominal_first, self.place)
+        return None
 
     def limits(self) -> dict[str, float]:
         """``[limits]``: limit of each load that has one (SI)."""

@@ -13,7 +13,7 @@ from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.notation import DIAMETER
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import merged, overridden
+from tolstat.joint.overrides import laid_over
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
 from tolstat.study.listed import CaseEntry, Range, VariantEntry
@@ -83,7 +83,7 @@ def read(data: Mapping[str, Any], nominal: Nominal | None, place: str, folder: P
         cases |= _cases(data.get("case", []), axes, place, faults)
     if nominal is not None:
         with gather(faults):
-            variants = _Variants(data["joint"], nominal, place, folder).read(data.get("variant", []), list(cases))
+            variants = Variants(data["joint"], nominal, place, folder).read(data.get("variant", []), list(cases))
             faults += _clashes(data.get("variant", []), axes, place)
     points = tuple(_points(axes))
     rows = len(points) * sum(len(one.run) for one in variants)
@@ -153,7 +153,7 @@ def _clashes(section: list[Any], axes: list[Axis], place: str) -> list[Fault]:
     ]
 
 
-class _Variants:
+class Variants:
     """``[[variant]]``: joints made from the study's joint by the keys of each entry.
 
     Parameters
@@ -200,18 +200,18 @@ class _Variants:
         return [cases.index(name) for name in names]
 
     def _expanded(self, entry: VariantEntry, run: list[int], at: Section) -> list[Listed]:
-        keys = overridden(self._study, entry.joint)
-        made = [self._joint(keys, (*at, "joint"))]
+        keys = laid_over(self._study, entry.joint)
+        made = [self._loaded(keys, (*at, "joint"))]
         ranges = dict(_ranges(entry.vary, (*at, "vary"), self._place))
         if ranges:
             members = self._members(entry, keys, ranges, (*at, "vary"))
-            made = [self._joint(merged(keys, own), (*at, "vary")) for own in members]
+            made = [self._loaded(laid_over(keys, own), (*at, "vary")) for own in members]
         operation, solver = self._settings(entry, at)
         own = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
         own |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
         written = [key for key, _ in flat(entry.joint)] + list(ranges)
         return [
-            Listed(Variant(entry.name, self._values(joint, written) | own, entry.note), joint, operation, solver, run)
+            Listed(Variant(entry.name, self.values(joint, written) | own, entry.note), joint, operation, solver, run)
             for joint in made
         ]
 
@@ -238,7 +238,7 @@ class _Variants:
         """Keys of each joint of a family, as a joint file writes them."""
         assert entry.points is not None
         ends = [{key: getattr(r, end) for key, r in ranges.items()} for end in ("start", "stop")]
-        start, stop = (self._joint(merged(keys, nested(end)), at) for end in ends)
+        start, stop = (self._loaded(laid_over(keys, nested(end)), at) for end in ends)
         low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
         faults = []
         for key in ranges:
@@ -260,14 +260,19 @@ class _Variants:
             nested({key: _written(value, text[key], ranges[key].start) for key, value in own.items()}) for own in values
         ]
 
-    def _joint(self, keys: Mapping[str, Any], at: Section) -> Joint:
+    def joint(self, over: Mapping[str, Any], at: Section) -> Joint:
+        """Make a joint from the study's by the keys `over`; `at` is their key path in faults."""
+        return self._loaded(laid_over(self._study, over), at)
+
+    def _loaded(self, keys: Mapping[str, Any], at: Section) -> Joint:
         overrides = {key: value for key, value in keys.items() if key != "base"}
         return joint.load(keys["base"], overrides, self._place, self._folder, strict.dotted(at))
 
-    def _values(self, made: Joint, written: list[str]) -> dict[str, Any]:
-        nominal = dict(flat(self._nominal.joint.model_dump(exclude={"description"})))
-        values = dict(flat(made.model_dump(exclude={"description"})))
-        return {key: value for key, value in values.items() if key in written or nominal.get(key) != value}
+    def values(self, made: Joint, written: list[str]) -> dict[str, Any]:
+        """Return the keys `written` and all others in which a joint differs from the study's, see `Variant.values`."""
+        nominal, values = (dict(flat(joint.given())) for joint in (self._nominal.joint, made))
+        keys = [key for key in nominal | values if key != "description"]
+        return {key: values.get(key) for key in keys if key in written or nominal.get(key) != values.get(key)}
 
 
 def _tables(section: Any, name: str, place: str) -> list[Any]:

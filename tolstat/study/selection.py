@@ -17,6 +17,7 @@ from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean, dotted
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import to_si
+from tolstat.joint import HOLE_OF_PIN
 from tolstat.study.axes import PAIRS, ZONE_UNITS, columns_of, compatible, is_zone, zone_of
 
 UNITS = {field.name: field.unit for field in ERROR_FIELDS}
@@ -24,6 +25,10 @@ UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 
 TOLERANCED = UNITS | ZONE_UNITS
 """SI unit of all that ``[tolerances]`` can select: errors, and zones that stand for several of them."""
+
+_DIAMETERS = {f"{pin}.clearance": (f"{pin}.diameter", f"{hole}.diameter") for pin, hole in HOLE_OF_PIN.items()}
+EXCLUDES = _DIAMETERS | {of: (name,) for name, diameters in _DIAMETERS.items() for of in diameters}
+"""Errors that say in another way what an error says: the clearance of a pin, and the diameters of pin and hole."""
 
 
 class Entry(NamedTuple):
@@ -202,20 +207,24 @@ class Assignments:
         Raises
         ------
         InputError
-            When an earlier entry sets one of them.
+            When an earlier entry sets one of them, or the clearance of a pin is set beside one of its two diameters.
         """
         clashes: dict[tuple[int | str, ...], str] = {}
+        both: dict[tuple[int | str, ...], tuple[str, str]] = {}
         for name in names:
             for column in self._columns(entry, name):
                 owners = self._owner.setdefault(column, [])
                 clashes |= {one.path: column for one, other in owners if not compatible(name, other)}
                 owners.append((entry, name))
-        if clashes:
+                for other in EXCLUDES.get(column, ()):
+                    for one, _ in self._owner.get(other, ())[:1]:
+                        both.setdefault(one.path, (column, other))
+        if clashes or both:
             where = f"{self._place}: {dotted(entry.path)}"
             remedy = "remove one of the two, or narrow the pattern"
-            raise InputError(
-                [Fault(where, f"{column} is set by {dotted(path)} already", remedy) for path, column in clashes.items()]
-            )
+            found = [f"{column} is set by {dotted(path)} already" for path, column in clashes.items()]
+            found += [f"{c} is given beside {other} of {dotted(path)}" for path, (c, other) in both.items()]
+            raise InputError([Fault(where, text, remedy) for text in found])
 
     @staticmethod
     def _columns(entry: Entry, name: str) -> tuple[str, ...]:

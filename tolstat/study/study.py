@@ -17,6 +17,7 @@ from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words
 from tolstat.common.strict import with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
+from tolstat.study import listing
 from tolstat.study.axes import Axis
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
@@ -24,6 +25,7 @@ from tolstat.study.file import StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.proposal import Proposal
+from tolstat.study.swept import Swept
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Toleranced
@@ -106,6 +108,8 @@ class Study(Case):
         How many, and how they are drawn.
     sweep : tuple of SweepAxis
         Axes of a grid, the last varying fastest; empty unless ``sampling.method`` is ``sweep``.
+    swept : Swept, optional
+        The joints of a sweep of dimensions; None for other sweeps and methods.
     listed : Design, optional
         The joints listed one by one; None unless ``sampling.method`` is ``cases``.
     limits : dict
@@ -128,6 +132,7 @@ class Study(Case):
     copula: Copula = field(default_factory=Copula)
     proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
+    swept: Swept | None = None
     listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
@@ -137,17 +142,19 @@ class Study(Case):
     @property
     def joints(self) -> tuple[Joint, ...]:
         """Nominal joint of each variant."""
-        return self.listed.joints if self.listed else (self.joint,)
+        of = self.listed or self.swept
+        return of.joints if of else (self.joint,)
 
     @property
     def solvers(self) -> tuple[Solver, ...]:
         """Numerical settings of each of `joints`."""
-        return self.listed.solvers if self.listed else (self.solver,)
+        return self.listed.solvers if self.listed else (self.solver,) * len(self.joints)
 
     @property
     def variants(self) -> tuple[Variant, ...]:
-        """Variant of each of `joints`; empty where joints are not listed."""
-        return self.listed.variants if self.listed else ()
+        """Variant of each of `joints`; empty where all rows have the study's joint."""
+        of = self.listed or self.swept
+        return of.variants if of else ()
 
     @property
     def case_names(self) -> tuple[str, ...]:
@@ -156,8 +163,9 @@ class Study(Case):
 
     @property
     def design(self) -> NDArray[np.void]:
-        """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where joints are not listed."""
-        return self.listed.table if self.listed else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
+        """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where all rows have the study's joint."""
+        of = self.listed or self.swept
+        return of.table if of else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
     def has_bonus(self, name: str) -> bool:
         """Whether `name` is a position with a bonus by maximum material, or the diameter of such a feature."""
@@ -207,8 +215,8 @@ class Study(Case):
         Limits, comments and the file's name do not belong to it. Two studies of equal identity have the
         same rows with the same results.
         """
-        parts = {
-            "joint": self.joint.model_dump(mode="json", exclude={"description"}),
+        parts: dict[str, Any] = {
+            "joint": {k: v for k, v in self.joint.given("json").items() if k != "description"},
             "operation": self.operation.model_dump(),
             "solver": self.solver.model_dump(),
             "errors": self.errors,
@@ -224,6 +232,8 @@ class Study(Case):
             parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
         if self.groups:
             parts["groups"] = [[group.label, list(group.names)] for group in self.groups]
+        if self.swept:
+            parts["swept"] = [variant.values for variant in self.swept.variants]
         return dict(flat(parts | (self.listed.identity() if self.listed else {})))
 
 
@@ -303,6 +313,9 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         moved = groups(read.entries, copula, sampling.groups)
     if sampling is not None and sampling.method == "cases":
         listed = file.listed(joint, operation, solver)
+    joints_swept = None
+    if sampling is not None and sampling.method == "sweep" and joint and operation and solver:
+        joints_swept = file.swept(listing.Nominal(joint, operation, solver), sweep, sampling.nominal_first)
     if sampling is not None:
         file.check_method(sampling, sweep)
     if output is not None:
@@ -332,6 +345,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         copula=copula,
         proposals=proposals,
         sweep=sweep,
+        swept=joints_swept,
         listed=listed,
         limits=limits,
         fatigue=fatigue,

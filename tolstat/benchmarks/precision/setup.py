@@ -89,7 +89,7 @@ def load(path: Path, quick: bool = False) -> tuple[Setup, Study]:
         setup = strict.validate(Setup, data, str(path))
         base = study.load(path.parent / setup.study)
         first = base.first_sample
-        if base.listed is not None:
+        if base.variants:
             raise InputError([Fault(f"{path}: study", f"{setup.study} lists its joints", "name one that draws them")])
         if setup.joints > base.rows - first:
             found = f"{setup.joints} of the {base.rows - first} joints of {setup.study}"

@@ -12,9 +12,9 @@ import numpy as np
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import DISPLAY_UNITS
+from tolstat.store import recorded
 from tolstat.store.view import View
-
-_ERROR_UNITS = {field.name: field.unit for field in ERROR_FIELDS}
+from tolstat.study.swept import KEYS
 
 
 class Axis(NamedTuple):
@@ -38,7 +38,7 @@ class Axis(NamedTuple):
 def swept_axes(view: View) -> list[Axis]:
     """Quantities that a sweep varies, in the study's order.
 
-    Errors with equal values in every joint are swept together and form one axis.
+    Errors and dimensions with equal values in every joint are swept together and form one axis.
 
     Parameters
     ----------
@@ -51,15 +51,18 @@ def swept_axes(view: View) -> list[Axis]:
         Empty when nothing varies.
     """
     errors, patterns = view.errors(np.arange(view.n)), _patterns(tomllib.loads(view.store.study_text).get("sweep", {}))
-    groups: dict[bytes, list[str]] = {}
-    for field in ERROR_FIELDS:
-        column = np.ascontiguousarray(errors[field.name])
+    columns = {(field.name, field.unit): errors[field.name] for field in ERROR_FIELDS}
+    if view.store.variants:
+        columns |= {(key, KEYS[key]): of[view.store.first_sample :] for key, of in recorded.swept(view.store).items()}
+    groups: dict[bytes, list[tuple[str, str]]] = {}
+    for key, column in columns.items():
         if column.size and np.ptp(column) > 0:
-            groups.setdefault(column.tobytes(), []).append(field.name)
+            groups.setdefault(column.tobytes(), []).append(key)
     axes = []
-    for names in groups.values():
-        unit, factor = DISPLAY_UNITS[_ERROR_UNITS[names[0]]]
-        values = errors[names[0]] * factor
+    for keys in groups.values():
+        names = [name for name, _ in keys]
+        unit, factor = DISPLAY_UNITS.get(keys[0][1], (keys[0][1], 1.0))
+        values = columns[keys[0]] * factor
         values[np.abs(values) < 1e-12 * np.abs(values).max()] = 0.0  # rounding error of a sweep through zero
         axes.append(Axis(_label(names, patterns), unit, values))
     rank = {pattern: i for i, pattern in enumerate(patterns)}

@@ -19,6 +19,7 @@ from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
 from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.swept import KEYS
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
@@ -66,7 +67,7 @@ def overrides() -> Schema:
         "examples": [DEFAULT_JOINT],
     }
     own = {key: value for key, value in overriding(joint()).items() if key != "title"}
-    text = "Joint file, and keys that replace some of its own, such as contact.D_P."
+    text = "Joint file, and keys that replace some of its own, such as contact.clearance."
     return own | {"description": text, "properties": {"base": base} | own["properties"]}
 
 
@@ -99,11 +100,12 @@ def _tolerance(name: str, unit: str) -> str:
 
 
 def sweep() -> Schema:
-    """JSON schema of the axes of a grid of errors."""
-    text = "Errors that take equally spaced values, by name or pattern; several entries make a grid."
-    return table({name: {"x-table": _of_unit(SweepEntry.__name__, unit)} for name, unit in UNITS.items()}) | {
-        "description": text
+    """JSON schema of the axes of a grid of errors and keys of the joint."""
+    text = "Errors by name or pattern, and keys of the joint, that take equally spaced values; several make a grid."
+    made: dict[str, Schema] = {
+        name: {"x-table": _of_unit(SweepEntry.__name__, unit)} for name, unit in (UNITS | KEYS).items()
     }
+    return table(made) | {"description": text}
 
 
 def grid() -> Schema:
@@ -169,8 +171,9 @@ def tables() -> dict[str, Schema]:
     for name, unit in TOLERANCED.items():
         kinds = [for_unit(of_model(model), unit) for model in dict.fromkeys(kinds_of(name).values())]
         found.setdefault(_tolerance(name, unit), {"anyOf": kinds})
-    for unit in dict.fromkeys(UNITS.values()):
+    for unit in dict.fromkeys((UNITS | KEYS).values()):
         found[_of_unit(SweepEntry.__name__, unit)] = for_unit(of_model(SweepEntry), unit)
+    for unit in dict.fromkeys(UNITS.values()):
         found[_of_unit("quantity", unit)] = json_schema.quantity(unit, EXAMPLES[unit])
     for unit in dict.fromkeys(UNIT_OF_LOAD.values()):
         found[_of_unit("limit", unit)] = _positive(unit)

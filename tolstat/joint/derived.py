@@ -1,0 +1,314 @@
+"""Which keys of a joint follow from which others, and by what formula: the one table of it, `DERIVED`.
+
+A joint file may leave out each of these keys. Where a key of a joint file is overridden, all that follows from it is
+computed anew unless it is given, too: what the file has for it no longer counts. Hub and bearing diameters stay as they
+are, with a warning: a hub may have any form, and a bearing need not have the pin's diameter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Set
+from types import SimpleNamespace
+from typing import Any, NamedTuple, TypeVar
+
+from pydantic import BaseModel
+
+from tolstat.joint import material
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+WIDE = 0.05
+"""Clearance, or difference of two diameters, relative to a diameter, that no bearing has by intention."""
+BEARING = ("contact.D_H", "contact.D_P", "contact.clearance")
+"""Keys any two of which define the third."""
+
+
+class Rule(NamedTuple):
+    """How a key follows from others.
+
+    Attributes
+    ----------
+    follows : tuple of str
+        Keys that it follows from; those of a bearing follow from each other, too.
+    formula : str
+        The formula in words.
+    value : callable
+        The sections of the joint as attributes -> SI value; None where the formula has none.
+    unit : str
+        SI unit.
+    stays : bool
+        Whether the value of a joint file stays when a key that it follows from is overridden.
+    """
+
+    follows: tuple[str, ...]
+    formula: str
+    value: Callable[[Any], Any]
+    unit: str
+    stays: bool = False
+
+
+def _beam(body: str, l: str, bending: tuple[str, str]) -> dict[str, Rule]:  # noqa: E741
+    """Rules of the stiffness of a pin's or an arm's bushing, eqs. (9)-(11); `bending`: area moments about x and y."""
+    section = {"pin": "cross", "arm": "fork"}[body]
+    about_x, about_y = bending
+
+    def rule(name: str, of: tuple[str, ...], formula: str, unit: str) -> Rule:
+        def value(joint: Any) -> float:
+            part, steel = getattr(joint, body), joint.material
+            beam = material.beam_stiffness(
+                steel.E,
+                steel.G,
+                length=getattr(part, l),
+                A=part.A,
+                Jx=getattr(part, about_x),
+                Jy=getattr(part, about_y),
+                Jp=part.Jp,
+                chi=part.chi,
+            )
+            return float(getattr(beam, name))
+
+        keys = tuple(f"material.{key}" if key in "EG" else f"{body}.{key}" for key in of)
+        return Rule((*keys, f"{body}.{l}"), formula, value, unit)
+
+    shear = (("G", "A", "chi"), f"G A/(chi {l}), eqs. (9)-(11)", "N/m")
+    return {
+        f"bushing.{section}.{name}": rule(name, *entry)
+        for name, entry in {
+            "k_x": shear,
+            "k_y": shear,
+            "k_z": (("E", "A"), f"E A/{l}, eqs. (9)-(11)", "N/m"),
+            "k_bx": (("E", about_x), f"E {about_x}/{l}, eqs. (9)-(11)", "N*m/rad"),
+            "k_by": (("E", about_y), f"E {about_y}/{l}, eqs. (9)-(11)", "N*m/rad"),
+            "k_tz": (("G", "Jp"), f"G Jp/{l}, eqs. (9)-(11)", "N*m/rad"),
+        }.items()
+    }
+
+
+def _pin_diameter(joint: Any) -> float:
+    of = joint.contact
+    one_left_out = of.D_H is None or of.clearance is None
+    return float(joint.pin.d if one_left_out else of.D_H - 2.0 * of.clearance)
+
+
+def _hub(joint: Any) -> tuple[float, tuple[float, float, float]] | None:
+    if not 2.0 * joint.cross.r_b > joint.pin.d:
+        return None
+    return material.crossed_cylinders(joint.material.rho, joint.pin.d, 2.0 * joint.cross.r_b)
+
+
+def _hub_mass(joint: Any) -> float | None:
+    hub = _hub(joint)
+    return None if hub is None else hub[0]
+
+
+def _hub_inertia(joint: Any) -> tuple[float, ...] | None:
+    hub = _hub(joint)
+    return None if hub is None else tuple(joint.hub.mass / hub[0] * one for one in hub[1])
+
+
+def _fitted(joint: Any) -> tuple[float, float] | tuple[None, None]:
+    of, steel = joint.contact, joint.material
+    if not of.D_H > of.D_P > 0.0:
+        return None, None
+    return material.fit_contact(of.fit_load, of.z, of.D_H, of.D_P, steel.E, steel.nu)
+
+
+def _contact_damping(joint: Any) -> float:
+    pin, steel = joint.pin, joint.material
+    return material.contact_damping(
+        joint.contact.xi, pin.mass, length=pin.l, A=pin.A, J=pin.J, E=steel.E, rho=steel.rho
+    )
+
+
+_FIT = ("material.E", "material.nu", *BEARING, "contact.z", "contact.fit_load")
+_CYLINDERS = "two crossed cylinders of diameter pin.d, 2 r_b long"
+
+DERIVED: dict[str, Rule] = {
+    "pin.A": Rule(("pin.d",), "pi d^2/4", lambda j: material.circle(j.pin.d)[0], "m^2"),
+    "pin.J": Rule(("pin.d",), "pi d^4/64", lambda j: material.circle(j.pin.d)[1], "m^4"),
+    "pin.Jp": Rule(("pin.J",), "2 J", lambda j: 2.0 * j.pin.J, "m^4"),
+    "pin.mass": Rule(("material.rho", "pin.A", "pin.l"), "rho A l", lambda j: j.material.rho * j.pin.A * j.pin.l, "kg"),
+    "pin.inertia": Rule(
+        ("pin.mass", "pin.d", "pin.l"),
+        "solid cylinder of this mass, d and l",
+        lambda j: material.cylinder_inertia(j.pin.mass, j.pin.d, j.pin.l),
+        "kg*m^2",
+    ),
+    "arm.A": Rule(
+        ("arm.width", "arm.depth"), "width depth", lambda j: material.rectangle(j.arm.width, j.arm.depth)[0], "m^2"
+    ),
+    "arm.Jx": Rule(
+        ("arm.width", "arm.depth"), "width depth^3/12", lambda j: material.rectangle(j.arm.width, j.arm.depth)[1], "m^4"
+    ),
+    "arm.Jy": Rule(
+        ("arm.width", "arm.depth"), "depth width^3/12", lambda j: material.rectangle(j.arm.width, j.arm.depth)[2], "m^4"
+    ),
+    "arm.Jp": Rule(("arm.Jx", "arm.Jy"), "Jx + Jy", lambda j: j.arm.Jx + j.arm.Jy, "m^4"),
+    "arm.mass": Rule(
+        ("material.rho", "arm.A", "arm.l_f"), "rho A l_f", lambda j: j.material.rho * j.arm.A * j.arm.l_f, "kg"
+    ),
+    "arm.inertia": Rule(
+        ("arm.mass", "arm.A", "arm.Jx", "arm.Jy", "arm.l_f"),
+        "box of this mass, l_f long, with the area moments of the section",
+        lambda j: material.box_inertia(j.arm.mass, j.arm.A, j.arm.Jx, j.arm.Jy, j.arm.l_f),
+        "kg*m^2",
+    ),
+    "cross.r_b": Rule(("cross.R", "pin.l"), "R - pin.l", lambda j: j.cross.R - j.pin.l, "m"),
+    "hub.mass": Rule(("material.rho", "pin.d", "cross.r_b"), _CYLINDERS, _hub_mass, "kg", stays=True),
+    "hub.inertia": Rule(
+        ("hub.mass", "pin.d", "cross.r_b"), f"{_CYLINDERS}, of this mass", _hub_inertia, "kg*m^2", stays=True
+    ),
+    **_beam("pin", "l", ("J", "J")),
+    **_beam("arm", "l_f", ("Jx", "Jy")),
+    "contact.D_P": Rule(
+        ("pin.d",), "D_H - 2 clearance, or pin.d where D_H or clearance is left out", _pin_diameter, "m", stays=True
+    ),
+    "contact.D_H": Rule(
+        ("contact.D_P", "contact.clearance"),
+        "D_P + 2 clearance",
+        lambda j: j.contact.D_P + 2.0 * j.contact.clearance,
+        "m",
+        stays=True,
+    ),
+    "contact.clearance": Rule(
+        ("contact.D_H", "contact.D_P"),
+        "(D_H - D_P)/2",
+        lambda j: 0.5 * (j.contact.D_H - j.contact.D_P),
+        "m",
+        stays=True,
+    ),
+    "contact.k1u": Rule(_FIT, "fit of eq. (5) to eq. (3) up to fit_load", lambda j: _fitted(j)[0], "N/m^2"),
+    "contact.k2u": Rule(_FIT, "fit of eq. (5) to eq. (3) up to fit_load", lambda j: _fitted(j)[1], "N/m"),
+    "contact.k1p": Rule(
+        ("contact.k1u", "contact.H"), "k1u/H^2, eq. (4)", lambda j: j.contact.k1u / j.contact.H**2, "N/m^2"
+    ),
+    "contact.k2p": Rule(("contact.k2u", "contact.H"), "k2u/H, eq. (4)", lambda j: j.contact.k2u / j.contact.H, "N/m"),
+    "contact.c_d": Rule(
+        ("contact.xi", "pin.mass", "pin.l", "pin.A", "pin.J", "material.E", "material.rho"),
+        "2 xi m omega, eqs. (6)-(7)",
+        _contact_damping,
+        "N*s/m",
+    ),
+}
+"""Keys that follow from others, each after those that it follows from (but for a bearing's)."""
+
+
+def changed(given: Set[str], held: Collection[str]) -> set[str]:
+    """Keys with another value than before when a joint file with the keys `held` is overridden by the keys `given`.
+
+    They contain `given`; the others follow from them.
+    """
+    found = set(given)
+    for key, rule in DERIVED.items():
+        if key not in found and not (rule.stays and key in held) and found.intersection(rule.follows):
+            found.add(key)
+    return found
+
+
+def replaced(given: Collection[str], held: Collection[str]) -> set[str]:
+    """Keys of a bearing among `held` that give way when other keys of it are `given`: two of the three define it."""
+    new = set(given).intersection(BEARING)
+    hole, pin, clearance = BEARING
+    if len(new) > 1 or (new == {clearance} and "pin.d" in given):
+        away = set(BEARING)
+    elif new == {clearance}:
+        away = {pin} if hole in held else set()
+    elif new == {pin}:
+        away = {clearance} if hole in held else set()
+    elif new == {hole}:
+        away = set() if hole in held else {clearance}
+    else:
+        away = set()
+    return (away - new).intersection(held)
+
+
+UNITS = {key: rule.unit for key, rule in DERIVED.items()} | {"pin.d": "m"}
+"""SI unit of each key that a warning can be about."""
+
+
+def completed(name: str, section: ModelT, others: Mapping[str, Any]) -> ModelT:
+    """Copy of a section with the keys that were left out filled in, as far as they follow from others.
+
+    Only keys that were given stay in ``model_fields_set``: a dump that leaves out unset keys holds what was given.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    section : BaseModel
+        The section.
+    others : mapping
+        The sections before it, completed.
+    """
+    copy = section.model_copy()
+    joint = SimpleNamespace(**others, **{name: copy})
+    for key, rule in DERIVED.items():
+        path = key.split(".")
+        if path[0] == name and get(joint, key) is None and all(get(joint, of) is not None for of in rule.follows):
+            for table in path[1:-1]:
+                own = get(joint, f"{name}.{table}")
+                copy.__dict__[table] = own.model_copy()
+            holder = get(joint, ".".join(path[:-1]))
+            holder.__dict__[path[-1]] = rule.value(joint)
+    return copy
+
+
+def missing(name: str, section: BaseModel, others: Mapping[str, Any], exempt: Collection[str]) -> list[str]:
+    """Keys of a completed section that neither are given nor follow from others, but for those `exempt`.
+
+    Keys that follow from such a key are left out.
+    """
+    joint = SimpleNamespace(**others, **{name: section})
+    lacking: dict[str, tuple[str, ...]] = {}
+    unknown: set[str] = set()
+    for key, rule in DERIVED.items():
+        if not key.startswith(f"{name}.") or key in exempt or get(joint, key) is not None:
+            continue
+        if unknown.intersection(rule.follows) or not all(hasattr(joint, of.partition(".")[0]) for of in rule.follows):
+            unknown.add(key)  # a section that it follows from has faults of its own
+        else:
+            lacking[key] = rule.follows
+    return [key for key, follows in lacking.items() if not lacking.keys() & set(follows)] or list(lacking)
+
+
+def get(joint: Any, key: str) -> Any:
+    """Value of a dotted key; None if it, or a section on the way to it, is missing."""
+    for part in key.split("."):
+        joint = getattr(joint, part, None)
+    return joint
+
+
+def expected(joint: Any, given: Set[str], changed: Set[str], stay: Set[str]) -> dict[str, Any]:
+    """Values that hub and bearing would have by their formulas, where those of a joint file stay and do not agree.
+
+    Parameters
+    ----------
+    joint : Joint
+        The joint.
+    given, changed, stay : collection of str
+        Keys of the override, keys that have other values by it, and keys that have those of the joint file.
+
+    Returns
+    -------
+    dict
+        Key to SI value, words that say what gives it, and the key that may be given instead, or nothing.
+    """
+    found: dict[str, Any] = {}
+    hub = _hub(joint)
+    if hub is not None and changed & {*DERIVED["hub.mass"].follows, "hub.mass"}:
+        mass, inertia = hub
+        own = joint.hub.mass if "hub.mass" in changed else mass
+        values = {"hub.mass": mass, "hub.inertia": tuple(own / mass * one for one in inertia)}
+        found |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}
+    of, d = joint.contact, joint.pin.d
+    hole, pin, clearance = BEARING
+    if "pin.d" in changed and pin in stay and not math.isclose(of.D_P, d, rel_tol=1e-6):
+        found[pin] = d, "pin.d gives", clearance
+        if hole in stay:
+            found[hole] = d + 2.0 * of.clearance, "pin.d and the clearance of these two give", clearance
+    elif changed & {"pin.d", pin} and hole in stay and of.clearance > WIDE * of.D_P:
+        found[hole] = of.D_P, "that is much clearance; without any contact.D_P gives", clearance
+    if pin in given and {hole, clearance} & given and "pin.d" in stay and abs(of.D_P - d) > WIDE * d:
+        found["pin.d"] = of.D_P, "contact.D_P gives", ""
+    return found

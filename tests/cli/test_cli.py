@@ -227,7 +227,7 @@ def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
     table = pd.read_csv(out, header=[0, 1], index_col=0)
     names = ["case", "variant", "family", "group"]
     assert list(table.columns[:5]) == [*((name, "1") for name in names), (ERROR_COLUMNS[0].name, "m")]
-    assert table.columns[-1] == (RESULT_COLUMNS[-1].name, "1")
+    assert table.columns[-1] == (RESULT_COLUMNS[-1].name, RESULT_COLUMNS[-1].unit)
     with Reader.open(tmp_path / "small.h5") as store:
         assert list(store.to_pandas().columns[:4]) == names
         assert table[names].to_numpy().tolist() == [

@@ -84,11 +84,16 @@ def _entries() -> list[Load]:
     return found
 
 
+def unit_text(unit: str) -> str:
+    """Unit of a load for people: ``"N m"`` for ``"N*m"``, nothing for a pure number."""
+    return {"N*m": "N m", "1": ""}.get(unit, unit)
+
+
 def limits_in_words(limits: Mapping[str, float]) -> str:
     """Limits by name, SI, as one text: loads of the same limit together."""
     loads: dict[str, list[str]] = {}
     for name, limit in limits.items():
-        loads.setdefault(f"{limit:g} {UNIT_OF_LOAD[name]}".removesuffix(" 1"), []).append(name)
+        loads.setdefault(f"{limit:g} {unit_text(UNIT_OF_LOAD[name])}".rstrip(), []).append(name)
     return "; ".join(f"{', '.join(names)}: {limit}" for limit, names in loads.items()) or "none"
 
 

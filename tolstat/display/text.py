@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolstat.common.files import atomic_write
+from tolstat.common.loads import unit_text
 
 if TYPE_CHECKING:
     import pandas as pd
-
-UNITS = {"N*m": "N m", "1": ""}
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -46,7 +45,7 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
 
 def value(x: float, unit: str) -> str:
     """Format a load with its unit, four digits; NaN gives a dash."""
-    return f"{number(x)} {UNITS.get(unit, unit)}".strip() if not math.isnan(x) else "-"
+    return f"{number(x)} {unit_text(unit)}".strip() if not math.isnan(x) else "-"
 
 
 def limit(row: Mapping[Any, Any]) -> str:

@@ -28,7 +28,7 @@ class CheckedTables(Numbering):
     variants: tuple[Variant, ...]
     _file: h5py.File
 
-    def status(self, rows: slice = slice(None)) -> NDArray[np.uint8]:
+    def status(self, slots: slice = slice(None)) -> NDArray[np.uint8]:
         """Status of the joints, (n,), or of a slice of file slots; joints whose row is damaged are PENDING.
 
         Raises
@@ -37,8 +37,8 @@ class CheckedTables(Numbering):
             When a status is unknown to this version.
         """
         if self._file.mode != "r":
-            return self._status(rows)  # opening for writing has already marked damaged rows as pending
-        first, last, _ = rows.indices(self.n)
+            return self._status(slots)  # opening for writing has already marked damaged rows as pending
+        first, last, _ = slots.indices(self.n)
         blocks = (slice(begin, min(begin + BLOCK, last)) for begin in range(first, last, BLOCK))
         return np.concatenate([np.empty(0, np.uint8), *map(self._status_if_intact, blocks)])
 
@@ -46,10 +46,10 @@ class CheckedTables(Numbering):
         """File slots whose results do not match their checksums, as after an interrupted write or a disk fault."""
         found = [np.empty(0, np.intp)]
         for first in range(0, self.n, BLOCK):
-            rows = slice(first, first + BLOCK)
-            done = self._status(rows) != Status.PENDING
+            slots = slice(first, first + BLOCK)
+            done = self._status(slots) != Status.PENDING
             if done.any():
-                found.append(first + np.flatnonzero(done & ~self._intact(rows, self._results(rows))))
+                found.append(first + np.flatnonzero(done & ~self._intact(slots, self._results(slots))))
         return np.concatenate(found)
 
     def pending(self) -> NDArray[np.intp]:
@@ -82,7 +82,7 @@ class CheckedTables(Numbering):
         self._check_errors(slice(None), self._errors(slice(None)))
         return table
 
-    def origin(self, rows: slice = slice(None)) -> NDArray[np.void]:
+    def origin(self, slots: slice = slice(None)) -> NDArray[np.void]:
         """How every joint was drawn, (n,) table with the columns `draw_records.columns`, or of a slice of file slots.
 
         Raises
@@ -93,10 +93,10 @@ class CheckedTables(Numbering):
         if "origin" not in self._file:
             remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
             raise store_error(self.path, "has no record of how its joints were drawn", remedy)
-        self.errors(rows)  # checks this table too: it enters the checksums of the errors
-        return self._described("origin", rows)
+        self.errors(slots)  # checks this table too: it enters the checksums of the errors
+        return self._described("origin", slots)
 
-    def errors(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
+    def errors(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Errors of every joint, (n,) table ERROR, or of a slice of file slots.
 
         With `fields` the table has these only: all fields are read and checked in blocks, the others then dropped.
@@ -107,12 +107,12 @@ class CheckedTables(Numbering):
             When the errors are damaged.
         """
         if fields is not None:
-            return self._in_blocks(self.errors, rows, tables.ERROR, fields)
-        table = self._errors(rows)
-        self._check_errors(rows, table)
+            return self._in_blocks(self.errors, slots, tables.ERROR, fields)
+        table = self._errors(slots)
+        self._check_errors(slots, table)
         return table
 
-    def results(self, rows: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
+    def results(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Results of every joint, (n,) table RESULT, or of a slice of file slots.
 
         A joint whose row is damaged is PENDING. Results of pending joints are NaN (integers 0), as are columns that
@@ -124,20 +124,20 @@ class CheckedTables(Numbering):
             When a status is unknown to this version.
         """
         if fields is not None:
-            return self._in_blocks(self.results, rows, tables.RESULT, fields)
-        table = self._results(rows)
-        broken = (table["status"] == Status.PENDING) | ~self._intact(rows, table)
+            return self._in_blocks(self.results, slots, tables.RESULT, fields)
+        table = self._results(slots)
+        broken = (table["status"] == Status.PENDING) | ~self._intact(slots, table)
         for field in tables.RESULT_FIELDS:
             table[field.name][broken] = np.nan if np.dtype(field.dtype).kind == "f" else 0
         self._check_status(table["status"])
         return table
 
-    def attempt(self, rows: slice = slice(None)) -> NDArray[np.int32]:
+    def attempt(self, slots: slice = slice(None)) -> NDArray[np.int32]:
         """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``."""
-        return np.asarray(self.column("ledger", "attempt", rows))
+        return np.asarray(self.column("ledger", "attempt", slots))
 
-    def column(self, group: str, name: str, rows: Any) -> NDArray[Any]:
-        """Read a dataset at an index or slice of its rows.
+    def column(self, group: str, name: str, slots: Any) -> NDArray[Any]:
+        """Read a dataset at a file slot or slice of them.
 
         Raises
         ------
@@ -145,55 +145,55 @@ class CheckedTables(Numbering):
             When it cannot be read.
         """
         try:
-            return np.asarray(self._file[group][name][rows])
+            return np.asarray(self._file[group][name][slots])
         except checks.DAMAGE_ERRORS as error:
             if not self._file:
                 raise
             raise store_error(self.path, f"is damaged: {group}/{name} cannot be read", RUN_AGAIN) from error
 
-    def _status(self, rows: slice) -> NDArray[np.uint8]:
-        found = np.asarray(self.column("results", "status", rows))
+    def _status(self, slots: slice) -> NDArray[np.uint8]:
+        found = np.asarray(self.column("results", "status", slots))
         self._check_status(found)
         return found
 
-    def _status_if_intact(self, rows: slice) -> NDArray[np.uint8]:
-        found = self._status(rows)
+    def _status_if_intact(self, slots: slice) -> NDArray[np.uint8]:
+        found = self._status(slots)
         # any(): PENDING is 0; copy(): a view would keep the whole table of the block in memory
-        return self.results(rows)["status"].copy() if found.any() else found
+        return self.results(slots)["status"].copy() if found.any() else found
 
     def _check_status(self, found: NDArray[np.uint8]) -> None:
         if found.size and found.max() > max(Status):
             raise store_error(self.path, f"is damaged: a joint has the unknown status {found.max()}", RUN_AGAIN)
 
-    def _described(self, group: str, rows: slice) -> NDArray[np.void]:
-        return self._read(group, *descriptions(self._file)[group], rows)
+    def _described(self, group: str, slots: slice) -> NDArray[np.void]:
+        return self._read(group, *descriptions(self._file)[group], slots)
 
-    def _errors(self, rows: slice) -> NDArray[np.void]:
-        return self._read("errors", ERROR_COLUMNS, tables.ERROR, rows)
+    def _errors(self, slots: slice) -> NDArray[np.void]:
+        return self._read("errors", ERROR_COLUMNS, tables.ERROR, slots)
 
-    def _results(self, rows: slice) -> NDArray[np.void]:
-        table = self._read("results", self.columns, tables.RESULT, rows)
+    def _results(self, slots: slice) -> NDArray[np.void]:
+        table = self._read("results", self.columns, tables.RESULT, slots)
         selected_results.blank_others(table, self.columns)
         return table
 
-    def _intact(self, rows: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:
+    def _intact(self, slots: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:
         """Whether rows match their checksums, (m,); checksums are read after the values, the order of writing."""
-        attempt, errors, held = (self.column("ledger", c.name, rows) for c in LEDGER_COLUMNS)
+        attempt, errors, held = (self.column("ledger", c.name, slots) for c in LEDGER_COLUMNS)
         return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
 
-    def _check_errors(self, rows: slice, errors: NDArray[np.void]) -> None:
-        first = self.row(rows.indices(self.n)[0])
-        described = [(c, self._read(name, c, dtype, rows)) for name, (c, dtype) in descriptions(self._file).items()]
-        right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", rows)
+    def _check_errors(self, slots: slice, errors: NDArray[np.void]) -> None:
+        first = self.row(slots.indices(self.n)[0])
+        described = [(c, self._read(name, c, dtype, slots)) for name, (c, dtype) in descriptions(self._file).items()]
+        right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", slots)
         if not right.all():
             found = f"is damaged: the errors of row {first + int(np.argmin(right))} do not match their checksum"
             raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
 
     def _in_blocks(
-        self, read: Callable[[slice], NDArray[np.void]], rows: slice, dtype: np.dtype[np.void], fields: Sequence[str]
+        self, read: Callable[[slice], NDArray[np.void]], slots: slice, dtype: np.dtype[np.void], fields: Sequence[str]
     ) -> NDArray[np.void]:
         """Selected fields of a table; all fields are read and checked, `BLOCK` rows at a time."""
-        first, last, _ = rows.indices(self.n)
+        first, last, _ = slots.indices(self.n)
         table = np.empty(max(0, last - first), [(name, dtype[name]) for name in fields])
         for begin in range(first, last, BLOCK) if fields else ():
             block = read(slice(begin, min(begin + BLOCK, last)))
@@ -201,8 +201,8 @@ class CheckedTables(Numbering):
                 table[name][begin - first : begin - first + len(block)] = block[name]
         return table
 
-    def _read(self, group: str, columns: tuple[Column, ...], dtype: Any, rows: slice) -> NDArray[np.void]:
-        first, last, _ = rows.indices(self.n)
+    def _read(self, group: str, columns: tuple[Column, ...], dtype: Any, slots: slice) -> NDArray[np.void]:
+        first, last, _ = slots.indices(self.n)
         table = np.zeros(max(0, last - first), dtype)
         # The status is read first among the results: the values that it declares valid were written before it.
         for c in columns:

@@ -222,14 +222,14 @@ class Reader(CheckedTables):
         started, done = (self._file["session"][name][()] for name in ("started", "done"))
         return Session(float(started), int(done)) if started > 0 else None
 
-    def histories(self, name: str, rows: NDArray[np.intp] | None = None) -> NDArray[Any]:
+    def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Read the histories of one kind.
 
         Parameters
         ----------
         name : str
             One of `history_specs`.
-        rows : (m,) array of int, optional
+        slots : (m,) array of int, optional
             File slots to read; all without it.
 
         Returns
@@ -246,17 +246,17 @@ class Reader(CheckedTables):
             held = ", ".join(self.history_specs) or "none"
             remedy = f'write histories = "full" or "harmonics" in [output] of the study, and {RUN_AGAIN}'
             raise store_error(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
-        rows = np.arange(self.n) if rows is None else np.asarray(rows, dtype=np.intp)
+        slots = np.arange(self.n) if slots is None else np.asarray(slots, dtype=np.intp)
         if "histories" not in self._file:
-            done = self.status()[rows] != Status.PENDING  # read first: histories are written before the status
+            done = self.status()[slots] != Status.PENDING  # read first: histories are written before the status
             try:
-                values = self._parts.read(name, rows, done)
-                self._check_history(name, rows, values, done)
+                values = self._parts.read(name, slots, done)
+                self._check_history(name, slots, values, done)
                 return values
             except StoreError:
                 if not self._reopen():
                     raise
-        unique, back = np.unique(rows, return_inverse=True)
+        unique, back = np.unique(slots, return_inverse=True)
         values = np.asarray(self.column("histories", name, unique))
         self._check_history(name, unique, values, np.ones(len(unique), bool))
         return values[back]
@@ -319,11 +319,11 @@ class Reader(CheckedTables):
         self._file = file
         return True
 
-    def _check_history(self, name: str, rows: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
-        held = self.column("ledger", f"{name}_check", slice(None))[rows[done]]
-        wrong = integrity.history_checks(values[done], self.row(rows[done])) != held
+    def _check_history(self, name: str, slots: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
+        held = self.column("ledger", f"{name}_check", slice(None))[slots[done]]
+        wrong = integrity.history_checks(values[done], self.row(slots[done])) != held
         if wrong.any():
-            row = self.rows[rows[done][np.argmax(wrong)]]
+            row = self.rows[slots[done][np.argmax(wrong)]]
             found = f"is damaged: the history {name} of row {row} does not match its checksum"
             raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
 

@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import unit_text
 from tolstat.display import style
 from tolstat.display.table import Column
-from tolstat.display.text import UNITS
 
 if TYPE_CHECKING:
     from tolstat.questions.causes.angles import AgainstAngle
@@ -92,7 +92,7 @@ def loads(ax: Axes, angle: AgainstAngle) -> None:
     ax.plot(theta, middle, color=style.COLOURS[0], label="median")
     if np.isfinite(angle.nominal).all():
         ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label="without errors")
-    ax.set_ylabel(f"|{angle.load}| [{UNITS.get(angle.unit, angle.unit)}]")
+    ax.set_ylabel(f"|{angle.load}| [{unit_text(angle.unit)}]")
     ax.set_ylim(0.0, 1.28 * max(high.max(), np.nan_to_num(angle.nominal).max()))
     ax.legend(loc="upper right", ncols=3, columnspacing=1.2, handlelength=1.8)
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from tolstat.common.loads import unit_text
 from tolstat.display.table import Column, Row
-from tolstat.display.text import UNITS, records
+from tolstat.display.text import records
 
 if TYPE_CHECKING:
     from tolstat.questions.causes.query import Causes
@@ -56,7 +57,7 @@ def _has(name: str) -> Callable[[pd.DataFrame], bool]:
 
 def note(causes: Causes, log: bool = False) -> str:
     """Notes to the table: number of joints, explained variance, restrictions."""
-    unit = UNITS.get(causes.unit, causes.unit)
+    unit = unit_text(causes.unit)
     std = f"{causes.std:.4g}, of the logarithm" if log else f"{causes.std:.4g} {unit}".rstrip()
     if causes.from_design:
         what, ranks, tail = "groups of errors", "", "from a pick-freeze design"

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tolstat.common.loads import BUSHING_LOADS
+from tolstat.common.loads import BUSHING_LOADS, unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
@@ -142,7 +142,7 @@ def _tornado(ax: Axes, causes: Causes, quantity: str) -> None:
 
 
 def _angle_panels(angle: AgainstAngle, quantity: str) -> list[Panel]:
-    key, unit = angle.load.replace(".", "-"), text.UNITS.get(angle.unit, angle.unit)
+    key, unit = angle.load.replace(".", "-"), unit_text(angle.unit)
     middle = angle.spread[1]
     loads = Panel(
         f"angle-{key}",

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.common.loads import BUSHING_LOADS
+from tolstat.common.loads import BUSHING_LOADS, unit_text
 from tolstat.display import style, text
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.questions.causes import angles_figure
@@ -115,6 +115,6 @@ def _draw(ax: Axes, found: _Histories) -> None:
         ax.fill_between(around, low, high, color=style.FAINT, alpha=0.25, lw=0, label="5 to 95 %")
     if found.limit is not None:
         ax.axhline(found.limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
-    unit = text.UNITS.get(tail.unit, tail.unit)
+    unit = unit_text(tail.unit)
     ax.set(ylabel=f"|{tail.by}| [{unit}]", ylim=(0.0, 1.3 * np.nanmax(found.loads)))
     ax.legend(loc="upper right", ncols=3, columnspacing=1.2, handlelength=2.0)

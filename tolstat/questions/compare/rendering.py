@@ -16,9 +16,10 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from tolstat.analysis import difference, exceedance
+from tolstat.common.loads import unit_text
 from tolstat.display import style
 from tolstat.display.table import Column, Row
-from tolstat.display.text import UNITS, csv, limit, percent
+from tolstat.display.text import csv, limit, percent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -144,7 +145,7 @@ def _difference(ax: Axes, sides: Sides, name: str) -> None:
     ax.step(levels, 100.0 * found.estimate, where="post", color=style.INK)
     if sides.iid:
         _band(ax, levels, 100.0 * found.lower, 100.0 * found.upper, style.INK)
-    ax.set_xlabel(f"x [{UNITS.get(unit, unit)}]" if unit != "1" else "x")
+    ax.set_xlabel(f"x [{unit_text(unit)}]" if unit != "1" else "x")
 
 
 def _band(
@@ -180,7 +181,7 @@ def _share_columns(paired: bool) -> tuple[Column, ...]:
 
 
 def _unit(row: Row) -> str:
-    return f" {UNITS.get(row['unit'], row['unit'])}".rstrip()
+    return f" {unit_text(row['unit'])}".rstrip()
 
 
 def _interval(row: Row, factor: float, unit: str) -> str:

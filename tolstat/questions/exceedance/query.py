@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
 from tolstat.analysis.accuracy import size
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import LOADS, unit_text
 from tolstat.display import text
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -154,7 +154,7 @@ def readings(view: View) -> dict[str, Any]:
         start = load.limit if load.limit is not None else load.quantile(0.9).estimate
         table = load.curve(x)
         found[load.name] = {
-            "unit": text.UNITS.get(load.unit, load.unit),
+            "unit": unit_text(load.unit),
             "n": int(table["n"][0]),
             "failed": int(table["n_failed"][0]),
             "unsettled": int(table["n_unsettled"][0]),

@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from tolstat.analysis.exceedance import simultaneous
+from tolstat.common.loads import unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
@@ -124,7 +125,7 @@ def _bands(ax: Axes, view: View, load: SampleLoad) -> None:
     if valid < n:
         handles.append(Patch(color=style.COLOURS[0], alpha=0.12, lw=0))
         labels.append("with failed and unsettled joints")
-    unit = text.UNITS.get(load.unit, load.unit)
+    unit = unit_text(load.unit)
     if load.limit is not None:
         rendering.limit_lines(ax, {load.limit: [1, 2, 3, 4]}, unit)
     if low <= load.nominal <= high:

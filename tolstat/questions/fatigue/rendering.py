@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from tolstat.analysis.cycles import FloatArray
+from tolstat.common.loads import unit_text
 from tolstat.common.tables import CHANNELS
 from tolstat.display import style, text
 from tolstat.display.table import Column, Row
@@ -161,7 +162,7 @@ def panel(ax: Axes, spectrum: pd.DataFrame, revolutions: float) -> None:
     ax.set_xticks([t for t in (0.01, 0.03, 0.1, 0.3, 1, 2, 3, 4, 6, 8, 12, 16) if x[0] <= t <= ax.get_xlim()[1]])
     channel, unit = spectrum[["channel", "unit"]].iloc[0]
     ax.set_xlabel("cycles a revolution with at least this range")
-    ax.set_ylabel(f"range of {channel} [{text.UNITS.get(unit, unit)}]")
+    ax.set_ylabel(f"range of {channel} [{unit_text(unit)}]")
 
 
 def _settled(loading: Loading) -> str:

@@ -9,10 +9,9 @@ from operator import mul
 import pandas as pd
 
 from tolstat.analysis.subset import Estimate, Level
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import UNIT_OF_LOAD, unit_text
 from tolstat.display import text
 from tolstat.display.table import Column
-from tolstat.display.text import UNITS
 
 
 def _short(x: float) -> str:
@@ -59,7 +58,7 @@ def table(levels: list[Level], load: str) -> pd.DataFrame:
 def sentence(estimate: Estimate, load: str, above: float) -> str:
     """The probability with its interval, or its upper bound if the levels did not reach the limit."""
     unit = UNIT_OF_LOAD[load]
-    head = f"P({load} > {above:g} {UNITS.get(unit, unit)}".strip() + ")"
+    head = f"P({load} > {above:g} {unit_text(unit)}".strip() + ")"
     if math.isnan(estimate.probability):
         return f"{head} < {estimate.upper:.2g}: the limit was not reached"
     return f"{head} = {estimate.probability:.3g}, 95 % interval {estimate.lower:.3g} .. {estimate.upper:.3g}"

@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from tolstat.common.loads import unit_text
 from tolstat.display import style
 from tolstat.display.table import Column, Row
-from tolstat.display.text import UNITS, csv, limit
+from tolstat.display.text import csv, limit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,7 +95,7 @@ def figure(found: TimeAbove) -> Figure:
             for level in found.table.loc[found.table["load"] == name, "level"]:
                 for ax in (upper, lower):
                     ax.axvline(float(level), color=style.FAINT, lw=1.0, ls=style.DASHES[2])
-            lower.set_xlabel(f"x [{UNITS.get(unit, unit)}]")
+            lower.set_xlabel(f"x [{unit_text(unit)}]")
         axes[0, 0].set_ylabel("joints that exceed x, %")
         axes[1, 0].set_ylabel("time above x, % of a revolution")
         handles: list[Artist] = [

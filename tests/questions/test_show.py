@@ -159,7 +159,8 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
 
 
 def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
-    fitting = joints.load("cirelli2021", {"contact": {"D_H": "76 mm"}}, "test")
+    contact = {"D_H": "76 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"}
+    fitting = joints.load("cirelli2021", {"contact": contact}, "test")
     pairs = query.pairs(fitting, nominal_errors(1, OPERATION))
     assert one_joint.enlargement(pairs, 0.076, 0.022) == 1.0
     assert drawn(one_joint.draw, pairs, 0.076, 0.022)

@@ -112,7 +112,7 @@ def test_the_nominal_joint_is_exported_if_asked_for(tmp_path):
         lines = export(path, "--csv", "-", *options).stdout.splitlines()
         assert [int(line.split(",")[0]) for line in lines[2:]] == list(rows)
         assert ("nominal" in lines[0].split(",")) == bool(options)
-    refused = export(path, "--json", "-", "--nominal")
+    refused = export(path, "--statistics", "-", "--nominal")
     assert refused.exit_code == 2
     assert "--nominal is used with --csv" in refused.stderr
 

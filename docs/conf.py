@@ -39,8 +39,11 @@ nb_merge_streams = True
 
 
 def setup(app: Any) -> None:
-    """Connect the hook that makes the tree of pages."""
+    """Connect the hook that makes the tree of pages, and make the folder for pages that notebooks write."""
     app.connect("source-read", add_tree)
+    pages = Path(app.outdir, "docs")
+    pages.mkdir(parents=True, exist_ok=True)
+    os.environ["SITE_PAGES"] = str(pages)
 
 
 def add_tree(app: Any, docname: str, source: list[str]) -> None:

@@ -4,8 +4,6 @@ import doctest
 import importlib
 import inspect
 import re
-import runpy
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -77,13 +75,3 @@ def test_examples_on_files(module, examples):
         importlib.import_module(f"tolstat.{module}"), extraglobs={"tolstat": tolstat, **examples[module]}
     )
     assert (found.failed, found.attempted > 0) == (0, True)
-
-
-@pytest.mark.slow
-def test_the_example_study_runs_cell_by_cell(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["example.py", str(tmp_path)])
-    runpy.run_path(str(ROOT / "studies" / "example.py"))
-    said = capsys.readouterr().out
-    assert "P(cross1.F > 1500 N)" in said
-    assert "times only one joint of a pair is above a limit" in said
-    assert (tmp_path / "example_next_exceedance.png").stat().st_size > 10_000

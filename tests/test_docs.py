@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -10,15 +11,23 @@ import pytest
 
 import tolstat
 from tests.support.environment import ROOT
+from tolstat import cli
+from tolstat.cli import bench
 
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted(path for path in DOCS.rglob("*.md") if path.parent.name != "api"),
+]
+NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 QUESTIONS = sorted(
     folder.name for folder in (ROOT / "tolstat" / "questions").iterdir() if (folder / "__init__.py").exists()
 )
 PARTS = ["Intervals", "From Python", "On the page", "Limits of validity"]
 """Headings that each page of a question has, after its commands."""
-FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 SMALL = 'histories = "harmonics+cycles"\n\n[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 36\n\n[sampling]'
 
@@ -79,7 +88,32 @@ def test_every_page_is_in_the_index() -> None:
     listed = {
         (DOCS / link.partition("#")[0]).resolve() for link in LINK.findall((DOCS / "index.md").read_text("utf-8"))
     }
-    assert [name(path) for path in DOCS.rglob("*.md") if path.name != "index.md" and path not in listed] == []
+    assert [
+        name(path)
+        for path in (*PAGES, *NOTEBOOKS)
+        if path.is_relative_to(DOCS) and path != DOCS / "index.md" and path not in listed
+    ] == []
+
+
+def test_the_readme_has_every_command_in_the_order_of_the_help() -> None:
+    table = re.findall(r"^\| .*\| `tolstat ([a-z-]+(?: precision)?) ?[^`]*` \|", README, flags=re.MULTILINE)
+    commands = [name.replace("_", "-") for names in cli.COMMANDS.values() for name in names]
+    assert table == [*commands, *bench.INSTRUMENTS]
+    headings = re.findall(r"^\| \*\*(.*?)\*\* \|", README, flags=re.MULTILINE)
+    assert headings == [*cli.COMMANDS, "Measure tolstat itself"]
+
+
+def test_every_public_name_is_in_the_reference() -> None:
+    listed = re.findall(r"^   tolstat\.(\w+)$", (DOCS / "api.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert set(tolstat.__all__) - {"__version__"} - set(listed) == set()
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
+def test_a_notebook_is_stored_without_outputs(path: Path) -> None:
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    ran = [cell for cell in cells if cell["cell_type"] == "code"]
+    assert ran
+    assert [cell["id"] for cell in ran if cell["outputs"] or cell["execution_count"] is not None] == []
 
 
 def test_every_question_has_a_page() -> None:
@@ -135,9 +169,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "path", [ROOT / "README.md", DOCS / "python.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name
-)
+@pytest.mark.parametrize("path", [DOCS / "python.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name)
 def test_examples_run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     names: dict[str, object] = {}

@@ -71,9 +71,9 @@ def command(monkeypatch, *arguments):
 
 @pytest.mark.slow
 def test_command_writes_page_table_and_figure(tmp_path, monkeypatch):
-    readme = tmp_path / "README.md"
-    readme.write_text("before\n<!-- precision -->old<!-- end of precision -->\nafter\n", encoding="utf-8")
-    done = command(monkeypatch, "--out", tmp_path / "new", "--into", readme)
+    short = tmp_path / "numbers.md"
+    short.write_text("before\n<!-- precision -->old<!-- end of precision -->\nafter\n", encoding="utf-8")
+    done = command(monkeypatch, "--out", tmp_path / "new", "--into", short)
     assert done.exit_code == 0, done.stderr
     assert done.stdout.splitlines()[1].split() == ["0.01", "A", "2", "Radau,", "our", "Jacobian", "50", "25"]
     names = {path.name for path in (tmp_path / "new").iterdir()}
@@ -83,11 +83,11 @@ def test_command_writes_page_table_and_figure(tmp_path, monkeypatch):
     assert "| A | 36 | 0 | 0 | 2 | 2e-03 |" in text
     assert "| 1e-04 | – | – | – | – | – |" in text
     assert "1e-06" not in text.partition("## All points")[0]  # the truth itself is no better than 1e-5
-    short = readme.read_text(encoding="utf-8")
-    assert "| 0.01 | A | 2 | Radau, our Jacobian | 50 | 25 | – |" in short
-    assert "old" not in short
-    assert short.startswith("before\n<!-- precision")
-    assert short.endswith("-->\nafter\n")
+    inserted = short.read_text(encoding="utf-8")
+    assert "| 0.01 | A | 2 | Radau, our Jacobian | 50 | 25 | – |" in inserted
+    assert "old" not in inserted
+    assert inserted.startswith("before\n<!-- precision")
+    assert inserted.endswith("-->\nafter\n")
 
 
 def test_nothing_is_measured_for_a_page_without_a_place(tmp_path, monkeypatch):

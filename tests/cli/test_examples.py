@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+import webbrowser
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(made, tmp_path / "work")
     monkeypatch.chdir(tmp_path / "work")
+    monkeypatch.setattr(webbrowser, "open", lambda page: True)
     done = call(*example(command))
     assert done.exit_code == 0, done.stderr
     assert "Traceback" not in done.stderr

@@ -159,6 +159,8 @@ def _minimise(
 def _shares(problem: Problem, x: FloatArray, aim: str) -> FloatArray:
     """Share of the joints above each limit, or its upper end for ``interval``; the weights are not smoothed."""
     logs = problem.log_ratios(np.exp(x))
+    if np.isneginf(logs.max()):  # none of the joints is possible with these tolerances, so that they tell nothing
+        return np.ones(problem.above.shape[1])
     raw = np.exp(logs - logs.max())
     values = raw / raw.sum()
     if aim == "estimate":

@@ -202,5 +202,8 @@ LOADS = (
 
 def _change(change: Change) -> str:
     more = f" and {len(change.keys) - 1} more" if len(change.keys) > 1 else ""
-    a, b = ("nothing" if side is None else str(side) for side in (change.a, change.b))
-    return f"{change.keys[0]}{more}: {a} -> {b}"
+    return f"{change.keys[0]}{more}: {_side(change.a)} -> {_side(change.b)}"
+
+
+def _side(value: object) -> str:
+    return "nothing" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -43,7 +43,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = STUDY.replace("n = 1024", "n = 600").replace("[sampling]", f"[output]\n{CHEAP}")
     shutil.copytree(ROOT / "studies", folder / "studies")
     precision = folder / "studies" / "precision.toml"
-    precision.write_text(re.sub(r'(codes|methods|fidelities) = .*', lambda found: FEW[found[1]], precision.read_text()))
+    precision.write_text(re.sub(r"(codes|methods|fidelities) = .*", lambda found: FEW[found[1]], precision.read_text()))
     study = folder / "studies" / "iso2768_f.toml"
     study.write_text(text, encoding="utf-8")
     narrow = folder / "narrow.toml"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pandas as pd
 
 from tolstat.display import text
@@ -11,12 +9,7 @@ from tolstat.display.table import Column, Row
 
 
 def _with_ends(row: Row, key: str, form: str) -> str:
-    low, high = row[f"{key}_lower"], row[f"{key}_upper"]
-    return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
-
-
-def _number(value: float, form: str) -> str:
-    return "-" if math.isnan(value) else f"{value:{form}}"
+    return text.ends(row[f"{key}_lower"], row[f"{key}_upper"], form)
 
 
 LIMITS = (
@@ -27,9 +20,9 @@ LIMITS = (
     Column("interval of yield", lambda row: text.span(row["good_lower"], row["good_upper"])),
     Column("ppm", lambda row: text.number(row["ppm"]), rank=1),
     Column("interval of ppm", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1"), rank=2),
-    Column("Cpk", lambda row: _number(row["cpk"], ".2f")),
+    Column("Cpk", lambda row: text.formed(row["cpk"], ".2f")),
     Column("interval of Cpk", lambda row: _with_ends(row, "cpk", ".2f")),
-    Column("Cpk if normal", lambda row: _number(row["cpk_normal"], ".2f"), rank=4),
+    Column("Cpk if normal", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),
 )
 """Columns of the table `query.limits`."""
 

@@ -35,8 +35,7 @@ def without_interval(method: str) -> str:
     """Return why shares of a sampling method have no interval, and the remedy; empty if they have one."""
     if method not in WITHOUT_INTERVAL:
         return ""
-    said = f"shares of {WITHOUT_INTERVAL[method]} have no interval"
-    return f'{said}, so no limit gets a verdict: for intervals, set sampling.method = "random"'
+    return f'shares of {WITHOUT_INTERVAL[method]} have no interval: set sampling.method = "random" for a verdict'
 
 
 class Reason(NamedTuple):

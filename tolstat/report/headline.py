@@ -72,7 +72,8 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limits(view).to_dict("records")
     found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
-    unresolved = _causes(view) if found.answer == "none" or _matter(records) else ()
+    worst = max(records, key=lambda row: np.nan_to_num(row["estimate"], nan=-1.0))
+    unresolved = _causes(view) if _matter(records if found.answer == "none" else [worst]) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
 
 
@@ -161,7 +162,7 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
         said = f"at most {most} of the joints exceed {which} (largest share {share_of(worst)}, {interval})"
     else:
         which = limit if len(concerned) == 1 else f"{len(concerned)} limits, most of all {limit}"
-        said = f"more or less than {most} of the joints may exceed {which} ({interval})"
+        said = f"the joints that exceed {which} may be more or fewer than {most} ({interval})"
     return Headline(answer, WORDS[answer], said, notes)
 
 
@@ -180,7 +181,6 @@ def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
         )
     found = capabilities.together(capability.limits(view))
     if not found.decides:
-        notes = (f"{found.value} {found.words}", *notes)
         return Headline("none", WORDS["none"], _reason(view, records), notes)
     return Headline("", found.value, found.words, notes)
 
@@ -193,16 +193,16 @@ def _reason(view: View, records: list[dict[Any, Any]]) -> str:
     """Why there is no verdict on some limits."""
     lost = max(row["n_failed"] + row["n_unsettled"] for row in records)
     n = max(row["n"] for row in records)
+    poor = [row for row in records if row["n"] > lost and np.isnan(row["estimate"])]
+    if poor:
+        trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
+        limit = text.limit(poor[0]) + (f" (and {len(poor) - 1} more)" if len(poor) > 1 else "")
+        return f"too few effective joints are above {limit}: {trust.effective:.0f}"
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
     if not view.iid:
         return without_interval(view.method)
-    poor = [row for row in records if view.weighted and np.isnan(row["estimate"])]
-    if poor:
-        trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
-        limit = text.limit(poor[0]) + (f" (and {len(poor) - 1} more)" if len(poor) > 1 else "")
-        return f"too few effective joints are above {limit}: {trust.effective:.0f}"
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 
 

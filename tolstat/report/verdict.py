@@ -57,20 +57,20 @@ def question_of(text: str) -> str:
 
 def _headline(view: View, found: Headline, table: pd.DataFrame) -> list[Card]:
     """The verdict; then, unless it is what the verdict says, the yield; the limit exceeded most."""
-    note = ". ".join(found.notes)
+    note = " ".join(text.sentence(note) for note in found.notes)
     cards = [
         Card(
             found.value,
             found.words,
-            text.sentence(note) if note else "",
+            note,
             "open" if found.answer == "none" else found.answer,
         )
     ]
     if found.answer and not view.weighted and view.count(*VALID):
         together = capabilities.together(capability.limits(view))
-        cards.append(Card(together.value, f"{together.words}: yield", ""))
+        cards.append(Card(together.value, together.words, "Yield"))
     first = table[table["load"].isin(view.leading)].sort_values("estimate", ascending=False, kind="stable")
-    if first["estimate"].notna().any():
+    if first["estimate"].notna().any() and first["load"].iloc[0] not in found.words:
         worst = first.iloc[0].to_dict()
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"
         low, high = ends(worst)

@@ -48,7 +48,7 @@ RETURNS = (
 """Columns of the table `query.returns`; the largest of N joints is the median of it over fleets of N."""
 
 
-WIDEST = 0.25
+WIDEST = 0.5
 """Total interval of a yield, or its bounds without one, from which on it says too little for a verdict."""
 
 

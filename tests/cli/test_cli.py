@@ -23,7 +23,7 @@ from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
 from tolstat.display import text
-from tolstat.store import Reader, ResultStore
+from tolstat.store import Reader
 
 COMMANDS = (
     *(name.replace("_", "-") for names in cli.COMMANDS.values() for name in names),
@@ -356,7 +356,7 @@ def test_run_ends_with_the_report_and_resumes(study):
     assert done.stdout.startswith("load")
     assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
     assert done.stderr.endswith("next: tolstat report small.h5 --out small.html\n")
-    with ResultStore.open("small.h5") as store:
+    with Reader.open("small.h5") as store:
         assert store.complete
     again = call("run", study, "--executor", "serial")
     assert (again.exit_code, again.stdout) == (0, done.stdout)
@@ -365,7 +365,7 @@ def test_run_ends_with_the_report_and_resumes(study):
 def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatch):
     """As `run` sees a finished campaign with two kinds of joints without a load."""
     path = synthetic.store(study.parent, failed=3, unsettled=1)
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         counts = store.counts()
     monkeypatch.setattr(campaign, "run", lambda *_, **__: counts)
     told = call("run", "small.toml", "--no-report").stderr.splitlines()

@@ -13,7 +13,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.joint.derived import DERIVED
 from tolstat.questions.exceedance.swept_axes import swept_axes
-from tolstat.store import ResultStore, recall, recorded
+from tolstat.store import Reader, ResultStore, recall, recorded
 from tolstat.study.swept import KEYS
 
 TEXT = """
@@ -80,7 +80,7 @@ def test_a_file_replays_its_sweep(tmp_path: Path) -> None:
     errors, rows = sampling.draw(s), np.arange(s.rows)
     with ResultStore.create(tmp_path / "a.h5", s, errors) as store:
         store.write(rows, Simulation(synthetic.results(s.rows), {}))
-    with ResultStore.open(tmp_path / "a.h5") as store:
+    with Reader.open(tmp_path / "a.h5") as store:
         again = recorded.parameters(store, rows)
         assert again.tobytes() == recorded.perturbed(s, rows, errors, joint.perturb).tobytes()
         assert recall.recall(store).identity() == s.identity()

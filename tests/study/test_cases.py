@@ -138,7 +138,7 @@ def test_without_grid_and_variants_the_joint_as_it_is(tmp_path: Path) -> None:
 
 
 def test_other_methods_have_one_joint(tmp_path: Path) -> None:
-    s = study.load(ROOT / "studies" / "clearance.toml")
+    s = study.load(ROOT / "studies" / "iso2768_f.toml")
     assert s.joints == (s.joint,)
     assert (s.variants, s.case_names) == ((), ())
     assert s.design.tolist() == s.rows * [(0, 0, 0)]

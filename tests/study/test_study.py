@@ -359,11 +359,11 @@ def test_sweep_faults(tmp_path: Path) -> None:
         return str(caught.value)
 
     assert "leave n out" in messages('method = "sweep"', 'method = "sweep"\nn = 4')
-    assert "sweep.pin*.diameter.points" in messages("points = 38", "points = 1")
-    assert "sweep.pin*.diameter.to: '-0.60 deg' cannot" in messages('to = "-0.60 mm"', 'to = "-0.60 deg"')
-    assert "from and to are equal" in messages('to = "-0.60 mm"', 'to = "0.14 mm"')
-    assert "add [sweep]" in messages('"pin*.diameter" =', "# ")
-    assert "pin1.tilt_z is set by errors.pin1.tilt_z already" in messages("pin*.diameter", "pin*.tilt_z")
+    assert "sweep.contact.clearance.points" in messages("points = 38", "points = 1")
+    assert "sweep.contact.clearance.to: '0.40 deg' cannot" in messages('to = "0.40 mm"', 'to = "0.40 deg"')
+    assert "from and to are equal" in messages('to = "0.40 mm"', 'to = "0.03 mm"')
+    assert "add [sweep]" in messages("contact.clearance =", "# ")
+    assert "pin1.tilt_z is set by errors.pin1.tilt_z already" in messages("contact.clearance =", '"pin*.tilt_z" =')
 
 
 def test_the_studies_of_the_repository() -> None:

@@ -50,7 +50,9 @@ def test_every_fault_of_a_setup_is_told(tmp_path):
     told = str(caught.value)
     for place in ("tolstat.methods[0]", "others.limit", "sed: unknown key", "seed: missing key"):
         assert place in told
-    path.write_text(text.replace("joints = 6 ", "joints = 39").replace("iso2768_f.toml", "clearance.toml"))
+    few = STUDY.with_name("iso2768_f.toml").read_text(encoding="utf-8").replace("n = 1024", "n = 38")
+    (tmp_path / "few.toml").write_text(few, encoding="utf-8")
+    path.write_text(text.replace("joints = 6 ", "joints = 39").replace(f"{STUDY.parent}/iso2768_f.toml", "few.toml"))
     with pytest.raises(InputError, match="39 of the 38 joints"):
         setup.load(path)
     path.write_text(text.replace("iso2768_f.toml", "cirelli2021/cirelli2021.toml"))

@@ -155,3 +155,17 @@ def test_the_command_line_takes_an_accepted_share(tmp_path):
     told = CliRunner().invoke(app, ["export", str(path), "--statistics", "-", "--accept", "1 %"])
     assert json.loads(told.stdout)["verdict"]["answer"] == "no verdict"
     assert CliRunner().invoke(app, ["export", str(path), "--csv", "-", "--accept", "1 %"]).exit_code == 2
+
+
+@pytest.mark.parametrize(("method", "told"), [("sobol", True), ("lhs", True), ("random", False)])
+def test_run_and_plan_tell_before_that_shares_will_have_no_interval(tmp_path, monkeypatch, method, told):
+    monkeypatch.chdir(tmp_path)
+    source = tmp_path / "s.toml"
+    source.write_text(study(64, method), encoding="utf-8")
+    monkeypatch.setattr("tolstat.cli.run.simulate", lambda *given, **choices: None)
+    monkeypatch.setattr("tolstat.cli.run.conclude", lambda *given: None)
+    monkeypatch.setattr("tolstat.cli.plan.announce_compilation", lambda: None)
+    monkeypatch.setattr("tolstat.campaign.plan.plan", lambda *given: 1 / 0)
+    for command in ("run", "plan"):
+        done = CliRunner().invoke(app, [command, str(source), "--quiet"])
+        assert ("have no interval: set sampling.method" in done.stderr) == told

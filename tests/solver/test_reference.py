@@ -29,7 +29,7 @@ def assert_largest(row, force, torque, tol):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ang_cross_z_15", "pos_fork_t_15", "random_01", "twist_15", "zero_clearance_10"])
+@pytest.mark.parametrize("name", ["ang_cross_z_15", "random_01", "zero_clearance_10"])
 def test_independent_solutions(name):
     """Solved elsewhere at rtol 1e-6, so that the last digit here is theirs."""
     with np.load(REFERENCE / "loads.npz") as file:

@@ -1,0 +1,148 @@
+"""``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
+
+FOLDER holds the result files ``overnight.h5``, ``fuzz.h5`` and ``hard_cases.h5``, of some joints or all, and gets
+``tilted_pin.png``, ``overnight.png``, ``fuzz.png`` and ``hard_cases.png``.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+import tolstat
+from tests.support.environment import ROOT
+from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.common.tables import Status
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+
+COLOURS = {"ok": "#0072B2", "stationary": "#D55E00", "other": "#333333"}
+RPM = np.pi / 30
+
+
+def save(figure: plt.Figure, target: Path) -> None:
+    """Write a picture."""
+    figure.savefig(target, dpi=130)
+    plt.close(figure)
+    print(target)
+
+
+def tilted_pin(folder: Path) -> None:
+    """Draw a bushing's torque and a pin's contact force over a revolution, with the tilt and without it."""
+    case = tolstat.load_case(ROOT / "studies" / "tilted_pin.toml")
+    figure, panels = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+    for errors, label in ((case.errors, "pin 1 tilted by 0.5°"), ({}, "without errors")):
+        trace = tolstat.simulate_case(replace(case, errors=errors)).to_pandas()
+        torque = np.linalg.norm(trace[["cross1.T_e", "cross1.T_t", "cross1.T_z"]], axis=1)
+        contact = trace[["pin1.contact_outer", "pin1.contact_inner"]].max(axis=1)
+        for ax, values in zip(panels, (torque, contact), strict=True):
+            ax.plot(trace["theta"], values, label=label)
+    for ax, label in zip(panels, ("torque of cross1 (N m)", "larger contact force of pin 1 (N)"), strict=True):
+        ax.set(xlabel="angle of the input shaft (°)", ylabel=label, xticks=range(0, 361, 90), ylim=(0, None))
+        ax.grid(alpha=0.3)
+    panels[0].legend()
+    save(figure, folder / "tilted_pin.png")
+
+
+def overnight(folder: Path) -> None:
+    """Draw the share of joints above a limit, with 95 % intervals, against their mean clearance."""
+    with tolstat.open(folder / "overnight.h5") as store:
+        view = store.view()
+        over = np.zeros(len(view.status), dtype=bool)
+        for name in store.limits:
+            load = view.load(name)
+            over |= load.values > load.limit
+        errors = store.errors()[store.first_sample :]
+        nominal = tolstat.load(ROOT / "studies" / "overnight.toml").joint.contact.clearance
+    holes, pins = (np.mean([errors[f"{what}{i}.diameter"] for i in range(1, 5)], axis=0) for what in ("hole", "pin"))
+    clearance = (nominal + 0.5 * (holes - pins)) * 1e3
+    edges = np.arange(0.05, 0.26, 0.02)
+    place = np.digitize(clearance, edges)
+    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
+    for i in range(1, len(edges)):
+        here = over[place == i]
+        if here.size < 20:
+            continue
+        lower, upper = clopper_pearson(here.sum(), here.size)
+        middle = 0.5 * (edges[i - 1] + edges[i])
+        ax.plot([middle, middle], 100 * np.array([lower, upper]), color="#0072B2", lw=5, alpha=0.35)
+        ax.plot(middle, 100 * here.mean(), "o", color="#0072B2")
+    ax.axhline(1.0, color="#D55E00", ls="--", label="accepted: 1 %")
+    ax.set(xlabel="radial clearance, mean of the pins (mm)", ylabel="joints above a limit (%)", yscale="symlog")
+    ax.set_yticks([0, 1, 10, 100], ["0", "1", "10", "100"])
+    ax.set_ylim(0, 110)
+    ax.grid(alpha=0.3)
+    ax.legend()
+    save(figure, folder / "overnight.png")
+
+
+def kind(status: np.ndarray) -> np.ndarray:
+    """Name of the colour of each joint."""
+    names = np.full(len(status), "other", dtype="U10")
+    names[status == Status.OK] = "ok"
+    names[status == Status.STATIONARY] = "stationary"
+    return names
+
+
+def fuzz(folder: Path) -> None:
+    """Draw the status of each joint by angle and speed."""
+    with tolstat.open(folder / "fuzz.h5") as store:
+        errors, status = store.errors()[1:], store.status()[1:]
+    figure, ax = plt.subplots(figsize=(7, 3.8), layout="constrained")
+    kinds = kind(status)
+    for name, marker in (("ok", "o"), ("stationary", "s"), ("other", "x")):
+        at = kinds == name
+        speed, angle = errors["operation.speed"][at] / RPM, np.degrees(errors["operation.alpha"][at])
+        label = "another status" if name == "other" else name
+        ax.plot(speed, angle, marker, color=COLOURS[name], label=f"{label}: {at.sum()}", ms=5, alpha=0.8)
+    ax.set(xlabel="speed of the input shaft (1/min)", ylabel="misalignment α (°)")
+    ax.grid(alpha=0.3)
+    figure.legend(loc="outside right upper", frameon=False)
+    save(figure, folder / "fuzz.png")
+
+
+def hard_cases(folder: Path) -> None:
+    """Draw the largest force of any bushing of each case with errors, coloured by its status."""
+    with tolstat.open(folder / "hard_cases.h5") as store:
+        results, design = store.results(), store.design()
+        variants, cases = store.variants, store.case_names
+    rows = [row for row, place in enumerate(design) if cases[place["case"]] != "ideal"]
+    results, design = results[rows], design[rows]
+    names = [f"{variants[place['variant']].family}: {cases[place['case']]}" for place in design]
+    forces, kinds = results["F_max"].max(axis=1), kind(results["status"])
+    least = np.nanmin(forces)
+    figure, ax = plt.subplots(figsize=(8, 0.21 * len(names) + 1.0), layout="constrained")
+    for name, colour in COLOURS.items():
+        at = np.flatnonzero(kinds == name)
+        label = "another status" if name == "other" else name
+        ax.plot(np.nan_to_num(forces[at], nan=least), at, "x" if name == "other" else "o", color=colour, label=label)
+        if name == "other":
+            for i in at:
+                side = -1 if np.isfinite(forces[i]) else 1
+                text = {"xytext": (8 * side, 0), "textcoords": "offset points", "ha": "left" if side > 0 else "right"}
+                ax.annotate(
+                    Status(results["status"][i]).label, (np.nan_to_num(forces[i], nan=least), i), va="center", **text
+                )
+    ax.set_yticks(range(len(names)), names, fontsize=8)
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    ax.set(xscale="log", xlabel="largest force of any bushing (N)")
+    ax.grid(alpha=0.3)
+    figure.legend(loc="outside upper right", ncols=3, frameon=False)
+    save(figure, folder / "hard_cases.png")
+
+
+def main(folder: Path) -> None:
+    """Draw what the folder has the results of."""
+    tilted_pin(folder)
+    for draw in (overnight, fuzz, hard_cases):
+        if (folder / f"{draw.__name__}.h5").exists():
+            draw(folder)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -122,6 +122,7 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return made
 
 
+@pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "path", [ROOT / "README.md", DOCS / "python.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name

@@ -76,7 +76,7 @@ def test_every_command_has_help_with_every_option_explained(command):
         assert re.search(r"--[\w-]+( \S+)?( / --[\w-]+)?\s{2,}\S", line + "  ." * line.endswith("report")), line
     assert text.startswith(f"Usage: tolstat {command} [OPTIONS]")
     assert len(text.strip().splitlines()) >= 3
-    (example,) = re.findall(rf"^  Example: tolstat {command} (.*)$", text, flags=re.MULTILINE)
+    (example,) = re.findall(rf"^  Example: tolstat {command}\b(.*)$", text, flags=re.MULTILINE)
     assert set(re.findall(r"--[\w-]+", example)) <= set(re.findall(r"--[\w-]+", options))
 
 
@@ -287,6 +287,7 @@ def test_report_creates_its_output_folder(tmp_path):
 
 
 @pytest.mark.parametrize("simulated", [0, 40])
+@pytest.mark.slow
 def test_page_of_an_interrupted_campaign_simulates_nothing(tmp_path, monkeypatch, simulated):
     def refuse(*_, **__):
         raise AssertionError("simulated")
@@ -404,6 +405,7 @@ def test_run_refuses_the_file_of_another_study(study):
     assert "hint: give another file: --out OTHER.h5" in done.stderr
 
 
+@pytest.mark.slow
 def test_another_number_of_joints_is_an_extension_of_the_file(study):
     call("run", study, "--n", 5, "--executor", "serial", "--no-report")
     before = Path("small.h5").read_bytes()

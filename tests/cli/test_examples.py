@@ -75,6 +75,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("command", TABLES)
+@pytest.mark.slow
 def test_tables_fit_80_columns_and_wide_ones_have_all(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

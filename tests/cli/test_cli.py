@@ -76,7 +76,7 @@ def test_every_command_has_help_with_every_option_explained(command):
         assert re.search(r"--[\w-]+( \S+)?( / --[\w-]+)?\s{2,}\S", line + "  ." * line.endswith("report")), line
     assert text.startswith(f"Usage: tolstat {command} [OPTIONS]")
     assert len(text.strip().splitlines()) >= 3
-    (example,) = re.findall(rf"^  Example: tolstat {command} (.*)$", text, flags=re.MULTILINE)
+    (example,) = re.findall(rf"^  Example: tolstat {command}\b(.*)$", text, flags=re.MULTILINE)
     assert set(re.findall(r"--[\w-]+", example)) <= set(re.findall(r"--[\w-]+", options))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,11 +11,23 @@ from typing import Any
 import numpy as np
 import pytest
 
+import tolstat
+from tests.support.environment import ROOT
 from tolstat import joint as joints
 from tolstat.common.tables import PARAM
 
 REFERENCE = Path(__file__).parent / "reference"
 REFERENCE_CASES = sorted(path.stem for path in REFERENCE.glob("*.toml"))
+
+CHEAP = """histories = "harmonics+cycles"
+harmonics = 6
+
+[solver]
+fidelity = "quasistatic"
+steps_per_rev = 15
+
+[sampling]"""
+UNIFORM = 'upper = "0.030 mm", distribution = "uniform"'
 
 Params = Callable[..., np.recarray]
 
@@ -69,3 +83,23 @@ def random_errors() -> Callable[[int], dict[str, float]]:
         return errors
 
     return draw
+
+
+@pytest.fixture
+def one_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One core, so that commands simulate in this process: starting workers takes longer than few joints do."""
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
+
+
+@pytest.fixture(scope="session")
+def example_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the studies and files that examples name, of few joints at a cheap fidelity; tests copy it."""
+    folder = tmp_path_factory.mktemp("examples")
+    shutil.copytree(ROOT / "studies", folder / "studies")
+    study, narrow = folder / "studies" / "iso2768_f.toml", folder / "narrow.toml"
+    text = study.read_text(encoding="utf-8").replace("n = 1024", "n = 600").replace("[sampling]", f"[output]\n{CHEAP}")
+    study.write_text(text, encoding="utf-8")
+    narrow.write_text(text.replace('upper = "0.030 mm", distribution = "normal", cpk = 1.0', UNIFORM), encoding="utf-8")
+    tolstat.run(tolstat.load(study), folder / "iso2768_f.h5", workers=1)
+    tolstat.run(tolstat.load(narrow), folder / "narrow.h5", workers=1)
+    return folder

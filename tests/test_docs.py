@@ -29,7 +29,6 @@ PARTS = ["Intervals", "From Python", "On the page", "Limits of validity"]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\(([^()\s]+)\)")
-SMALL = 'histories = "harmonics+cycles"\n\n[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 36\n\n[sampling]'
 
 
 def name(path: Path) -> str:
@@ -160,24 +159,14 @@ def test_blocks_of_the_study_make_a_study(tmp_path: Path, page: str, added: str)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with the study and the files that the examples name, of few joints at each fidelity's cheapest."""
-    made = tmp_path_factory.mktemp("examples")
-    text = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8").replace("n = 1024", "n = 600")
-    text = text.replace("[sampling]", f"[output]\n{SMALL}")
-    (made / "studies").mkdir()
-    (made / "studies" / "iso2768_f.toml").write_text(text, encoding="utf-8")
-    (made / "narrow.toml").write_text(
-        text.replace(
-            'upper = "0.030 mm", distribution = "normal", cpk = 1.0', 'upper = "0.030 mm", distribution = "uniform"'
-        )
-    )
-    tolstat.run(tolstat.load(made / "studies" / "iso2768_f.toml"), made / "iso2768_f.h5", workers=1)
-    tolstat.run(tolstat.load(made / "narrow.toml"), made / "narrow.h5", workers=1)
+def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the study and the files that the examples name, where they may write."""
+    made = Path(shutil.copytree(example_files, tmp_path_factory.mktemp("docs") / "examples"))
     shutil.copy(made / "iso2768_f.h5", made / "histories.h5")
     return made
 
 
+@pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize("path", [DOCS / "python.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name)
 def test_examples_run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

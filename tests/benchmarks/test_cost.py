@@ -151,7 +151,7 @@ def test_other_integrators_are_those_that_are_installed(installed, others_named,
 def light(monkeypatch):
     """No worker processes and no other Pythons."""
     stints = {1: [Stint(1, 10, 0.0, 1.0, 1.0, 100.0)]}
-    monkeypatch.setattr(scaling, "measure", lambda these: scaling.table(stints))
+    monkeypatch.setattr(scaling, "measure", lambda these, quick: scaling.table(stints))
     starts = startup.Startup(0.2, 1.5, 1.0, 90.0, 80.0, None, None)
     monkeypatch.setattr(startup, "measure", lambda *args: starts)
 
@@ -170,7 +170,7 @@ def test_the_command_prints_tables_or_json(light, these, monkeypatch):
     assert facts["others"] is None
     against = others.Comparison(3, 1e-3, others.contenders(POINTS, 180))
     speeds = rates.Rates(**facts["rates"])
-    scales, starts = scaling.measure(None), startup.measure()
+    scales, starts = scaling.measure(None, True), startup.measure()
     whole = run.Cost("iso2768_f", {"processor": "some"}, speeds, found, scales, starts, against)
     text = page.text(whole)
     for word in ("one at a time", "assembly", "LAPACK", "workers", "--help", "compilation for dynamic joints", "Radau"):

@@ -45,7 +45,7 @@ def test_pages_that_are_not_built_get_the_commands(clone: Path) -> None:
 
 
 def test_the_commands_are_those_that_the_site_is_built_with() -> None:
-    """Extras and folders of the commands are those of the script that builds the site, the first page is the site's."""
+    """Extras and folders of the commands stand in the script that builds the site; the first page is the site's."""
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     install, build = own.BUILD
     assert install.partition("pip install")[2] in script

@@ -19,8 +19,8 @@ from tolstat.cli import bench
 
 COMMANDS = [name.replace("_", "-") for names in cli.COMMANDS.values() for name in names]
 STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
-CHEAP = 'histories = "harmonics+cycles"\n\n[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 36\n\n[sampling]'
-UNIFORM = 'upper = "0.030 mm", distribution = "uniform"'
+FEW = {"codes": 'codes = ["LSODA"]', "methods": 'methods = ["bdf2"]', "fidelities": 'fidelities = ["quasistatic"]'}
+"""One integrator of each side in ``studies/precision.toml``."""
 
 
 def call(*args: object) -> Result:
@@ -35,24 +35,19 @@ def example(command: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with the files that the examples name, of few joints at a cheap fidelity."""
-    folder = tmp_path_factory.mktemp("examples")
-    text = STUDY.replace("n = 1024", "n = 600").replace("[sampling]", f"[output]\n{CHEAP}")
-    (folder / "studies").mkdir()
-    shutil.copy(ROOT / "studies" / "precision.toml", folder / "studies")
+def made(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the files that the examples name; instruments have few settings."""
+    folder = Path(shutil.copytree(example_files, tmp_path_factory.mktemp("made") / "examples"))
+    precision = folder / "studies" / "precision.toml"
+    few = re.sub(r"(codes|methods|fidelities) = .*", lambda found: FEW[found[1]], precision.read_text(encoding="utf-8"))
+    precision.write_text(few, encoding="utf-8")
     study = folder / "studies" / "iso2768_f.toml"
-    study.write_text(text, encoding="utf-8")
-    narrow = folder / "narrow.toml"
-    narrow.write_text(text.replace('upper = "0.030 mm", distribution = "normal", cpk = 1.0', UNIFORM), encoding="utf-8")
-    (folder / "case.toml").write_text(synthetic.HEAD, encoding="utf-8")
-    tolstat.run(tolstat.load(study), folder / "iso2768_f.h5", workers=1)
-    tolstat.run(tolstat.load(narrow), folder / "narrow.h5", workers=1)
     for part, rows in (("part1", range(300)), ("part2", range(300, 601))):
         tolstat.run(tolstat.load(study), folder / f"{part}.h5", workers=1, rows=rows)
     return folder
 
 
+@pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
 def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -80,6 +75,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("command", TABLES)
+@pytest.mark.slow
 def test_tables_fit_80_columns_and_wide_ones_have_all(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -121,6 +121,7 @@ def alone(params, options):
     results = np.zeros(len(params), simulation.RESULT).view(np.recarray)
     samples = [own.copy() for _, own in simulation._alone(params, options, True, results)]
     stationary.fill_intervals(results)
+    results["clearance"] = params["clearance"]
     return results, samples
 
 

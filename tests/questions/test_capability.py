@@ -8,7 +8,8 @@ from scipy.stats import lognorm, norm
 from tests.support.views import view
 from tolstat.analysis import capability, exceedance
 from tolstat.common.tables import Status
-from tolstat.questions.capability import query
+from tolstat.questions.capability import query, rendering
+from tolstat.questions.exceedance.query import limits
 
 SEEDS = 2000
 LIMIT = 3.0
@@ -113,3 +114,37 @@ def test_a_joint_is_good_when_no_load_is_above_its_limit():
     assert 0 < above[:188].sum() < 188
     assert (together["count"], together["n"], together["n_failed"]) == (above[:188].sum(), 200, 7)
     assert together["good"] == pytest.approx(1.0 - above[:188].mean())
+
+
+def test_yields_have_the_total_interval_of_the_limits_table_with_the_numerical_error():
+    made = view(limits={"cross1.F": 700.0, "fork3.T": 26.0}, failed=2)
+    made.numerical_error = {"F": 0.02, "T": 0.01}
+    table, of_limits = query.limits(made), limits(made)
+    np.testing.assert_allclose(1.0 - table["good_lower"][:2], of_limits["total_upper"])
+    np.testing.assert_allclose(table["ppm_lower"][:2], 1e6 * of_limits["total_lower"])
+    made = view(limits={"cross1.F": 700.0, "fork3.T": 26.0}, failed=2)
+    made.numerical_error = {}
+    assert (table["good_lower"] <= query.limits(made)["good_lower"]).all()
+    assert table["good_lower"].iloc[-1] < query.limits(made)["good_lower"].iloc[-1]
+
+
+def test_indices_that_must_not_be_used_are_not_given():
+    table = query.limits(view(limits={"cross1.F": 700.0}, n=2001))
+    assert (table["normal_p"] < query.NOT_NORMAL).all()
+    assert table["cpk_normal"].isna().all()
+    assert table["cpk"].notna().all()
+    many = query.limits(view(limits={"cross1.F": 700.0}, failed=60))
+    assert many[["cpk", "cpk_lower", "cpk_normal"]].isna().all(axis=None)
+    assert "as uncertain as sampling" in rendering.note(many)
+
+
+def test_a_tail_that_is_not_generalised_pareto_is_not_extrapolated(monkeypatch):
+    made = view(limits={"cross1.F": 700.0}, n=2001)
+    good = query.returns(made, ["cross1.F"], [1000.0])
+    assert np.isfinite(good["estimate"]).all()
+    assert rendering.no_tail(good) == ""
+    monkeypatch.setattr(query, "NO_TAIL", 1.1)
+    poor = query.returns(made, ["cross1.F"], [1000.0])
+    assert poor.loc[0, "estimate":"shape_upper"].isna().all()
+    assert poor["p"].notna().all()
+    assert rendering.no_tail(poor.assign(p=0.01)).startswith("cross1.F: the tail is not generalised Pareto")

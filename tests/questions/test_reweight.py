@@ -217,3 +217,14 @@ def test_a_study_without_limits_has_quantiles(tmp_path):
     row = found.table.query("load == 'cross1.F' and share == 0.9").iloc[0]
     assert row["lower"] <= row["estimate"] <= row["upper"] < row["before"] + 20.0
     assert row["estimate"] < row["before"]
+
+
+def test_a_table_that_needs_new_runs_has_no_estimates(tmp_path):
+    text = synthetic.STUDY.replace("n = 60", "n = 400")
+    path = campaign(tmp_path, text, "few")
+    with Reader.open(path) as store:
+        found = campaigns.reweighted(store.view(), ["pin*.offset_t.plus_minus=0.01 mm"])
+    assert not found.weights.usable
+    assert found.table[["estimate", "lower", "upper", "bound_lower", "bound_upper"]].isna().all(axis=None)
+    assert found.table["before"].notna().all()
+    assert found.verdict.startswith("needs new runs, no estimates: ")

@@ -27,7 +27,7 @@ from tolstat.joint import nominal_errors, perturb
 from tolstat.kernel.mechanics import bushing
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, FRAME, PIN, TRIAD
 from tolstat.questions.show import query, rendering, section, source
-from tolstat.store import ResultStore
+from tolstat.store import Reader
 
 ALPHA = 0.3
 OPERATION = joints.Operation.model_construct(alpha=ALPHA, speed=50.0, torque=100.0)
@@ -159,7 +159,8 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
 
 
 def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
-    fitting = joints.load("cirelli2021", {"contact": {"D_H": "76 mm"}}, "test")
+    contact = {"D_H": "76 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"}
+    fitting = joints.load("cirelli2021", {"contact": contact}, "test")
     pairs = query.pairs(fitting, nominal_errors(1, OPERATION))
     assert one_joint.enlargement(pairs, 0.076, 0.022) == 1.0
     assert drawn(one_joint.draw, pairs, 0.076, 0.022)
@@ -236,7 +237,7 @@ def test_row_prints_the_errors_of_the_file(here):
     assert done.exit_code == 0, done.stderr
     assert (here / "row17.svg").read_text(encoding="utf-8").startswith("<?xml")
     lines = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()[1:]}
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         errors = store.errors(slice(17, 18))
         shown = source.read(path, 17)
     assert shown.errors == errors
@@ -271,7 +272,7 @@ def test_what_cannot_be_drawn_is_exit_code_2_and_writes_nothing(here, args, said
 
 
 def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
-    with ResultStore.open(synthetic.store(tmp_path)) as store:
+    with Reader.open(synthetic.store(tmp_path)) as store:
         view, asked = store.view(), Asked(store.path)
         panels = section.legend(view, asked)
         (part,) = section.sections(view, asked)

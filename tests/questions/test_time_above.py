@@ -114,7 +114,7 @@ def test_command_prints_limits_and_writes_curves(path, tmp_path):
 
 
 def test_shares_have_their_unit_with_intervals_and_without(path):
-    with ResultStore.open(path) as store:
+    with Reader.open(path) as store:
         table = time_above(store.view(), ["cross1.F"], ["700 N"]).table
     without = table.assign(**{name: np.nan for name in table if name.endswith(("_lower", "_upper"))})
     cells = []

@@ -18,8 +18,9 @@ from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.questions.exceedance import query
 from tolstat.questions.joints import query as joints
+from tolstat.report import headline as verdict
 from tolstat.report import html as writer
-from tolstat.report import page, verdict
+from tolstat.report import page
 from tolstat.store import Reader, revolutions
 from tolstat.store.recall import recall
 from tolstat.store.view import MAX_LISTED
@@ -156,12 +157,13 @@ def test_limits_and_their_verdicts_stand_on_the_page(view, html):
 
 @pytest.mark.parametrize(("low", "high", "answer"), [(0.01, 0.05, "yes"), (0.04, 0.06, "open"), (0.051, 0.2, "no")])
 def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, high, answer):
-    wide = {"outer_lower": 0.03, "outer_upper": 0.04, "total_lower": low, "total_upper": high}
+    counted = {"n": 100, "n_failed": 0, "n_unsettled": 0, "count": 4, "bound_lower": 0.04, "bound_upper": 0.04}
+    wide = counted | {"outer_lower": 0.03, "outer_upper": 0.04, "total_lower": low, "total_upper": high}
     assert verdict.verdict(wide, 0.05) == answer
-    narrow = {"outer_lower": low, "outer_upper": high, "total_lower": np.nan, "total_upper": np.nan}
+    narrow = counted | {"outer_lower": low, "outer_upper": high, "total_lower": np.nan, "total_upper": np.nan}
     assert verdict.verdict(narrow, 0.05) == answer
     assert verdict.verdict(narrow, np.nan) == ""
-    assert verdict.verdict(narrow | {"outer_lower": np.nan, "outer_upper": np.nan}, 0.05) == "open"
+    assert verdict.verdict(narrow | {"outer_lower": np.nan, "outer_upper": np.nan}, 0.05) == "none"
 
 
 def test_reader_holds_the_shares_that_are_counted(view):
@@ -222,14 +224,14 @@ def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
     page.write_page(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, replay=0)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert Reading(text).sections == ["verdict", "failed", "provenance"]
-    assert text.count(">open<") == 7
+    assert text.count(">no verdict<") == 8
 
 
 def test_dependent_samples_have_no_interval_on_the_page(tmp_path):
     text = synthetic.STUDY.replace("seed = 2021", 'seed = 2021\nmethod = "sobol"')
     said = words(synthetic.store(tmp_path, text), 0.01)[1]
     assert any(line.startswith("No intervals: Clopper–Pearson holds for independent samples only") for line in said)
-    assert said.count("open") == 7
+    assert said.count("no verdict") == 7
 
 
 def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
@@ -264,7 +266,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
         (["--out", "gone/p.html", "--accept", "much"], "is not a share"),
         (["--out", "p.html", "--accept", "much"], "is not a share"),
         (["--out", "p.html", "--accept", "110 %"], "is not a share"),
-        (["--accept", "5 %"], "is used with an HTML page only"),
+        (["--accept", "110 %"], "is not a share"),
     ],
 )
 def test_wrong_options_write_nothing(path, tmp_path, monkeypatch, arguments, said):

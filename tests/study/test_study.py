@@ -276,8 +276,8 @@ def test_a_fault_names_the_line_of_its_key(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text("[pin]\n\nl = 3\n", encoding="utf-8")
     places = [fault.place for fault in caught_by(lambda: read(tmp_path, ('"cirelli2021"', '"own.toml"')))]
     assert f"{tmp_path / 'own.toml'}:3: pin.l" in places
-    assert f"{tmp_path / 'own.toml'}:1: pin.A" in places
-    assert f"{tmp_path / 'own.toml'}: hub" in places
+    assert f"{tmp_path / 'own.toml'}:1: pin.d" in places
+    assert f"{tmp_path / 'own.toml'}: material" in places
 
 
 def caught_by(act: Callable[[], object]) -> tuple[Fault, ...]:

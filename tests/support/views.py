@@ -4,6 +4,7 @@ import numpy as np
 
 from tests.support import synthetic
 from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.tables import Options
 from tolstat.store.numbering import Numbering
 from tolstat.store.view import View
 
@@ -15,6 +16,7 @@ class FakeStore(Numbering):
         self.path, self.study_name, self.study_text = "made_up.h5", "made up", study_text
         self.sampling, self.limits, self.columns = {"method": method, "nominal_first": True}, limits, columns
         self.variants = ()
+        self.options = Options()._asdict()
         self.n, self.rows = len(results), range(len(results))
         self._errors, self._results = errors, results
 

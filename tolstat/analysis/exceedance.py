@@ -257,6 +257,34 @@ def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
     return float(high)
 
 
+def unresolved_matter(count: int, n: int, n_unresolved: int, confidence: float = 0.95) -> bool:
+    """Whether joints without a valid load make a share about as uncertain as sampling does, or more.
+
+    Parameters
+    ----------
+    count : int
+        Valid joints above the level.
+    n, n_unresolved : int
+        Joints simulated, and those of them without a valid load.
+    confidence : float
+        Confidence level of the Clopper–Pearson interval that tells how uncertain sampling makes the share.
+
+    Returns
+    -------
+    bool
+        Whether their share of all joints is at least half the width of the interval of the valid joints.
+
+    Examples
+    --------
+    >>> unresolved_matter(0, 61, 36), unresolved_matter(75, 1024, 2)
+    (True, False)
+    """
+    if not n_unresolved:
+        return False
+    lower, upper = clopper_pearson(count, n - n_unresolved, confidence)
+    return bool(n_unresolved / n >= 0.5 * (upper - lower))
+
+
 def exceedance(
     values: ArrayLike,
     status: ArrayLike,

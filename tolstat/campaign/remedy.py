@@ -27,6 +27,17 @@ WITHOUT_RESULTS = {
 """Remedies that do not depend on the results of the joint."""
 
 
+WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
+"""Sampling methods of a production whose joints are not independent."""
+
+
+def without_interval(method: str) -> str:
+    """Return why shares of a sampling method have no interval, and the remedy; empty if they have one."""
+    if method not in WITHOUT_INTERVAL:
+        return ""
+    return f'shares of {WITHOUT_INTERVAL[method]} have no interval: set sampling.method = "random" for a verdict'
+
+
 class Reason(NamedTuple):
     """Joints without a valid load that have the same status.
 

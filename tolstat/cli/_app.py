@@ -87,6 +87,14 @@ ByMany = Annotated[
     list[str] | None,
     typer.Option("--by", metavar="LOAD", help="Load, such as cross1.F; repeatable; default: loads with limits."),
 ]
+Accept = Annotated[
+    str | None,
+    typer.Option(
+        "--accept",
+        metavar="SHARE",
+        help='Accepted share of joints above a limit, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
 StudyOption = Annotated[
     Path | None,
@@ -161,6 +169,36 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
     for first, *others in found.values():
         more = f" (and {len(others)} more joints)" if others else ""
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
+
+
+def warn_without_interval(method: str) -> None:
+    """Print a warning if shares of a sampling method have no interval."""
+    from tolstat.campaign.remedy import without_interval
+
+    if said := without_interval(method):
+        warn(f"warning: {said}")
+
+
+def parse_share(text: str) -> float:
+    """Parse a share such as ``"0.1 %"``, ``"1000 ppm"`` or ``"1e-3"``.
+
+    Raises
+    ------
+    InputError
+        When the text is not a share between 0 and 1.
+    """
+    from pydantic_core import PydanticCustomError
+
+    from tolstat.common.units import to_si
+
+    try:
+        share = to_si(text, "1")
+    except PydanticCustomError:
+        share = -1.0
+    if not 0.0 < share < 1.0:
+        remedy = 'write --accept "0.1 %", --accept "1000 ppm" or --accept 0.001'
+        raise InputError([Fault("--accept", f"{text!r} is not a share between 0 and 1", remedy)])
+    return share
 
 
 def tell(report: Report) -> None:

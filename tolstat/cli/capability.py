@@ -55,5 +55,5 @@ def capability(
         typer.echo("\nload that one in N joints exceeds; median of the largest load of N joints")
         print_table(rendering.RETURNS, rare, wide)
     say(rendering.note(table))
-    if rare is not None and (rare["p"] < 0.05).any():
-        warn("warning: a tail with p < 0.05 is not generalised Pareto; do not use its estimate")
+    if rare is not None and (no_tail := rendering.no_tail(rare)):
+        warn(f"warning: {no_tail}; a subset simulation needs no tail: tolstat rare")

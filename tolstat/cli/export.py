@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, as_text, output_file
+from tolstat.cli._app import Accept, ResultFile, as_text, output_file, parse_share
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 
@@ -52,6 +53,7 @@ def export(
             help="With --statistics: load whose causes are included, such as cross1.F; repeatable.",
         ),
     ] = None,
+    accept: Accept = None,
     nominal: Annotated[
         bool,
         typer.Option("--nominal", help="Include the joint without errors, marked by a column."),
@@ -68,7 +70,8 @@ def export(
 
     --xlsx writes three sheets: the same columns, the share above each limit, the unit and meaning of each column.
 
-    --statistics writes the share above each limit, quantiles, capability, the numerical error and the versions.
+    --statistics writes the verdict, the share above each limit, quantiles, capability, the numerical error and the
+    versions.
 
     --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
     keeps cycles or load histories. docs/questions/fatigue.md shows how to read it as a pandas Series.
@@ -87,6 +90,9 @@ def export(
         )
     if by and statistics is None:
         raise typer.BadParameter("--by is used with --statistics only: add --statistics OUT")
+    if accept is not None and statistics is None:
+        raise typer.BadParameter("--accept is used with --statistics only: add --statistics OUT")
+    accepted = math.nan if accept is None else parse_share(accept)
     if nominal and (out, parquet, workbook, cycles) == (None, None, None, None):
         raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
     if parquet is not None and find_spec("pyarrow") is None:
@@ -102,7 +108,7 @@ def export(
         if cycles is not None:
             _write(cycles, *_collectives(store.view(), nominal))
         if statistics is not None:
-            _write(statistics, *_statistics(store, by or ()))
+            _write(statistics, *_statistics(store, by or (), accepted))
         if out is None and parquet is None and workbook is None:
             return
         frame = store.to_pandas(nominal)
@@ -136,13 +142,13 @@ def _collectives(view: View, nominal: bool) -> tuple[Callable[[TextIO], None], s
     return lambda stream: table.to_csv(stream, index=False, lineterminator="\n"), what
 
 
-def _statistics(store: Reader, by: Sequence[str]) -> tuple[Callable[[TextIO], object], str]:
+def _statistics(store: Reader, by: Sequence[str], accepted: float) -> tuple[Callable[[TextIO], object], str]:
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
     from tolstat.report import summary
 
     view = store.view()
-    found = summary.statistics(view)
+    found = summary.statistics(view, accepted=accepted)
     found["causes"] = {load: rendering.values(causes_of(view, load)) for load in by}
     return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_warnings
+from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_warnings, warn_without_interval
 from tolstat.cli._talk import progress, say
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ def plan(
 
     loaded = study.load(study_file, n=n)
     print_warnings(study_file, loaded.joints, loaded.variants)
+    warn_without_interval(loaded.sampling.method)
     announce_compilation()
     with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import ResultFile, Wide, announce_compilation, make_folder, tell, width_of
+from tolstat.cli._app import Accept, ResultFile, Wide, announce_compilation, make_folder, parse_share, tell, width_of
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
@@ -25,14 +26,7 @@ def report(
             help="Folder for the files, created if missing (default: folder of FILE), or an HTML page to write.",
         ),
     ] = None,
-    accept: Annotated[
-        str | None,
-        typer.Option(
-            "--accept",
-            metavar="SHARE",
-            help='With an HTML page: accepted share of joints above a limit: "0.1 %", "1000 ppm" or 0.001.',
-        ),
-    ] = None,
+    accept: Accept = None,
     again: Annotated[
         int | None,
         typer.Option(
@@ -47,8 +41,8 @@ def report(
 ) -> None:
     """Report the share of joints above each load.
 
-    Prints the share of joints above each limit; without limits, the quantiles of each bushing load; for a sweep, the
-    loads against the swept value. Writes the curves as PNG, SVG and CSV.
+    Prints the verdict and the share of joints above each limit; without limits, the quantiles of each bushing load; for
+    a sweep, the loads against the swept value. Writes the curves as PNG, SVG and CSV.
 
     With --out PAGE.html, writes a single page instead, with verdict, exceedance, capability, causes, worst joints,
     fatigue, contact modes, numerical error, failed joints and provenance. The campaign may be unfinished.
@@ -61,13 +55,12 @@ def report(
     from tolstat.report import build
     from tolstat.store import Reader
 
-    if accept is not None:
-        raise InputError([Fault("--accept", "is used with an HTML page only", "add --out page.html")])
+    accepted = math.nan if accept is None else parse_share(accept)
     if out is not None:
         Reader.open(file).close()  # check the file before the folder is created
         make_folder(out)
     with progress("report") as shown:
-        made = build(file, out, width_of(wide), shown.stage)
+        made = build(file, out, width_of(wide), shown.stage, accepted)
     tell(made)
 
 
@@ -100,32 +93,3 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None) -> None:
     with progress("page") as shown:
         page.write_page(file, out, accepted, again, shown.stage)
     say(f"wrote {out}")
-
-
-def parse_share(text: str) -> float:
-    """Parse a share such as ``"0.1 %"``, ``"1000 ppm"`` or ``"1e-3"``.
-
-    Raises
-    ------
-    InputError
-        When the text is not a share between 0 and 1.
-    """
-    from pydantic_core import PydanticCustomError
-
-    from tolstat.common.units import to_si
-
-    try:
-        share = to_si(text, "1")
-    except PydanticCustomError:
-        share = -1.0
-    if not 0.0 < share < 1.0:
-        raise InputError(
-            [
-                Fault(
-                    "--accept",
-                    f"{text!r} is not a share between 0 and 1",
-                    'write --accept "0.1 %", --accept "1000 ppm" or --accept 0.001',
-                )
-            ]
-        )
-    return share

@@ -28,7 +28,7 @@ def reweight(
     that under the tolerances of the campaign (likelihood ratio).
 
     Prints the share of joints above each limit with its 95 % interval, and a verdict. The verdict is "needs new runs"
-    if few joints have most of the weight; the table is then unreliable.
+    if few joints have most of the weight; no share is then given.
 
     Example: tolstat reweight iso2768_f.h5 --set "pin*.offset_t.plus_minus=0.1 mm"
     """

@@ -72,6 +72,16 @@ def sentence(words: str) -> str:
     return (words if any(letter.isdigit() for letter in first) else words[:1].upper() + words[1:]) + "."
 
 
+def formed(x: float, form: str = ".3g") -> str:
+    """Format by a format specification; NaN gives a dash."""
+    return "-" if math.isnan(x) else f"{x:{form}}"
+
+
+def ends(low: float, high: float, form: str) -> str:
+    """Format both ends of an interval by a format specification; NaN gives a dash."""
+    return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
+
+
 def percent(share: float) -> str:
     """Format a share in per cent, three digits; NaN gives a dash."""
     return "-" if math.isnan(share) else f"{100.0 * share:.3g} %"

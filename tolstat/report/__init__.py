@@ -6,12 +6,15 @@ gets its table.
 
 from __future__ import annotations
 
+import math
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
+from tolstat.common.tables import VALID
 from tolstat.display import table, text
 from tolstat.display.asked import silent
 from tolstat.display.table import WIDTH
@@ -57,6 +60,7 @@ def build(
     out_dir: str | Path | None = None,
     width: int | None = WIDTH,
     stage: Callable[[str], None] = silent,
+    accepted: float = math.nan,
 ) -> Report:
     """Write the report of a result file; the campaign may be unfinished.
 
@@ -76,6 +80,8 @@ def build(
         Characters in a line of the table; None for all columns.
     stage : callable
         Called with the name of each stage when it begins.
+    accepted : float
+        Accepted share: share of the joints that may be above each limit; NaN if none is given.
 
     Returns
     -------
@@ -98,7 +104,7 @@ def build(
             if store.case_names:
                 return _noted(_cases(store, stem, width), stands_on)
             view = store.view()
-            report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width)
+            report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width, accepted)
             for note in (view.missing(), _stopped(store.stop) if store.stop else "", stands_on):
                 report = _noted(report, note)
             return report
@@ -111,11 +117,12 @@ def _noted(report: Report, note: str) -> Report:
     return report._replace(notes=f"{report.notes}\n{note}") if note else report
 
 
-def _exceedance(view: View, stem: Path, width: int | None) -> Report:
+def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> Report:
     from tolstat.display import style
     from tolstat.questions.capability import query as capability
     from tolstat.questions.capability import rendering as capabilities
     from tolstat.questions.exceedance import query, rendering
+    from tolstat.report.headline import headline
 
     files, shown, more = [], "no largest load is kept; the results that are: tolstat export", ""
     if view.bushing_loads:
@@ -125,13 +132,17 @@ def _exceedance(view: View, stem: Path, width: int | None) -> Report:
         quantiles = query.quantiles(view)
         files.append(text.csv(quantiles, stem, "quantiles"))
         shown, more = _fitted(rendering.quantile_columns(), rendering.by_load(quantiles), width)
+    verdict = headline(view, accepted)
     if view.limits:
         limits = query.limits(view)
         files.append(text.csv(limits, stem, "limits"))
         shown, more = _fitted(rendering.LIMITS, limits, width)
-        if not view.weighted and limits["estimate"].notna().any():
-            shown += f"\n\n{capabilities.together(capability.limits(view))}"
-    notes = [more, view.head(), rendering.note(view), _accuracy(view)]
+    if verdict is not None:
+        shown = f"{textwrap.fill(text.sentence(verdict.sentence), WIDTH)}\n\n{shown}"
+        if verdict.answer and not view.weighted and view.count(*VALID):
+            kept = capabilities.together(capability.limits(view))
+            shown += f"\n\nyield: {kept.value} {kept.words}"
+    notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]
     return Report(shown, "\n".join(note for note in notes if note), files)
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Status
+from tolstat.report.headline import headline
 from tolstat.solver.fidelity import sentence
 
 if TYPE_CHECKING:
     from tolstat.store.view import View
 
 
-def statistics(view: View, confidence: float = 0.95) -> dict[str, Any]:
+def statistics(view: View, confidence: float = 0.95, accepted: float = math.nan) -> dict[str, Any]:
     """Collect the statistics of a campaign.
 
     Parameters
@@ -21,12 +23,16 @@ def statistics(view: View, confidence: float = 0.95) -> dict[str, Any]:
     view : View
         Campaign of a study whose joints are drawn from tolerances.
     confidence : float
-        Confidence level of all intervals.
+        Confidence level of all intervals; the verdict's are of 95 %.
+    accepted : float
+        Accepted share: share of the joints that may be above each limit; NaN if none is given.
 
     Returns
     -------
     dict
-        JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``joints``, numbers by status;
+        JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``verdict``, with ``answer``
+        (null without an accepted share), ``sentence`` and ``notes``, null without limits; ``joints``, numbers by
+        status;
         ``limits`` (share above each), ``quantiles`` of every load kept, ``capability`` (empty for weighted joints),
         each the rows of the table that the question of this name returns; ``numerical_error`` by kind of load;
         ``fidelity``, a sentence on the fidelity of the results; ``provenance``.
@@ -47,10 +53,12 @@ def statistics(view: View, confidence: float = 0.95) -> dict[str, Any]:
     if view.method in ("cases", "sweep"):
         remedy = "its joints are in: tolstat export --csv"
         raise StoreError(str(Fault(str(store.path), "holds no sample of a production, and has no statistics", remedy)))
+    verdict = headline(view, accepted)
     head = {
         "study": view.name,
         "method": view.method,
         "confidence": confidence,
+        "verdict": None if verdict is None else verdict.values(),
         "joints": {status.label: count for status in Status if (count := view.count(status))},
     }
     provenance = {

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from tolstat.analysis import exceedance as shares
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
@@ -19,12 +16,12 @@ from tolstat.display.blocks import Block, Card, Cards, Panel, Panels, Section, T
 from tolstat.display.table import Column, as_block
 from tolstat.questions.accuracy import rendering as accuracy
 from tolstat.questions.capability import query as capability
+from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
-from tolstat.questions.exceedance.rendering import LIMIT_DASH, LIMITS
+from tolstat.questions.exceedance.rendering import LIMIT_DASH, LIMITS, above
 from tolstat.questions.show import section as show
+from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, verdict
 from tolstat.store.view import View
-
-WORDS = {"yes": "kept", "no": "not kept", "open": "open"}
 
 
 def section(view: View, asked: Asked) -> Section:
@@ -32,10 +29,11 @@ def section(view: View, asked: Asked) -> Section:
     question = question_of(view.store.study_text)
     blocks: list[Block] = [Text(f"Question: {question}")] if question else []
     joint = show.legend(view, asked)
-    if view.sampled and view.limits:
+    found = headline(view, asked.accepted)
+    if found is not None:
         table = exceedance.limits(view)
         verdicts = [verdict(row, asked.accepted) for row in table.to_dict("records")]
-        blocks.append(Cards([*_headline(view, asked, table, verdicts), *_basis(view)]))
+        blocks.append(Cards([*_headline(view, found, table), *_basis(view)]))
         blocks += _limits(view, asked, table, verdicts, joint)
     else:
         blocks.append(Cards(_basis(view)))
@@ -57,54 +55,27 @@ def question_of(text: str) -> str:
     return " ".join(found[1].split()) if found else ""
 
 
-def verdict(row: Mapping[Any, Any], accepted: float) -> str:
-    """Verdict on a limit: whether the interval `ends` of its share lies below or above the accepted share.
-
-    Parameters
-    ----------
-    row : mapping
-        A row of `exceedance.limits`.
-    accepted : float
-        Accepted share: share of the joints that may be above the limit; NaN if none is given.
-
-    Returns
-    -------
-    str
-        ``yes`` (below), ``no`` (above), ``open`` (neither, or no interval); empty without an accepted share.
-    """
-    if np.isnan(accepted):
-        return ""
-    low, high = ends(row)
-    if np.isnan(low):
-        return "open"
-    return "yes" if high <= accepted else "no" if low > accepted else "open"
-
-
-def ends(row: Mapping[Any, Any]) -> tuple[float, float]:
-    """Interval that covers sampling, unresolved joints and, if known, the numerical error."""
-    wide = (row["total_lower"], row["total_upper"])
-    return (row["outer_lower"], row["outer_upper"]) if np.isnan(wide[0]) else wide
-
-
-def _headline(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str]) -> list[Card]:
-    count, cards = len(table), []
-    if asked.judges:
-        kept = verdicts.count("yes")
-        whole = "no" if "no" in verdicts else "open" if "open" in verdicts else "yes"
-        label = f"limits kept: at most {text.percent(asked.accepted)} of the joints are above"
-        words = ", ".join(f"{verdicts.count(v)} {WORDS[v]}" for v in ("no", "open") if v in verdicts)
-        cards.append(Card(f"{kept} of {count}", label, words or "each with 95 % confidence", whole))
-    if not view.weighted:
-        together = capability.limits(view).iloc[-1]
-        keep = "its limit" if count == 1 else f"all {count} limits"
-        interval = text.span(together["good_lower"], together["good_upper"])
-        cards.append(Card(text.percent(together["good"]), f"of the joints keep {keep} (yield)", f"95 %: {interval}"))
+def _headline(view: View, found: Headline, table: pd.DataFrame) -> list[Card]:
+    """The verdict; then, unless it is what the verdict says, the yield; the limit exceeded most."""
+    note = " ".join(text.sentence(note) for note in found.notes)
+    cards = [
+        Card(
+            found.value,
+            found.words,
+            note,
+            "open" if found.answer == "none" else found.answer,
+        )
+    ]
+    if found.answer and not view.weighted and view.count(*VALID):
+        together = capabilities.together(capability.limits(view))
+        cards.append(Card(together.value, together.words, "Yield"))
     first = table[table["load"].isin(view.leading)].sort_values("estimate", ascending=False, kind="stable")
-    if first["estimate"].notna().any():
-        worst = first.iloc[0]
+    if first["estimate"].notna().any() and first["load"].iloc[0] not in found.words:
+        worst = first.iloc[0].to_dict()
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"
-        interval = text.span(worst["outer_lower"], worst["outer_upper"])
-        cards.append(Card(text.percent(worst["estimate"]), label, f"95 %: {interval}"))
+        low, high = ends(worst)
+        interval = "no interval" if np.isnan(low) else f"total interval {text.span(low, high)}"
+        cards.append(Card(share_of(worst), label, f"{above(worst)} joints with a valid load; {interval}"))
     return cards
 
 
@@ -144,20 +115,8 @@ def _limits(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str], 
     blocks: list[Block] = [Panels([panel, *joint])]
     blocks += [Text(show.LEGEND, small=True)] if joint else []
     blocks.append(block)
-    if "open" in verdicts and view.iid and not view.weighted:
-        blocks.append(Text(_open(table.to_dict("records"), verdicts, asked.accepted)))
     blocks.append(Text(_how(view, asked), small=True))
     return blocks
-
-
-def _open(records: list[dict[Any, Any]], verdicts: list[str], accepted: float) -> str:
-    """Sentence on the number of joints that would decide each open limit if the shares stayed the same."""
-    said = []
-    for row, answer in zip(records, verdicts, strict=True):
-        if answer == "open":
-            joints = np.inf if np.isnan(row["estimate"]) else shares.needed(row["estimate"], accepted)
-            said.append(f"{row['load']} {text.number(joints) if joints < 1e7 else 'unknown'}")
-    return f"Valid joints that would decide the open limits if their shares stayed the same: {', '.join(said)}."
 
 
 def _how(view: View, asked: Asked) -> str:
@@ -168,10 +127,11 @@ def _how(view: View, asked: Asked) -> str:
         )
     said = "Joints are counted by their weights. " if view.weighted else ""
     said += "Intervals are Clopper–Pearson's, 95 % for each limit by itself; failed and unsettled joints are counted "
-    said += "below the limit at the lower end and above it at the upper end."
+    said += "below the limit at the lower end and above it at the upper end of the total interval, which covers the "
+    said += "numerical error, too, where it is known."
     if asked.judges:
         said += f" A limit is kept if the widest interval lies below {text.percent(asked.accepted)}, not kept if it"
-        said += " lies above, and open otherwise: more joints will decide."
+        said += " lies above. It has no verdict where joints without a valid load decide, and is open otherwise."
     return said
 
 

@@ -127,6 +127,10 @@ class SampleLoad:
         """Diagnostics of the weights above a level; see `weighted.trust`."""
         return weighted.trust_of(self._weighted, level)
 
+    def supports(self, level: float) -> bool:
+        """Whether the weights of the joints support a share above a level; equal weights always do."""
+        return self.weights is None or self.trust(level).usable
+
     def shifted(self, by: FloatArray) -> SampleLoad:
         """Return the load of the same joints with `by`, (n,), added to values and ends."""
         return replace(self, values=self.values + by, ends=(self.ends[0] + by, self.ends[1] + by))

@@ -96,7 +96,7 @@ def measure(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], No
     say("parts of a Newton iteration")
     parts = iteration.measure(these, rounds)
     say("workers")
-    scales = scaling.measure(these)
+    scales = scaling.measure(these, quick)
     say("start of a process, with compilation into an empty cache" if cold else "start of a process")
     starts = startup.measure(str(path), cold, 1 if quick else 3)
     against = None

@@ -18,9 +18,9 @@ from tolstat.campaign.executors import Lost, Work, available_workers, map_in_pro
 from tolstat.common.tables import Options
 from tolstat.solver import simulation
 
-BLOCKS = 8
+BLOCKS, QUICK_BLOCKS = 8, 2
 """Blocks per worker."""
-BLOCK = 128
+BLOCK, QUICK_BLOCK = 128, 32
 """Joints per block."""
 
 
@@ -69,13 +69,15 @@ def counts(most: int) -> list[int]:
     return [*powers, most]
 
 
-def measure(these: Sample, workers: Sequence[int] | None = None) -> list[Scale]:
+def measure(these: Sample, quick: bool, workers: Sequence[int] | None = None) -> list[Scale]:
     """Simulate blocks of the joints with each number of workers.
 
     Parameters
     ----------
     these : Sample
         The joints.
+    quick : bool
+        Few and small blocks: to check that everything runs, not for the numbers.
     workers : sequence of int, optional
         Numbers of processes, the first of them 1; by default 1, 2, 4 and so on, up to one a core.
 
@@ -83,8 +85,9 @@ def measure(these: Sample, workers: Sequence[int] | None = None) -> list[Scale]:
     -------
     list of Scale
     """
-    block = np.resize(these.params, BLOCK)
-    stints = {n: _run(block, these.options, n) for n in workers or counts(available_workers())}
+    block = np.resize(these.params, QUICK_BLOCK if quick else BLOCK)
+    blocks = QUICK_BLOCKS if quick else BLOCKS
+    stints = {n: _run([block] * (blocks * n), these.options, n) for n in workers or counts(available_workers())}
     return table(stints)
 
 
@@ -125,11 +128,10 @@ def _after_first(done: list[Stint]) -> float:
     return max(one.mb for one in first.values())
 
 
-def _run(block: NDArray[np.void], options: Options, workers: int) -> list[Stint]:
+def _run(blocks: Sequence[NDArray[np.void]], options: Options, workers: int) -> list[Stint]:
     work: Work[NDArray[np.void], Stint | Lost] = Work(
         partial(_simulate, options), prepare=partial(simulation.warm_up, options)
     )
-    blocks = [block] * (BLOCKS * workers)
     stints = []
     with closing(map_in_processes(work, blocks, workers)) as results:
         for _, stint in results:

@@ -47,7 +47,7 @@ class Allocation(NamedTuple):
         ``proposed`` (half band, SI), ``factor``, ``cost_before``, ``cost``.
     limits : DataFrame
         One row per limit, from joints that the search did not use: ``limit``, ``target``, ``before`` (share of all
-        joints as drawn), ``estimate``, ``lower``, ``upper``, ``ess``.
+        joints as drawn), ``estimate``, ``lower``, ``upper`` (NaN if the weights are not usable), ``ess``.
     entries : dict
         Keys of the changed entries of ``[tolerances]`` by pattern.
     weights : Weights
@@ -181,6 +181,8 @@ def allocated(
         for share, ess, target in table[["estimate", "ess", "target"]].to_numpy(float)
     ]
     needed = max(growth) * weights.ess
+    if not weights.usable:
+        table[["estimate", "lower", "upper"]] = np.nan
     return Allocation(view.study, _tolerances(request, entries), table, entries, weights, choice.aim, needed)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import text
 from tolstat.display.table import Column, Row
@@ -29,6 +27,6 @@ LIMITS = (
     Column("before", lambda row: text.percent(row["before"])),
     Column("proposed", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
-    Column("counts as joints", lambda row: "-" if math.isnan(row["ess"]) else f"{row['ess']:.0f}", rank=1),
+    Column("counts as joints", lambda row: text.formed(row["ess"], ".0f"), rank=1),
 )
 """Columns of the table `Allocation.limits`."""

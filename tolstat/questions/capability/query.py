@@ -9,12 +9,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tolstat.analysis import capability, extreme
+from tolstat.analysis import capability, exceedance, extreme
 from tolstat.display import text
+from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
 TOGETHER = "all limits"
+NOT_NORMAL = 0.01
+"""p-value of the test of normality below which no index of a normal load is given."""
+NO_TAIL = 0.05
+"""p-value of the test of the fit below which a tail is not extrapolated."""
 
 
 def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
@@ -31,27 +36,38 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above);
-        ``good`` and ``ppm`` with ``_lower`` and ``_upper``, which count unresolved joints below and above the limit;
-        ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``, ``needed``. The last row,
-        `TOGETHER`, is for the largest ratio of load to limit of each joint.
+        ``good`` and ``ppm`` with ``_lower`` and ``_upper``, total intervals: they cover sampling, unresolved joints
+        and, if known, the numerical error; ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``,
+        ``needed``. The last row, `TOGETHER`, is for the largest ratio of load to limit of each joint. ``cpk_normal``
+        is NaN where the load is not normal (``normal_p`` below `NOT_NORMAL`), both indices where unresolved joints
+        matter (`analysis.exceedance.unresolved_matter`).
     """
+    loads = view.loads(list(view.limits))
+    ends = [error_budget.shifted(view, load) for load in loads]
+    known = [pair for pair in ends if pair is not None]
+    whole = (_largest([low for low, _ in known]), _largest([high for _, high in known])) if all(ends) else None
     rows = []
-    for load in [*view.loads(list(view.limits)), _utilization(view)]:
+    for load, pair in zip([*loads, _largest(loads)], [*ends, whole], strict=True):
         assert load.limit is not None
         c = capability.of_sample(load.sample, load.limit, confidence, view.iid)
         row = {"load": load.name, "unit": load.unit, "limit": load.limit, "n": c.above.n}
         row |= {key: getattr(c.above, key) for key in ("n_failed", "n_unsettled", "count")}
-        for key in ("good", "ppm"):
-            row |= dict(zip((key, f"{key}_lower", f"{key}_upper"), getattr(c, key), strict=True))
+        low, high = error_budget.total_interval(load, pair, load.limit, confidence)
+        row |= {"good": 1.0 - c.above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
+        row |= {"ppm": 1e6 * c.above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
         names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
         row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
+        if exceedance.unresolved_matter(c.above.count, c.above.n, c.above.n_failed + c.above.n_unsettled):
+            row |= dict.fromkeys(names, np.nan)
+        if c.normal_p < NOT_NORMAL:
+            row |= dict.fromkeys(names[3:], np.nan)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _utilization(view: View) -> SampleLoad:
+def _largest(loads: Sequence[SampleLoad]) -> SampleLoad:
     """Largest ratio of load to limit of each joint, with the limit 1; computed load by load to save memory."""
-    parts = [load.of_limit() for load in view.loads(list(view.limits))]
+    parts = [load.of_limit() for load in loads]
     ends = (np.maximum.reduce([part.ends[k] for part in parts]) for k in (0, 1))
     largest = np.maximum.reduce([part.values for part in parts])
     return replace(
@@ -78,7 +94,8 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
     DataFrame
         One row per load and N: ``load``, ``unit``, ``one_in``, ``estimate``, ``lower``, ``upper``, ``bound_lower`` and
         ``bound_upper`` (unresolved joints counted below, above), ``fleet``, ``fleet_lower``, ``fleet_upper``,
-        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``. SI units.
+        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``. SI units. Loads and shape
+        are NaN where the tail is not generalised Pareto (``p`` below `NO_TAIL`).
 
     Raises
     ------
@@ -95,6 +112,8 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
             row["bound_lower"], row["bound_upper"] = tail.bounds(1.0 / number)
             row |= dict(zip(("fleet", "fleet_lower", "fleet_upper"), tail.largest(int(number)), strict=True))
             row |= dict(zip(("shape", "shape_lower", "shape_upper"), tail.shape, strict=True))
+            if tail.p < NO_TAIL:
+                row |= dict.fromkeys(list(row)[3:], np.nan)
             rows.append({**row, "p": tail.p, "n_above": tail.n_above})
     return pd.DataFrame(rows)
 

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import pandas as pd
 
+from tolstat.analysis import exceedance
 from tolstat.display import text
 from tolstat.display.table import Column, Row
+from tolstat.questions.capability.query import NO_TAIL, NOT_NORMAL
 
 
 def _with_ends(row: Row, key: str, form: str) -> str:
-    low, high = row[f"{key}_lower"], row[f"{key}_upper"]
-    return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
-
-
-def _number(value: float, form: str) -> str:
-    return "-" if math.isnan(value) else f"{value:{form}}"
+    return text.ends(row[f"{key}_lower"], row[f"{key}_upper"], form)
 
 
 LIMITS = (
@@ -24,14 +22,14 @@ LIMITS = (
     Column("limit", lambda row: text.value(row["limit"], row["unit"])),
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("yield", lambda row: text.percent(row["good"])),
-    Column("interval of yield", lambda row: text.span(row["good_lower"], row["good_upper"])),
+    Column("total interval", lambda row: text.span(row["good_lower"], row["good_upper"])),
     Column("ppm", lambda row: text.number(row["ppm"]), rank=1),
     Column("interval of ppm", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1"), rank=2),
-    Column("Cpk", lambda row: _number(row["cpk"], ".2f")),
+    Column("Cpk", lambda row: text.formed(row["cpk"], ".2f")),
     Column("interval of Cpk", lambda row: _with_ends(row, "cpk", ".2f")),
-    Column("Cpk if normal", lambda row: _number(row["cpk_normal"], ".2f"), rank=4),
+    Column("Cpk if normal", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),
 )
-"""Columns of the table `query.limits`."""
+"""Columns of the table `query.limits`; the total interval is that of the yield."""
 
 RETURNS = (
     Column("load", lambda row: str(row["load"])),
@@ -45,13 +43,44 @@ RETURNS = (
 """Columns of the table `query.returns`; the largest of N joints is the median of it over fleets of N."""
 
 
-def together(table: pd.DataFrame) -> str:
-    """Sentence on the joints that keep all limits, from the last row of `query.limits`."""
+WIDEST = 0.5
+"""Total interval of a yield, or its bounds without one, from which on it says too little for a verdict."""
+
+
+class Yield(NamedTuple):
+    """Yield of all limits together, in words.
+
+    Attributes
+    ----------
+    value : str
+        The estimate, or the interval where joints without a valid load matter.
+    words : str
+        What it is the share of, number of joints, total interval.
+    decides : bool
+        Whether the interval is narrower than `WIDEST`.
+    """
+
+    value: str
+    words: str
+    decides: bool
+
+
+def together(table: pd.DataFrame) -> Yield:
+    """Share of the joints that keep all limits, from the last row of `query.limits`."""
     row = table.iloc[-1]
-    valid = int(row["n"] - row["n_failed"] - row["n_unsettled"])
-    count, what = valid - int(row["count"]), "all limits" if len(table) > 2 else "the limit"
-    interval = text.span(row["good_lower"], row["good_upper"])
-    return f"yield, {what}: {text.percent(row['good'])} (95 %: {interval}), {count} of {valid} joints"
+    n, above = int(row["n"]), int(row["count"])
+    unresolved = int(row["n_failed"] + row["n_unsettled"])
+    valid, low, high = n - unresolved, row["good_lower"], row["good_upper"]
+    keep = f"keep all {len(table) - 1} limits" if len(table) > 2 else "keep the limit"
+    kind, known = "total interval", not math.isnan(low)
+    if not known:
+        low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
+    counted = f"{valid - above} of {valid}" + (" with a valid load" if unresolved else "")
+    if exceedance.unresolved_matter(above, n, unresolved):
+        covers = kind if known else "bounds"
+        return Yield(text.span(low, high), f"of the joints {keep} ({counted}; {covers})", high - low < WIDEST)
+    interval = f"{kind} {text.span(low, high)}" if known else "no interval"
+    return Yield(text.percent(row["good"]), f"of the joints {keep} ({counted}; {interval})", high - low < WIDEST)
 
 
 def note(table: pd.DataFrame) -> str:
@@ -59,11 +88,22 @@ def note(table: pd.DataFrame) -> str:
     lines = ["limits are upper limits: Cpk is Cpu, of median and 99.865 % quantile (ISO 22514-2), and there is no Cp"]
     unresolved = int((table["n_failed"] + table["n_unsettled"]).iloc[0])
     if unresolved:
-        lines.append(f"{unresolved} joints without a valid load: in the intervals of ppm both ways, in no Cpk")
+        of = f"{unresolved} of {table['n'].iloc[0]} joints without a valid load"
+        lines.append(f"{of}: in the intervals of yield and ppm both ways, in no Cpk")
+    if unresolved and table["cpk"].isna().any():
+        lines.append("no Cpk where joints without a valid load make a share as uncertain as sampling does")
     if (table["cpk_lower"] == 0).any():
         lines.append(f"lower ends of Cpk need {table['needed'].iloc[0]} valid joints")
-    if (table["normal_p"] < 0.01).any():
-        lines.append("loads are not normal: do not use the column 'Cpk if normal' (p < 0.01)")
+    if (table["normal_p"] < NOT_NORMAL).any():
+        lines.append(f"no 'Cpk if normal' where a load is not normal (p < {NOT_NORMAL:g})")
     if table["ppm_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only; run replicates of other seeds")
     return "\n".join(lines)
+
+
+def no_tail(table: pd.DataFrame) -> str:
+    """Sentence on the loads of `query.returns` whose tail cannot be extrapolated; empty if there are none."""
+    names = list(dict.fromkeys(table["load"][table["p"] < NO_TAIL]))
+    if not names:
+        return ""
+    return f"{', '.join(names)}: the tail is not generalised Pareto (p < {NO_TAIL:g}) and is not extrapolated"

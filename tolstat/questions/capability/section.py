@@ -37,9 +37,11 @@ def _rare(view: View) -> list[Block]:
         except ValueError as error:
             said.setdefault(str(error), []).append(name)
             continue
-        tables.append(table)
-        if (table["p"] < 0.05).any():
-            said.setdefault("the tail is not generalised Pareto (p < 0.05): do not extrapolate it", []).append(name)
+        if rendering.no_tail(table):
+            reason = rendering.no_tail(table).removeprefix(f"{name}: ")
+            said.setdefault(reason, []).append(name)
+        else:
+            tables.append(table)
     title = "Rare loads, from a generalised Pareto tail"
     blocks: list[Block] = [as_block(title, rendering.RETURNS, pd.concat(tables))] if tables else []
     if said:

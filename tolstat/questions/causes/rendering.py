@@ -11,7 +11,7 @@ import pandas as pd
 
 from tolstat.common.loads import unit_text
 from tolstat.display.table import Column, Row
-from tolstat.display.text import records
+from tolstat.display.text import ends, records
 
 if TYPE_CHECKING:
     from tolstat.questions.causes.query import Causes
@@ -131,9 +131,7 @@ def _interval(row: Row, name: str, factor: float = 1.0) -> str:
 
 
 def _ends(row: Row, name: str, factor: float = 1.0) -> str:
-    low, high = factor * row[f"{name}_lower"], factor * row[f"{name}_upper"]
-    form = ".1f" if factor > 1 else "+.2f"
-    return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
+    return ends(factor * row[f"{name}_lower"], factor * row[f"{name}_upper"], ".1f" if factor > 1 else "+.2f")
 
 
 def _tail(row: Row, name: str) -> str:

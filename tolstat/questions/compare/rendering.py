@@ -19,7 +19,7 @@ from tolstat.analysis import difference, exceedance
 from tolstat.common.loads import unit_text
 from tolstat.display import style
 from tolstat.display.table import Column, Row
-from tolstat.display.text import csv, limit, percent
+from tolstat.display.text import csv, formed, limit, percent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -176,7 +176,7 @@ def _share_columns(paired: bool) -> tuple[Column, ...]:
         Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
         Column("only A", only("a"), rank=1),
         Column("only B", only("b"), rank=1),
-        Column("p", lambda row: "-" if math.isnan(row["p"]) else f"{row['p']:.2g}"),
+        Column("p", lambda row: formed(row["p"], ".2g")),
     )
 
 

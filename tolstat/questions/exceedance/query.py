@@ -10,9 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.analysis.accuracy import size
-from tolstat.common.loads import LOADS, unit_text
+from tolstat.common.loads import unit_text
 from tolstat.display import text
+from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
@@ -20,6 +20,12 @@ SHARES = (0.5, 0.9, 0.95, 0.99)
 COVERED = 0.99
 """Share of the joints that the tolerance limit covers."""
 ERROR_BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
+WITHHELD = (
+    "estimate",
+    *(f"{kind}{end}" for kind in ("", "bound_", "outer_") for end in ("lower", "upper")),
+    *ERROR_BUDGET,
+)
+"""Shares and intervals, which are not given where the weights of joints do not support them."""
 MAX_LEVELS = 600
 """Maximum number of points of a curve."""
 READER_LEVELS = 240
@@ -41,14 +47,16 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
     DataFrame
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
         `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
-        `_error_budget`. Loads in SI units.
+        `_error_budget`. Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
+        `SampleLoad.supports`.
     """
     rows = []
     for name, level in view.limits.items():
         load = view.load(name)
         head = {"load": name, "unit": load.unit, "nominal": load.nominal}
         budget = _error_budget(view, load, level, confidence)
-        rows.append({**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget})
+        row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
+        rows.append(row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan))
     return pd.DataFrame(rows)
 
 
@@ -62,12 +70,11 @@ def _error_budget(view: View, load: SampleLoad, level: float, confidence: float)
         and ``numerical_upper``, the estimates with loads shifted down and up; ``total_lower`` and ``total_upper``,
         their ends ``outer_lower`` and ``outer_upper``: cover numerical error, sampling and unresolved joints.
     """
-    error = view.numerical_error.get(LOADS[load.name].kind, np.nan)
-    if np.isnan(error):
+    error, ends = error_budget.relative(view, load.name), error_budget.shifted(view, load)
+    if ends is None:
         return {"numerical_error": error} | dict.fromkeys(ERROR_BUDGET, np.nan)
-    shift = error * size(view.results, load.name)
-    low, high = (load.shifted(by).above(level, confidence) for by in (-shift, shift))
-    bounds = (low.estimate, high.estimate, low.outer_lower, high.outer_upper)
+    estimates = (end.above(level, confidence).estimate for end in ends)
+    bounds = (*estimates, *error_budget.total_interval(load, ends, level, confidence))
     return {"numerical_error": error, **dict(zip(ERROR_BUDGET, bounds, strict=True))}
 
 

@@ -39,11 +39,16 @@ def _outer(row: Row) -> str:
     return text.span(row[f"{kind}_lower"], row[f"{kind}_upper"])
 
 
+def above(row: Row) -> str:
+    """Joints above a limit, and of how many with a valid load."""
+    return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
+
+
 LIMITS = (
     Column("load", lambda row: str(row["load"])),
     Column("limit", lambda row: text.value(row["level"], row["unit"])),
     Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=1),
-    Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
+    Column("above", above),
     Column("share", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
     Column("with unresolved joints", _outer, shown=_has_unresolved, rank=2),
@@ -122,13 +127,15 @@ def note(view: View) -> str:
 
 
 def _distrust(view: View) -> str:
-    """Words on limits whose share is unreliable, because too few effective joints are above them."""
+    """Words on limits without a share, because too few effective joints are above them."""
     poor = []
     for name, level in view.limits.items():
-        found = view.load(name).trust(level)
-        if not found.usable:
-            poor.append(f"{name} ({found.effective:.0f} effective joints above, Pareto k {found.k:.2f})")
-    return f"; not to be trusted, needs more joints or other proposals: {', '.join(poor)}" if poor else ""
+        load = view.load(name)
+        if not load.supports(level):
+            found = load.trust(level)
+            tail = "" if np.isnan(found.k) else f", Pareto k {found.k:.2f}"
+            poor.append(f"{name} ({found.effective:.0f} effective joints above{tail})")
+    return f"; no share, needs more joints or other proposals: {', '.join(poor)}" if poor else ""
 
 
 def figure(view: View, confidence: float = 0.95) -> Figure:

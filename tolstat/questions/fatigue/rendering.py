@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
@@ -42,10 +40,6 @@ def _line(row: Row) -> str:
     return f"{text.value(row['S0'], CHANNELS[row['channel']])} at {row['N0']:g} cycles, m = {row['m']:g}"
 
 
-def _damage(x: float) -> str:
-    return "-" if math.isnan(x) else f"{x:.3g}"
-
-
 LOADS = (
     Column("channel and exponent", lambda row: f"{row['channel']}, m = {row['m']:g}"),
     Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=2),
@@ -56,8 +50,8 @@ LOADS = (
 DAMAGES = (
     Column("channel", lambda row: str(row["channel"])),
     Column("S–N line", _line, words=True, rank=3),
-    Column("nominal damage", lambda row: _damage(row["nominal"]), rank=2),
-    Column("median", lambda row: _damage(row["median"]), rank=1),
+    Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=2),
+    Column("median", lambda row: text.formed(row["median"]), rank=1),
     Column("joints above 1", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("share", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),

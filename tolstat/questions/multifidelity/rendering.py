@@ -28,6 +28,6 @@ TABLE = (
     Column("high fidelity alone", lambda row: _value(row, "alone"), rank=1),
     Column("95 % interval of it", lambda row: _ends(row, "alone_"), rank=3),
     Column("correlation", lambda row: f"{row['rho']:.4f}".replace("nan", "-"), rank=2),
-    Column("gain", lambda row: f"{row['gain']:.3g}".replace("nan", "-")),
+    Column("gain", lambda row: text.formed(row["gain"])),
 )
 """Columns of the table `TwoFidelities.table`."""

@@ -255,7 +255,7 @@ def _is_done(plan: Study, out: Path) -> bool:
     """Whether the file has all rows of the study simulated."""
     if not out.exists():
         return False
-    with ResultStore.open(out) as store:
+    with Reader.open(out) as store:
         differing = differing_keys(store.identity, json.loads(json.dumps(plan.identity())))
         return store.complete and not differing
 

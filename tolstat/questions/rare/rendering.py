@@ -13,20 +13,15 @@ from tolstat.common.loads import UNIT_OF_LOAD, unit_text
 from tolstat.display import text
 from tolstat.display.table import Column
 
-
-def _short(x: float) -> str:
-    return "-" if math.isnan(x) else f"{x:.3g}"
-
-
 LEVELS = (
     Column("level", lambda row: str(row["level"])),
     Column("threshold", lambda row: "-" if math.isinf(row["threshold"]) else text.value(row["threshold"], row["unit"])),
-    Column("P(above it)", lambda row: _short(row["probability"])),
+    Column("P(above it)", lambda row: text.formed(row["probability"])),
     Column("share that goes on", lambda row: text.percent(row["share"])),
     Column("its deviation", lambda row: text.percent(row["deviation"])),
     Column("joints", lambda row: str(row["joints"])),
     Column("accepted moves", lambda row: text.percent(row["acceptance"]), rank=1),
-    Column("step", lambda row: _short(row["step"]), rank=2),
+    Column("step", lambda row: text.formed(row["step"]), rank=2),
 )
 """Columns of the table `table`; the deviation is the coefficient of variation of the share."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,6 +27,8 @@ SHARES = (0.5, 0.9, 0.99)
 """Quantiles of a study without limits."""
 MAX_OUTSIDE = 1e-4
 """Maximum probability of the new distribution outside the range of the old one; no estimate covers that part."""
+WITHHELD = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
+"""Columns that are NaN where too few joints support them."""
 _ENDS = np.array([1e-12, 1 - 1e-12])
 
 
@@ -44,6 +46,7 @@ class Reweighted(NamedTuple):
         One row per limit: ``load``, ``unit``, ``level``, ``before`` (share of the joints as drawn), ``estimate``,
         ``lower``, ``upper``, ``bound_lower`` and ``bound_upper`` (joints without a valid load counted below and above),
         ``ess``. For a study without limits, quantiles: ``share`` instead of ``level``, loads as estimates, no bounds.
+        Estimates, intervals and bounds are NaN where the weights, or ``ess`` joints, do not support them (`usable`).
     """
 
     weights: Weights
@@ -55,7 +58,13 @@ class Reweighted(NamedTuple):
         """Sentence on whether the table is reliable."""
         w = self.weights
         figures = f"{len(w.values)} joints count as {w.ess:.0f}; Pareto k {w.k:.2f}, {w.allowed:.2f} allowed"
-        return figures if w.usable else f"needs new runs: {figures}, {reweight.LEAST_ESS} joints needed"
+        if not w.usable:
+            return f"needs new runs, no estimates: {figures}, {reweight.LEAST_ESS} joints needed"
+        missing = int(self.table["estimate"].isna().sum())
+        some = (
+            f"; {missing} of {len(self.table)} rows need new runs: they count as fewer than {reweight.LEAST_ESS} joints"
+        )
+        return figures + (some if missing else "")
 
 
 def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) -> Reweighted:
@@ -112,7 +121,14 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
         rows = [_share_above(load, weights, view.limits[load.name], confidence) for load in loads]
     else:
         rows = [_quantile(load, weights, share, confidence) for load in loads for share in SHARES]
-    return Reweighted(weights, names, pd.DataFrame(rows))
+    return Reweighted(weights, names, pd.DataFrame([_supported(row, weights) for row in rows]))
+
+
+def _supported(row: dict[str, Any], weights: Weights) -> dict[str, Any]:
+    """Row of the table, without its estimate where too few joints support it."""
+    if weights.usable and row["ess"] >= reweight.LEAST_ESS:
+        return row
+    return row | {key: np.nan for key in WITHHELD if key in row}
 
 
 def _check_range(name: str, old: Distribution, new: Distribution) -> list[Fault]:
@@ -162,7 +178,7 @@ def _block_log_ratios(
     return logs
 
 
-def _share_above(load: SampleLoad, weights: Weights, level: float, confidence: float) -> dict[str, object]:
+def _share_above(load: SampleLoad, weights: Weights, level: float, confidence: float) -> dict[str, Any]:
     """Row of the table for a limit; `weights` are those of the joints of `load`."""
     valid = load.is_valid
     found = reweight.share_above(load.values[valid], _restricted(weights, valid), level, confidence, load.iid)
@@ -172,7 +188,7 @@ def _share_above(load: SampleLoad, weights: Weights, level: float, confidence: f
     return {**head, **found._asdict(), **bounds}
 
 
-def _quantile(load: SampleLoad, weights: Weights, share: float, confidence: float) -> dict[str, object]:
+def _quantile(load: SampleLoad, weights: Weights, share: float, confidence: float) -> dict[str, Any]:
     """Row of the table for a quantile; `weights` are those of the joints of `load`."""
     part = _restricted(weights, load.is_valid)
     estimate, lower, upper = reweight.quantile(load.values[load.is_valid], part, share, confidence, load.iid)

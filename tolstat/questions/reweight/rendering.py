@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import pandas as pd
@@ -30,7 +29,7 @@ def columns(table: pd.DataFrame) -> tuple[Column, ...]:
         Column("before", value("before")),
         Column("after", value("estimate")),
         Column("95 % interval", ends),
-        Column("counts as joints", lambda row: "-" if math.isnan(row["ess"]) else f"{row['ess']:.0f}", rank=1),
+        Column("counts as joints", lambda row: text.formed(row["ess"], ".0f"), rank=1),
     )
     unresolved = Column(
         "with unresolved joints",

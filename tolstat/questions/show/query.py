@@ -50,7 +50,7 @@ def dimensions(joint: Joint, alpha: float) -> Dimensions:
 
 
 def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
-    """Pins 1 to 4 with the holes that they turn in, of one joint.
+    """Pins 1 to 4 with the holes that they turn in, of one joint; an error of the clearance widens the hole.
 
     Parameters
     ----------
@@ -64,11 +64,11 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
     for i, arm in enumerate(ARM_OF_PIN):
         names = PINS[i], HOLES[arm]
         own = tuple({kind: float(errors[f"{name}.{kind}"][0]) for kind in KINDS} for name in names)
-        pin = _feature(par["pin_point"][i], par["pin_axis"][i], PIN_TRIADS[i], joint.contact.D_P + own[0]["diameter"])
-        hole = _feature(
-            par["hole_point"][arm], par["hole_axis"][arm], ARM_TRIADS[arm], joint.contact.D_H + own[1]["diameter"]
-        )
-        found.append(Pair(names, pin, hole, float(par["clearance"][i]), (own[0], own[1])))
+        clearance = float(par["clearance"][i])
+        diameter = joint.contact.D_P + own[0]["diameter"]
+        pin = _feature(par["pin_point"][i], par["pin_axis"][i], PIN_TRIADS[i], diameter)
+        hole = _feature(par["hole_point"][arm], par["hole_axis"][arm], ARM_TRIADS[arm], diameter + 2.0 * clearance)
+        found.append(Pair(names, pin, hole, clearance, (own[0], own[1])))
     return found
 
 

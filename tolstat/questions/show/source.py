@@ -13,8 +13,7 @@ from tolstat import study
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_toml
 from tolstat.joint import Joint
-from tolstat.store import ResultStore
-from tolstat.store.reader import Reader
+from tolstat.store import Reader
 from tolstat.store.recorded import joint_of
 
 ALPHA = float(np.radians(15.0))
@@ -62,7 +61,7 @@ def read(source: str | Path, row: int | None = None, alpha: float | None = None)
     path = Path(source)
     if path.is_file() and path.suffix != ".toml":
         _refuse(alpha)
-        with ResultStore.open(path) as store:
+        with Reader.open(path) as store:
             return _of_file(store, row)
     if row is not None:
         raise InputError([Fault(str(source), "has no rows, which --row asks for", "give a result file: FILE.h5")])

@@ -1,0 +1,171 @@
+"""The verdict on campaigns built to mislead: the same sentence in page, text and JSON, no more than the file tells."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.support import synthetic
+from tests.support.views import view
+from tolstat import report
+from tolstat.analysis.exceedance import clopper_pearson, needed
+from tolstat.cli import app
+from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.display.asked import Asked
+from tolstat.questions.exceedance import query as exceedance
+from tolstat.report import headline, page, summary
+from tolstat.store import Reader, ResultStore
+
+ONE = synthetic.STUDY.partition("[limits]")[0] + '[limits]\n"cross1.F" = "1500 N"\n'
+PROPOSAL = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
+
+
+def study(n=60, method="random", text=ONE):
+    made = text.replace("n = 60", f'n = {n}\nmethod = "{method}"')
+    return made + PROPOSAL if method == "importance" else made
+
+
+def interfering(folder):
+    """36 of 61 joints whose pin is larger than its hole; none of the others is above the limit."""
+    path = synthetic.store(folder, study(61), simulated=0)
+    results = synthetic.results(62)
+    for name in RESULT.names:
+        if RESULT[name].base.kind == "f":
+            results[name][1:37] = np.nan
+    results["status"][1:37], results["settled"][1:37] = Status.OUTSIDE_MODEL, 0
+    with ResultStore.open_to_write(path) as store:
+        store.write(np.arange(62), Simulation(results, None))
+    return path
+
+
+MISLEADING = {
+    "all failed": (lambda d: synthetic.store(d, study(), failed=60), "none", "100 % of the joints have no result"),
+    "half interfering": (interfering, "none", "59 % of the joints have no result (36 of 61)"),
+    "Sobol'": (lambda d: synthetic.store(d, study(64, "sobol")), "none", "shares of Sobol' points have no interval"),
+    "Latin hypercube": (lambda d: synthetic.store(d, study(64, "lhs")), "none", "a Latin hypercube have no interval"),
+    "importance": (
+        lambda d: synthetic.store(d, study(300, "importance")), "none",
+        "too few effective joints are above cross1.F > 1500 N: 0",
+    ),
+    "interrupted": (
+        lambda d: synthetic.store(d, study(600), simulated=300), "open",
+        "the joints that exceed 1500 N on cross1.F may be more or fewer than 1 % (total interval 0 .. 1.23 %)",
+    ),
+    "not begun": (lambda d: synthetic.store(d, study(), simulated=0), "none", "no joint has been simulated"),
+    "three joints": (lambda d: synthetic.store(d, study(3)), "open", "fewer than 1 % (total interval 0 .. 70.8 %)"),
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _without_pictures(monkeypatch):
+    monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
+    monkeypatch.setattr("tolstat.questions.exceedance.rendering.figure", lambda view: None)
+    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
+
+
+def everywhere(path, accepted):
+    """Sentence of the verdict in text, JSON and first card of the page."""
+    text = report.build(path, accepted=accepted)
+    with Reader.open(path) as store:
+        made = store.view()
+        json_ = summary.statistics(made, accepted=accepted)["verdict"]
+        first = page.compose(made, Asked(path, accepted)).sections[0]
+    card = next(block for block in first.blocks if block.kind == "cards").cards[0]
+    separator = ":" if card.verdict else ""
+    assert text.table.splitlines()[0].lower() == f"{json_['sentence']}.".lower()
+    assert f"{card.value}{separator} {card.label}" == json_["sentence"]
+    assert all(note in text.notes for note in json_["notes"])
+    return json_, card
+
+
+@pytest.mark.parametrize("name", MISLEADING)
+def test_no_verdict_says_more_than_the_file(tmp_path, name):
+    make, answer, words = MISLEADING[name]
+    said, card = everywhere(make(tmp_path), 0.01)
+    assert said["answer"] == headline.WORDS[answer]
+    assert words in said["sentence"]
+    assert card.verdict == "open"
+    assert "100 % of the joints keep" not in said["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("all failed", "no verdict: 100 % of the joints have no result (60 of 60)"),
+        ("half interfering", "no verdict: 59 % of the joints have no result (36 of 61)"),
+        ("Sobol'", "100 % of the joints keep the limit (64 of 64; no interval)"),
+        ("importance", "no verdict: too few effective joints are above cross1.F > 1500 N: 0"),
+        ("interrupted", "100 % of the joints keep the limit (299 of 299; total interval 98.8 .. 100 %)"),
+        ("three joints", "no verdict: 3 joints are too few"),
+    ],
+)
+def test_without_an_accepted_share_the_yield_leads_where_its_interval_tells_something(tmp_path, name, sentence):
+    said, _ = everywhere(MISLEADING[name][0](tmp_path), np.nan)
+    assert said["sentence"] == sentence
+
+
+def test_joints_without_a_result_have_a_cause_and_a_remedy(tmp_path):
+    said, card = everywhere(interfering(tmp_path), 0.01)
+    assert said["notes"][0].startswith("36 outside_model: ")
+    assert "Row 1: negative clearance" in said["notes"][0]
+    assert said["notes"][0] in card.note
+
+
+def test_pending_joints_are_told(tmp_path):
+    said, _ = everywhere(synthetic.store(tmp_path, study(600), simulated=300), 0.05)
+    assert said["answer"] == "kept"
+    assert said["notes"] == ["301 of 600 joints are still pending"]
+
+
+def test_a_limit_that_is_not_kept_leads_with_its_share(tmp_path):
+    said, card = everywhere(synthetic.store(tmp_path), 0.05)
+    low, high = clopper_pearson(20, 60)
+    interval = f"{100 * low:.3g} .. {100 * high:.3g} %"
+    assert said["sentence"] == (
+        f"not kept: 33.3 % of the joints exceed 700 N on cross1.F (total interval {interval}); 5 % is accepted"
+    )
+    assert said["notes"][0] == "of 7 limits: 1 not kept, 6 open"
+    assert card.verdict == "no"
+
+
+@pytest.mark.parametrize(("failed", "shown"), [(0, "100 %"), (9, r"\d.* \.\. 100 %")])
+def test_a_share_that_joints_without_a_result_decide_is_shown_as_its_interval(failed, shown):
+    made = headline.headline(view(failed=failed, limits={"cross1.F": 2000.0}))
+    assert made.answer == ""
+    assert re.fullmatch(shown, made.value)
+
+
+def test_joints_that_would_decide_count_those_without_a_result():
+    made = view(failed=2, limits={"cross1.F": 2000.0})
+    row = exceedance.limits(made).to_dict("records")[0]
+    said = headline.deciding([row], 0.02)
+    assert said.endswith(f"cross1.F {needed(2 / 200, 0.02):.0f}")
+    assert needed(2 / 200, 0.02) > needed(0.0, 0.02)
+    near = exceedance.limits(view(failed=1, limits={"cross1.F": 2000.0})).to_dict("records")
+    assert headline.deciding(near, 0.003).endswith("no number of them")
+
+
+def test_the_command_line_takes_an_accepted_share(tmp_path):
+    path = interfering(tmp_path)
+    done = CliRunner().invoke(app, ["report", str(path), "--accept", "1 %"])
+    assert done.exit_code == 0
+    assert done.stdout.startswith("No verdict: 59 % of the joints have no result (36 of 61).\n")
+    told = CliRunner().invoke(app, ["export", str(path), "--statistics", "-", "--accept", "1 %"])
+    assert json.loads(told.stdout)["verdict"]["answer"] == "no verdict"
+    assert CliRunner().invoke(app, ["export", str(path), "--csv", "-", "--accept", "1 %"]).exit_code == 2
+
+
+@pytest.mark.parametrize(("method", "told"), [("sobol", True), ("lhs", True), ("random", False)])
+def test_run_and_plan_tell_before_that_shares_will_have_no_interval(tmp_path, monkeypatch, method, told):
+    monkeypatch.chdir(tmp_path)
+    source = tmp_path / "s.toml"
+    source.write_text(study(64, method), encoding="utf-8")
+    monkeypatch.setattr("tolstat.cli.run.simulate", lambda *given, **choices: None)
+    monkeypatch.setattr("tolstat.cli.run.conclude", lambda *given: None)
+    monkeypatch.setattr("tolstat.cli.plan.announce_compilation", lambda: None)
+    monkeypatch.setattr("tolstat.campaign.plan.plan", lambda *given: 1 / 0)
+    for command in ("run", "plan"):
+        done = CliRunner().invoke(app, [command, str(source), "--quiet"])
+        assert ("have no interval: set sampling.method" in done.stderr) == told

@@ -1,0 +1,226 @@
+"""The verdict of a campaign in one sentence, as page, text and JSON give it: no more than the file tells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tolstat.analysis import exceedance as shares
+from tolstat.campaign.remedy import without_interval
+from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED
+from tolstat.display import text
+from tolstat.questions.capability import query as capability
+from tolstat.questions.capability import rendering as capabilities
+from tolstat.questions.exceedance import query as exceedance
+from tolstat.questions.joints import query as joints
+from tolstat.store.view import View
+
+WORDS = {"yes": "kept", "no": "not kept", "open": "open", "none": "no verdict"}
+"""Answers of `verdict` in words."""
+Row = Mapping[Any, Any]
+
+
+class Headline(NamedTuple):
+    """The verdict.
+
+    Attributes
+    ----------
+    answer : str
+        ``yes``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share can be.
+    value, words : str
+        The answer or, without one, a share or its interval; the rest of the sentence.
+    notes : tuple of str
+        Causes, remedies, and what else restricts the verdict.
+    """
+
+    answer: str
+    value: str
+    words: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """The whole sentence, without full stop."""
+        return f"{self.value}{':' if self.answer else ''} {self.words}"
+
+    def values(self) -> dict[str, Any]:
+        """JSON values: ``answer`` in words or null, ``sentence``, ``notes``."""
+        return {"answer": WORDS.get(self.answer), "sentence": self.sentence, "notes": list(self.notes)}
+
+
+def headline(view: View, accepted: float = np.nan) -> Headline | None:
+    """Verdict of a campaign.
+
+    Parameters
+    ----------
+    view : View
+        The campaign; it may be unfinished.
+    accepted : float
+        Accepted share: share of the joints that may be above each limit; NaN if none is given.
+
+    Returns
+    -------
+    Headline or None
+        None without limits, and for joints that are no sample of a production.
+    """
+    if not (view.sampled and view.limits):
+        return None
+    counts = view.counts
+    if not counts.done:
+        return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
+    records = exceedance.limits(view).to_dict("records")
+    found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
+    worst = max(records, key=lambda row: np.nan_to_num(row["estimate"], nan=-1.0))
+    unresolved = _causes(view) if _matter(records if found.answer == "none" else [worst]) else ()
+    return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
+
+
+def verdict(row: Row, accepted: float) -> str:
+    """Verdict on a limit: whether the interval `ends` of its share lies below or above the accepted share.
+
+    Parameters
+    ----------
+    row : mapping
+        A row of `exceedance.limits`.
+    accepted : float
+        Accepted share: share of the joints that may be above the limit; NaN if none is given.
+
+    Returns
+    -------
+    str
+        ``yes`` (below), ``no`` (above), ``open`` (neither), ``none``: no interval, or joints without a valid load
+        decide, so that more joints do not help; empty without an accepted share.
+    """
+    if np.isnan(accepted):
+        return ""
+    low, high = ends(row)
+    if np.isnan(low):
+        return "none"
+    if high <= accepted or low > accepted:
+        return "yes" if high <= accepted else "no"
+    undecided = row["bound_lower"] <= accepted < row["bound_upper"]
+    return "none" if not row["n"] or (undecided and _matter([row])) else "open"
+
+
+def ends(row: Row) -> tuple[float, float]:
+    """Interval that covers sampling, unresolved joints and, if known, the numerical error."""
+    wide = (row["total_lower"], row["total_upper"])
+    return (row["outer_lower"], row["outer_upper"]) if np.isnan(wide[0]) else wide
+
+
+def share_of(row: Row) -> str:
+    """Share above a limit or, where unresolved joints matter, its interval or bounds."""
+    if not _matter([row]):
+        return text.percent(row["estimate"])
+    low, high = ends(row)
+    return text.span(low, high) if not np.isnan(low) else text.span(row["bound_lower"], row["bound_upper"])
+
+
+def deciding(records: list[dict[Any, Any]], accepted: float) -> str:
+    """Sentence on the number of simulated joints that would decide each open limit; empty if none is open."""
+    said = [f"{row['load']} {_needed(row, accepted)}" for row in records if verdict(row, accepted) == "open"]
+    if not said:
+        return ""
+    return f"Joints that would decide the open limits if their shares stayed the same: {', '.join(said)}"
+
+
+def _needed(row: Row, accepted: float) -> str:
+    """Number of simulated joints, those without a valid load included, whose interval excludes the accepted share."""
+    low, high = row["bound_lower"], row["bound_upper"]
+    if not np.isnan(row["numerical_lower"]):
+        part = (row["n_failed"] + row["n_unsettled"]) / row["n"]
+        low = min(low, row["numerical_lower"] * (1.0 - part))
+        high = max(high, row["numerical_upper"] * (1.0 - part) + part)
+    if low <= accepted <= high:
+        return "no number of them"
+    joints = shares.needed(high if high < accepted else low, accepted)
+    return text.number(joints) if joints < 1e7 else "more than 1e7"
+
+
+def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headline:
+    answers = [verdict(row, accepted) for row in records]
+    answer = next(own for own in ("no", "none", "open", "yes") if own in answers)
+    count, most = len(records), text.percent(accepted)
+    numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
+    notes: tuple[str, ...] = (f"of {count} limits: {numbers}",) if count > 1 else ()
+    decide = deciding(records, accepted) if view.iid and not view.weighted else ""
+    notes += (decide,) if decide else ()
+    concerned = [row for row, own in zip(records, answers, strict=True) if own == answer]
+    if answer == "none":
+        return Headline(answer, WORDS[answer], _reason(view, concerned), notes)
+    worst = max(concerned, key=lambda row: row["estimate"])
+    limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
+    interval = f"total interval {text.span(*ends(worst))}"
+    if answer == "no":
+        share = share_of(worst)
+        interval = "total interval" if _matter([worst]) else interval
+        said = f"{share} of the joints exceed {limit} ({interval}); {most} is accepted"
+    elif answer == "yes":
+        which = limit if count == 1 else f"each of the {count} limits"
+        said = f"at most {most} of the joints exceed {which} (largest share {share_of(worst)}, {interval})"
+    else:
+        which = limit if len(concerned) == 1 else f"{len(concerned)} limits, most of all {limit}"
+        said = f"the joints that exceed {which} may be more or fewer than {most} ({interval})"
+    return Headline(answer, WORDS[answer], said, notes)
+
+
+def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
+    """Without an accepted share: share of the joints that keep all limits; of weighted joints, of the worst limit."""
+    notes = () if view.iid else (without_interval(view.method),)
+    if view.weighted:
+        known = [row for row in records if not np.isnan(row["estimate"])]
+        if not known or _undecided(known):
+            return Headline("none", WORDS["none"], _reason(view, records), notes)
+        worst = max(known, key=lambda row: row["estimate"])
+        limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
+        interval = "total interval" if _matter([worst]) else f"total interval {text.span(*ends(worst))}"
+        return Headline(
+            "", share_of(worst), f"of the joints exceed {limit}, the limit exceeded most ({interval})", notes
+        )
+    found = capabilities.together(capability.limits(view))
+    if not found.decides:
+        return Headline("none", WORDS["none"], _reason(view, records), notes)
+    return Headline("", found.value, found.words, notes)
+
+
+def _undecided(records: list[dict[Any, Any]]) -> bool:
+    return max(high - low for low, high in map(ends, records)) >= capabilities.WIDEST
+
+
+def _reason(view: View, records: list[dict[Any, Any]]) -> str:
+    """Why there is no verdict on some limits."""
+    lost = max(row["n_failed"] + row["n_unsettled"] for row in records)
+    n = max(row["n"] for row in records)
+    poor = [row for row in records if row["n"] > lost and np.isnan(row["estimate"])]
+    if poor:
+        trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
+        limit = text.limit(poor[0]) + (f" (and {len(poor) - 1} more)" if len(poor) > 1 else "")
+        return f"too few effective joints are above {limit}: {trust.effective:.0f}"
+    if _matter(records):
+        what = "valid result" if view.count(*UNSETTLED) else "result"
+        return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
+    if not view.iid:
+        return without_interval(view.method)
+    return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
+
+
+def _matter(records: list[dict[Any, Any]] | list[Row]) -> bool:
+    return any(
+        shares.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]) for row in records
+    )
+
+
+def _causes(view: View) -> Iterator[str]:
+    """Most frequent status of the joints without a valid load, its meaning, and the remedy for the first of them."""
+    states = sorted((s for s in (*FAILED, *UNSETTLED) if view.count(s)), key=lambda s: -view.count(s))
+    first = {joint.status: joint for joint in reversed(joints.without_load(view))} if states else {}
+    for state in states[:1]:
+        said = f"{view.count(state)} {state.label}: {STATUS_TEXT[state]}"
+        yield f"{said}. Row {first[state.label].row}: {first[state.label].remedy}" if state.label in first else said
+
+
+def _pending(view: View) -> tuple[str, ...]:
+    pending = view.counts.total - view.counts.done
+    return (f"{pending} of {view.counts.total} joints are still pending",) if pending else ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -39,11 +40,13 @@ nb_merge_streams = True
 
 
 def setup(app: Any) -> None:
-    """Connect the hook that makes the tree of pages, and make the folder for pages that notebooks write."""
+    """Connect the hook that makes the tree of pages; make the folder for pages of notebooks and README's drawing."""
     app.connect("source-read", add_tree)
     pages = Path(app.outdir, "docs")
     pages.mkdir(parents=True, exist_ok=True)
     os.environ["SITE_PAGES"] = str(pages)
+    for drawing in (ROOT / "docs").glob("joint*.svg"):  # in HTML of the README, where Sphinx does not see it
+        shutil.copy(drawing, pages)
 
 
 def add_tree(app: Any, docname: str, source: list[str]) -> None:

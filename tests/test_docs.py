@@ -115,6 +115,16 @@ def test_a_notebook_is_stored_without_outputs(path: Path) -> None:
     assert [cell["id"] for cell in ran if cell["outputs"] or cell["execution_count"] is not None] == []
 
 
+def test_every_study_is_in_the_gallery_with_a_picture() -> None:
+    text = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    studies = [path for path in (ROOT / "studies").iterdir() if path.suffix == ".toml" or path.is_dir()]
+    sections = text.split("\n## ")[1:]
+    assert [
+        name(path) for path in studies if f"](../studies/{path.name}" not in text and path.name != "__pycache__"
+    ] == []
+    assert [section.partition("\n")[0] for section in sections if "\n![" not in section] == []
+
+
 def test_every_question_has_a_page() -> None:
     assert sorted(path.stem for path in (DOCS / "questions").glob("*.md")) == QUESTIONS
 
@@ -156,6 +166,7 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return made
 
 
+@pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize("path", [DOCS / "python.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name)
 def test_examples_run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

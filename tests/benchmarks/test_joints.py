@@ -24,6 +24,7 @@ def test_any_rows_are_those_of_the_campaign(method, tmp_path):
     assert parameters(base, rows).tobytes() == expected.tobytes()
 
 
+@pytest.mark.slow
 def test_each_joint_of_a_family_has_its_own_variant():
     base = study.load(STUDIES / "cirelli2021" / "cirelli2021.toml")
     rows = np.arange(0, base.rows, base.rows // 50)

@@ -195,6 +195,7 @@ def small(tmp_path: Path) -> study.Study:
     return study.load(path)
 
 
+@pytest.mark.slow
 def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -> None:
     made = plan.plan(small, workers=2, pilot=20)
     assert (made.rows, made.dimensions, made.pilot, made.workers) == (61, 4, 20, 2)
@@ -271,6 +272,7 @@ def test_a_plan_simulates_variants_as_they_are(tmp_path: Path, monkeypatch: pyte
         np.testing.assert_array_equal(made[0].results["F_max"], store.results()["F_max"])
 
 
+@pytest.mark.slow
 def test_a_plan_chooses_the_fidelity_that_the_campaign_chooses(tmp_path: Path) -> None:
     text = synthetic.STUDY.replace("n = 60", "n = 6").replace("[limits]", '[solver]\nfidelity = "auto"\n[limits]')
     (tmp_path / "a.toml").write_text(text, encoding="utf-8")

@@ -125,6 +125,7 @@ def test_a_campaign_reaches_every_state_of_the_supervisor(tmp_path: Path) -> Non
         assert (store.results()["failed_step"][[2, 5]] == -1).all()
 
 
+@pytest.mark.slow
 def test_status_counts_each_state(path: Path) -> None:
     done = CliRunner().invoke(cli.app, ["status", str(path), "--json"])
     assert done.exit_code == 0, done.output
@@ -134,6 +135,7 @@ def test_status_counts_each_state(path: Path) -> None:
     assert {name: told[name] for name in others} == dict.fromkeys(others, 1)
 
 
+@pytest.mark.slow
 def test_each_state_can_be_asked_for_again(path: Path) -> None:
     made = study.load(path.with_suffix(".toml"))
     for state in Status:

@@ -301,12 +301,12 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
 @pytest.mark.slow
 def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
-        "500 rpm", "1100 rpm"
+        "500 rpm", "1000 rpm"
     )
     found = verify.check_study(study.load(written(tmp_path, text)), joints=1, names=(*verify.QUICK_CHECKS, "reference"))
     true = force_and_torque(found.base, found.checks["reference"].results)
     seen = force_and_torque(found.base, found.checks["fidelity"].results)
-    assert true.min() > 1e-3  # the inertia of bodies that deviate from the ideal motion
+    assert true.min() > 5e-4  # the inertia of bodies that deviate from the ideal motion
     np.testing.assert_allclose(seen, true, rtol=0.3)
     assert force_and_torque(found.base, found.checks["half_step"].results).max() < 0.1 * true.min()
     assert "error of numerics and fidelity, measured" in rendering.note(found)

@@ -49,7 +49,7 @@ def test_the_commands_are_those_that_the_site_is_built_with() -> None:
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     install, build = own.BUILD
     assert install.partition("pip install")[2] in script
-    assert build.partition(" -q ")[2] == script.partition("sphinx-build -q -W --keep-going ")[2].partition("\n")[0]
+    assert build.partition(" -q ")[2] == script.partition("sphinx-build -q -W --keep-going ")[2].partition(" >")[0]
     settings = (ROOT / "docs" / "conf.py").read_text(encoding="utf-8")
     assert f'root_doc = "{own.BUILT.relative_to("build/docs").with_suffix("")}"' in settings
 

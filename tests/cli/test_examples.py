@@ -47,6 +47,7 @@ def made(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
 def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,6 +75,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("command", TABLES)
+@pytest.mark.slow
 def test_tables_fit_80_columns_and_wide_ones_have_all(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

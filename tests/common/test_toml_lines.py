@@ -199,6 +199,7 @@ class Writer:
 
 @settings(max_examples=150, deadline=None)
 @given(tree=st.dictionaries(st.sampled_from(sorted(KEYS)), TREES, max_size=5), seed=st.integers(0, 10**6))
+@pytest.mark.slow
 def test_every_key_of_an_odd_file_is_at_its_line(tree: dict, seed: int) -> None:
     writer = Writer(seed)
     writer.table(tree, (), ())

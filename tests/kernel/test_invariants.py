@@ -73,6 +73,7 @@ def measured(par, t, q, v):
     ).of[0]
 
 
+@pytest.mark.slow
 def test_kinetic_energy_is_that_of_particles(params, random_errors):
     par, t, q, v = loaded(params, random_errors, "mode")
     places, masses = along(t, q, v, np.zeros(N_DOF), par, 1e-5)

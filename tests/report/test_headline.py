@@ -67,7 +67,7 @@ def _without_pictures(monkeypatch):
 
 def everywhere(path, accepted):
     """Sentence of the verdict in text, JSON and first card of the page."""
-    text = report.build(path, accepted=accepted)
+    text = report.build(path, width=None, accepted=accepted)
     with Reader.open(path) as store:
         made = store.view()
         json_ = summary.statistics(made, accepted=accepted)["verdict"]

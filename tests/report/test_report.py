@@ -191,7 +191,7 @@ def test_sweep_page_shows_unsettled_and_failed_joints():
 
 def test_report_of_a_random_view(tmp_path):
     path = synthetic.store(tmp_path, failed=2)
-    made = report.build(path)
+    made = report.build(path, width=None)
     names = [f"small_{what}" for what in ("exceedance.png", "exceedance.svg", "exceedance.csv")]
     names += ["small_quantiles.csv", "small_limits.csv"]
     assert [file.name for file in made.files] == names

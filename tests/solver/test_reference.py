@@ -40,6 +40,7 @@ def test_independent_solutions(name):
     assert_largest(row, largest[:, 0], largest[:, 1], 1e-5)
 
 
+@pytest.mark.slow
 def test_limit_of_the_solver():
     """At 2880 steps a revolution and another method of integration, the same loads."""
     par = case("ang_cross_z_15")
@@ -59,6 +60,7 @@ def test_statics_of_the_straight_joint(params):
 
 
 @pytest.mark.parametrize("integrator", ["BDF", "LSODA"])
+@pytest.mark.slow
 def test_other_integrators_agree(integrator):
     par = case("ideal_15")
     row, other = reference_rows(par, OPTIONS)[0], reference_rows(par, OPTIONS, 1e-4, integrator, 1e-3)[0]
@@ -78,6 +80,7 @@ def test_jacobian_is_the_slope_of_the_rate():
     np.testing.assert_allclose(jacobian[:55, 55:], np.eye(55), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_what_did_not_repeat_in_the_steps_allowed_keeps_its_largest_loads(params):
     par = params(alpha=0.2)
     full = reference_rows(par, OPTIONS)[0]

@@ -72,6 +72,7 @@ def test_parquet_has_columns_units_and_rows(tmp_path):
     assert frame.attrs["units"]["cross1.T_max"] == "N*m"
 
 
+@pytest.mark.slow
 def test_excel_has_sheets_for_joints_limits_and_units(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     path, out = synthetic.store(tmp_path, failed=2), tmp_path / "x.xlsx"

@@ -346,6 +346,7 @@ def test_the_method_needs_cases(tmp_path: Path) -> None:
     assert "add [[case]]" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_paper_as_printed() -> None:
     s = study.load(PAPER)
     (number,) = (i for i, v in enumerate(s.variants) if v.family == "as printed")
@@ -358,6 +359,7 @@ def test_the_paper_as_printed() -> None:
     assert joint.perturb(printed, sampling.draw(s)[:1])["arm_mass"][0] == 0.3516
 
 
+@pytest.mark.slow
 def test_the_paper_s_cases_and_choices() -> None:
     s = study.load(PAPER)
     errors = sampling.draw(s)

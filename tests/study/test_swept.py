@@ -75,6 +75,7 @@ def test_without_the_nominal_joint(tmp_path: Path) -> None:
     assert s.design["variant"].tolist() == load(tmp_path).design["variant"][1:].tolist()
 
 
+@pytest.mark.slow
 def test_a_file_replays_its_sweep(tmp_path: Path) -> None:
     s = load(tmp_path)
     errors, rows = sampling.draw(s), np.arange(s.rows)

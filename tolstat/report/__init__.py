@@ -7,6 +7,7 @@ gets its table.
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -137,7 +138,8 @@ def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> R
         files.append(text.csv(limits, stem, "limits"))
         shown, more = _fitted(rendering.LIMITS, limits, width)
     if verdict is not None:
-        shown = f"{text.sentence(verdict.sentence)}\n\n{shown}"
+        sentence = text.sentence(verdict.sentence)
+        shown = f"{sentence if width is None else textwrap.fill(sentence, width)}\n\n{shown}"
         if verdict.answer and not view.weighted and view.count(*VALID):
             kept = capabilities.together(capability.limits(view))
             shown += f"\n\nyield: {kept.value} {kept.words}"

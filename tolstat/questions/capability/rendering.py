@@ -8,6 +8,7 @@ import pandas as pd
 
 from tolstat.display import text
 from tolstat.display.table import Column, Row
+from tolstat.questions.capability.query import TOGETHER
 
 
 def _with_ends(row: Row, key: str, form: str) -> str:
@@ -21,7 +22,7 @@ def _number(value: float, form: str) -> str:
 
 LIMITS = (
     Column("load", lambda row: str(row["load"])),
-    Column("limit", lambda row: text.value(row["limit"], row["unit"])),
+    Column("limit", lambda row: "-" if row["load"] == TOGETHER else text.value(row["limit"], row["unit"])),
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("yield", lambda row: text.percent(row["good"])),
     Column("interval of yield", lambda row: text.span(row["good_lower"], row["good_upper"])),

@@ -70,7 +70,8 @@ def _lines(made: Plan) -> str:
         for share, width in made.widths.items()
     ]
     lines += [
-        f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; interval at most {100 * limit.width:.2g} points wide"
+        f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; "
+        f"interval at most {100 * limit.width:.2g} points wide"
         for limit in made.limits
     ]
     lines += [

@@ -308,7 +308,7 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, h
         assert store.retries == [json.loads(json.dumps(AGAIN.entry()))]
         assert np.flatnonzero(store.attempt() == 1).tolist() == failed.tolist()
         assert (store.results()["steps"][failed] == 60).all()
-        assert store.to_pandas()["attempt"].sum() == failed.size
+        assert store.to_pandas(nominal=True)["attempt"].sum() == failed.size
         assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5"]
         for name in store.history_specs:
             assert np.isfinite(store.histories(name)).all()

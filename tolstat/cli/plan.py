@@ -64,12 +64,18 @@ def _lines(made: Plan) -> str:
         f"file: {_size(made.file_bytes)}",
         *made.fit,
     ]
-    lines += [f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide" for share, width in made.widths.items()]
     lines += [
-        f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; interval at most {100 * limit.width:.2g} points wide"
+        f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"
+        for share, width in made.widths.items()
+    ]
+    lines += [
+        f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; "
+        f"interval at most {100 * limit.width:.2g} points wide"
         for limit in made.limits
     ]
-    lines += [f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}" for q, n in made.wilks.items()]
+    lines += [
+        f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}" for q, n in made.wilks.items()
+    ]
     return "\n".join(lines + _meanings(made))
 
 

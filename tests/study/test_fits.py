@@ -194,3 +194,9 @@ def test_a_fit_and_diameters_of_the_joint_are_a_fault() -> None:
     text = faults(H7_F7, 'contact.D_H = "76.3 mm"\ncontact.D_P = "76 mm"')
     assert "joint.contact.D_H: is set by tolerances.fit already" in text
     assert "joint.contact.D_P: is set by tolerances.fit already" in text
+
+
+def test_a_clearance_beside_a_fit_is_one_fault() -> None:
+    text = faults(H7_F7, 'contact.clearance = "0.05 mm"')
+    assert text.count("hint:") == 1
+    assert "joint.contact.clearance: is set by tolerances.fit already" in text

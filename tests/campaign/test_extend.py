@@ -21,7 +21,7 @@ from tolstat import cli, joint, sampling
 from tolstat import study as studies
 from tolstat.campaign import extend
 from tolstat.campaign import run as campaign
-from tolstat.common import tables
+from tolstat.common import files, tables
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import Reader, ResultStore
@@ -242,3 +242,34 @@ def test_large_campaigns_need_no_more_memory(tmp_path: Path) -> None:
     whole = 80_000 * (tables.ERROR.itemsize + tables.RESULT.itemsize)
     assert growth < 0.3 * whole
     assert measured[1]["file_bytes_a_row"] < 1.02 * (tables.ERROR.itemsize + tables.RESULT.itemsize)
+
+
+def test_a_file_away_from_its_study_and_joint_file_is_extended(tmp_path: Path) -> None:
+    here, away = tmp_path / "here", tmp_path / "away"
+    here.mkdir()
+    away.mkdir()
+    joint_file = here / "own.toml"
+    joint_file.write_bytes((files.data_dir() / "joints" / "cirelli2021.toml").read_bytes())
+    study = here / "small.toml"
+    study.write_text(
+        synthetic.STUDY.replace('"cirelli2021"', '"own.toml"').replace("n = 60", "n = 4"), encoding="utf-8"
+    )
+    path = run(studies.load(study), away / "small.h5")
+    identity = studies.load(study, n=6).identity()
+    joint_file.unlink()
+    assert extend.extend(path, 6).identity() == identity
+    with Reader.open(path) as store:
+        assert store.n == 7
+
+
+def test_what_a_study_needs_beside_the_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "parts.csv").write_text("shift\n0.01\n0.02\n", encoding="utf-8")
+    study = tmp_path / "here" / "small.toml"
+    measured = '{ file = "parts.csv", column = "shift", unit = "mm", distribution = "measured" }'
+    old = '{ plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }'
+    study.write_text(synthetic.STUDY.replace(old, measured).replace("n = 60", "n = 4"), encoding="utf-8")
+    path = run(studies.load(study), tmp_path / "small.h5")
+    with pytest.raises(InputError, match=r"(?s)parts\.csv.*hint: give the study file.*--study STUDY"):
+        extend.extend(path, 6)
+    assert extend.extend(path, 6, study).samples == 6

@@ -288,7 +288,7 @@ def test_a_plan_chooses_the_fidelity_that_the_campaign_chooses(tmp_path: Path) -
 def test_plan_command(small: study.Study) -> None:
     done = CliRunner().invoke(cli.app, ["plan", str(small.path), "--n", "2000", "--pilot", "4"])
     assert done.exit_code == 0
-    assert "joints: 2001\ndimensions: 4\npilot: 4 joints, 0 failed" in done.stdout
-    assert "joints for a 95 % bound of the 99.9 % quantile: 2995" in done.stdout
+    assert "joints: 2001\nrandom numbers a joint: 4\npilot: 4 joints, 0 failed" in done.stdout
+    assert "joints for a load that 99.9 % stay below, with 95 % confidence: 2995" in done.stdout
     done = CliRunner().invoke(cli.app, ["plan", str(small.path), "--json", "--pilot", "4"])
     assert json.loads(done.stdout)["limits"][0]["load"] == "cross1.F"

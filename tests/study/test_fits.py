@@ -155,13 +155,14 @@ def test_a_clearance_fit_may_reach_beyond_its_zones() -> None:
     assert found.misfit == pytest.approx(stats.norm.sf(24.5 / math.hypot(5.0, 19 / 6)), rel=1e-9)
     assert found.misfit_joints == pytest.approx(4 * found.misfit, rel=1e-4)
     assert found.meaning == [
-        "fit H7/h6 at 76 mm: hole 0 to +30 um, pin -19 to 0 um, clearance 0 to 49 um",
+        "fit H7/h6 at 76 mm: hole 0 to +30 um, pin -19 to 0 um",
+        "fit: hole less pin 0 to 49 um, radial clearance 0 to 24.5 um",
         f"fit: {400 * found.misfit:.3g} % of the joints do not go together",
     ]
     bounded = fits.read({"fit": {"basic": "76 mm", "code": "H7/h6", "distribution": "uniform"}}, "x")
     assert bounded is not None
     assert bounded.misfit == 0.0
-    assert len(bounded.meaning) == 1
+    assert len(bounded.meaning) == 2
     assert load(f"fit = {{ {text}'uniform' }}").joint.contact.D_P < 76e-3
 
 
@@ -193,3 +194,9 @@ def test_a_fit_and_diameters_of_the_joint_are_a_fault() -> None:
     text = faults(H7_F7, 'contact.D_H = "76.3 mm"\ncontact.D_P = "76 mm"')
     assert "joint.contact.D_H: is set by tolerances.fit already" in text
     assert "joint.contact.D_P: is set by tolerances.fit already" in text
+
+
+def test_a_clearance_beside_a_fit_is_one_fault() -> None:
+    text = faults(H7_F7, 'contact.clearance = "0.05 mm"')
+    assert text.count("hint:") == 1
+    assert "joint.contact.clearance: is set by tolerances.fit already" in text

@@ -200,7 +200,7 @@ MALFORMED = {
     "no unit": (('"100 N*m"\n\n', "100\n\n"), "operation.torque: 100 has no unit"),
     "unknown key": (("steps_per_rev", "steps_per_rve"), "solver.steps_per_rve: unknown key"),
     "unknown table": (("[output]", "[ouput]"), "ouput: unknown key"),
-    "missing key": (('speed = "500 rpm"', ""), "operation.speed: missing key"),
+    "missing key": (('speed = "500 rpm"', ""), 'hint: add operation.speed, for example speed = "500 rpm"'),
     "missing number": (("n = 8", ""), "sampling: missing key n"),
     "negative tolerance": (
         ('plus_minus = "0.1 mm"', 'plus_minus = "-0.1 mm"'),

@@ -53,7 +53,7 @@ def plan(
 def _lines(made: Plan) -> str:
     lines = [
         f"joints: {made.rows}",
-        f"dimensions: {made.dimensions}",
+        f"random numbers a joint: {made.dimensions}",
         f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
         *([made.fidelity] if made.fidelity else []),
         *_rattle_warning(made),
@@ -65,12 +65,18 @@ def _lines(made: Plan) -> str:
         f"file: {_size(made.file_bytes)}",
         *made.fit,
     ]
-    lines += [f"width of the 95 % interval at P = {share:g}: {width:.2g}" for share, width in made.widths.items()]
     lines += [
-        f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; interval at most {limit.width:.2g} wide"
+        f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"
+        for share, width in made.widths.items()
+    ]
+    lines += [
+        f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; "
+        f"interval at most {100 * limit.width:.2g} points wide"
         for limit in made.limits
     ]
-    lines += [f"joints for a 95 % bound of the {100 * q:g} % quantile: {n}" for q, n in made.wilks.items()]
+    lines += [
+        f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}" for q, n in made.wilks.items()
+    ]
     return "\n".join(lines + _meanings(made))
 
 

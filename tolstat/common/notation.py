@@ -53,10 +53,11 @@ _SPELLINGS = (
     (re.compile(r"(?<![A-Za-z])([kMmd]?N)(m|cm|mm)(?![A-Za-z])"), r"\1*\2"),
     (re.compile(r"(?<![A-Za-z])(?:U|r|tr)(?![A-Za-z])"), "turn"),
     (re.compile(r"(?<![A-Za-z])(?:RPM|Rpm|UPM|UpM|Upm)(?![A-Za-z])"), "rpm"),
+    (re.compile(r"(?<=[A-Za-z])-1(?!\d)"), "^-1"),
     (re.compile(r"·"), "*"),
     (re.compile(r"^\s*/"), "1/"),
 )
-"""Spellings that pint does not know or takes for something else, and what is meant: Nm, U/min, r/min, RPM."""
+"""Spellings that pint does not know or takes for something else, and what is meant: Nm, U/min, r/min, RPM, min-1."""
 
 
 def read(text: str) -> Written | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -183,7 +184,7 @@ def _fault(e: Any, model: type[BaseModel], data: object, place: str, prefix: tup
     if e["type"] == "extra_forbidden":
         return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), _keys_at(model, e["loc"][:-1])))
     if e["type"] == "missing":
-        return Fault(where, "missing key", f"add {path}")
+        return Fault(where, "missing key", f"add {path}" + _example(model, e["loc"]))
     if e["type"] in ("literal_error", "enum"):
         return Fault(where, f"{e['input']!r} is not allowed", f"write one of {context['expected']}")
     remedy = _REMEDIES.get(e["type"], "give a value of the expected type").format(**context)
@@ -216,19 +217,33 @@ def did_you_mean(word: str, allowed: Sequence[str]) -> str:
 
 def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
     """Names of the keys that `model` allows at a key path; empty where they are not known."""
+    fields = getattr(_model_at(model, location), "model_fields", {})
+    return [f.alias or name for name, f in fields.items()]
+
+
+def _model_at(model: type[BaseModel], location: Sequence[int | str]) -> Any:
+    """Annotation at a key path of `model`; None where it is not known."""
     current: Any = model
     for part in location:
         fields = getattr(current, "model_fields", None)
         if isinstance(part, int):
             current = next(iter(get_args(current)), None)
         elif fields is None or part not in fields:
-            return []
+            return None
         else:
             current = fields[part].annotation
             if NoneType in get_args(current):  # a key that may be left out
                 current = get_args(current)[0]
-    fields = getattr(current, "model_fields", {})
-    return [f.alias or name for name, f in fields.items()]
+    return current
+
+
+def _example(model: type[BaseModel], location: Sequence[int | str]) -> str:
+    """How a file writes the key at a path, as its field has it: `` = "22 mm"``; empty where no example is known."""
+    fields = getattr(_model_at(model, location[:-1]), "model_fields", {})
+    examples = next((field.examples for name, field in fields.items() if location[-1] in (name, field.alias)), None)
+    if not examples or isinstance(examples[0], (Mapping, list)):
+        return ""
+    return f", for example {location[-1]} = {json.dumps(examples[0], ensure_ascii=False)}"
 
 
 def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:

@@ -47,7 +47,7 @@ def settings() -> Iterator[None]:
         "axes.linewidth": 0.8,
         "grid.linewidth": 0.7,
         "legend.frameon": True,
-        "legend.framealpha": 0.8,
+        "legend.framealpha": 0.95,
         "legend.facecolor": "white",
         "legend.edgecolor": "none",
     }

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tolstat.common.errors import Fault, StoreError
+from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.store.recorded import joint_of
 from tolstat.study import Study, load, subset_of
 from tolstat.study.model import Solver
 
@@ -22,8 +23,8 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     Parameters
     ----------
     store : Reader
-        The file, which holds the text of its study. Relative paths in the text, of a joint file or of measured data,
-        are resolved from the result file's folder.
+        The file, which holds the text of its study and the nominal joint. Relative paths in the text, of measured data
+        or of a joint file with variants, are resolved from the result file's folder.
     n : int, optional
         Number of joints instead of the campaign's.
     path : Path, optional
@@ -43,7 +44,15 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     held = store.sampling["n"]
     source = path if path is not None else store.path.parent / f"{store.study_name}.toml"
     text = None if path is not None else store.study_text
-    study = load(source, n=held, text=text)
+    joint = None if path is not None or store.variants else joint_of(store, 0)
+    try:
+        study = load(source, n=held, text=text, joint=joint)
+    except InputError as error:
+        if path is not None:
+            raise
+        found = "holds the text of this study; what the text names is looked for in the folder of the result file"
+        remedy = "give the study file, if the command has this option: --study STUDY"
+        raise InputError([*error.faults, Fault(str(store.path), found, remedy)]) from error
     if store.sampling["method"] == "subset":
         study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
     if path is None:
@@ -55,7 +64,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         raise StoreError(str(Fault(str(store.path), found, "give the study file of the campaign: --study STUDY")))
     if n is None:
         return study
-    return replace(load(source, n=n, text=text), solver=study.solver)
+    return replace(load(source, n=n, text=text, joint=joint), solver=study.solver)
 
 
 def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:

@@ -124,18 +124,21 @@ class StudyFile:
         else:
             overrides = {key: value for key, value in table.items() if key != "base"}
             if fit is not None:
-                overrides = merged(overrides, {"contact": self._diameters(fit, overrides)})
+                overrides = self._with_diameters(fit, overrides)
             with gather(self._faults):
                 return joint.load(base, overrides, self.place, self.path.parent)
         return None
 
-    def _diameters(self, fit: Fit, overrides: Mapping[str, Any]) -> dict[str, str]:
-        """Nominal diameters of the fit; note diameters and clearance that the study sets beside it."""
+    def _with_diameters(self, fit: Fit, overrides: Mapping[str, Any]) -> dict[str, Any]:
+        """Keys of the joint with the fit's diameters; note diameters and clearance that the study sets beside it."""
         own = overrides.get("contact")
-        for key in (*fit.diameters, "clearance"):
-            if isinstance(own, Mapping) and key in own:
-                self._fault(("joint", "contact", key), "is set by tolerances.fit already", "remove one of the two")
-        return fit.diameters
+        if not isinstance(own, Mapping):
+            return merged(overrides, {"contact": fit.diameters})
+        both = [key for key in (*fit.diameters, "clearance") if key in own]
+        for key in both:
+            self._fault(("joint", "contact", key), "is set by tolerances.fit already", "remove one of the two")
+        others = {key: value for key, value in own.items() if key not in both}
+        return {**overrides, "contact": merged(others, fit.diameters)}
 
     def errors(self) -> dict[str, float]:
         """``[errors]``: the errors that every joint has."""

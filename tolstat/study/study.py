@@ -269,7 +269,7 @@ SECTIONS = (
 )
 
 
-def load(path: str | Path, n: int | None = None, text: str | None = None) -> Study:
+def load(path: str | Path, n: int | None = None, text: str | None = None, joint: Joint | None = None) -> Study:
     """Read a study file.
 
     Parameters
@@ -280,6 +280,8 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
         Number of joints instead of the file's ``sampling.n``.
     text : str, optional
         TOML to read instead of the file's; `path` is then only what faults and relative paths refer to.
+    joint : Joint, optional
+        Nominal joint in place of that of ``[joint]``; variants and swept dimensions are read from the file still.
 
     Returns
     -------
@@ -295,7 +297,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None) -> Stu
     if n is not None:
         file.override("sampling", "n", n)
     fit = file.fit()
-    joint = file.joint(fit)
+    joint = file.joint(fit) if joint is None else joint
     operation = file.model("operation", Operation, required=True)
     solver = file.model("solver", Solver)
     errors = file.errors()

@@ -116,5 +116,5 @@ def _draw(ax: Axes, found: _Histories) -> None:
     if found.limit is not None:
         ax.axhline(found.limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
     unit = unit_text(tail.unit)
-    ax.set(ylabel=f"|{tail.by}| [{unit}]", ylim=(0.0, 1.3 * np.nanmax(found.loads)))
+    ax.set(ylabel=f"|{tail.by}| [{unit}]", ylim=(0.0, 1.3 * np.nanmax([*found.loads.flat, found.limit or 0.0])))
     ax.legend(loc="upper right", ncols=3, columnspacing=1.2, handlelength=2.0)

@@ -15,8 +15,8 @@ from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
 LEGEND = (
-    "The joint from its own dimensions. Marked: where the limits are exceeded most. Loads of cross1–4 act on the pins, "
-    "those of fork1–4 on the arms; their components are along and about the axes e, t, z of each."
+    "The joint from its own dimensions. Marked: the bushings and pins of the leading loads. Loads of cross1–4 act on "
+    "the pins, those of fork1–4 on the arms; their components are along and about the axes e, t, z of each."
 )
 """Text below the drawings of `legend`."""
 

@@ -121,8 +121,11 @@ class Fit(NamedTuple):
         """Lines of text: zones of the fit, and the share of joints that do not go together if there are any."""
         zones = self.entry.zones
         hole, pin = (f"{_signed(zone.lower)} to {_signed(zone.upper)} um" for zone in zones)
-        found = f"fit {self.entry.code} at {1e3 * self.entry.basic:g} mm: hole {hole}, pin {pin}"
-        lines = [f"{found}, clearance {zones.least:g} to {zones.largest:g} um"]
+        lines = [
+            f"fit {self.entry.code} at {1e3 * self.entry.basic:g} mm: hole {hole}, pin {pin}",
+            f"fit: hole less pin {zones.least:g} to {zones.largest:g} um, "
+            f"radial clearance {zones.least / 2:g} to {zones.largest / 2:g} um",
+        ]
         if self.misfit > NEGLIGIBLE:
             lines.append(f"fit: {_percent(self.misfit_joints)} of the joints do not go together")
         return lines

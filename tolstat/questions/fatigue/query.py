@@ -104,7 +104,7 @@ def load_cycles(
         name=" + ".join(view.name for view in views),
         cycles=cycles.duty_cycle([own for own, _ in parts], shares),
         status=status,
-        nominal=cycles.duty_cycle([_rows(nominal, rows) for _, nominal in parts], shares),
+        nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares),
         iid=first.iid,
         # the section alone, like limits: it is at hand even where the study refers to files that are not
         settings=of_text(first.store.study_text, str(first.path)),
@@ -117,11 +117,7 @@ def _cycles_of(view: View, names: Sequence[str] | None, samples: int | None) -> 
     first, end = map(int, view.slots([0, n]))
     whole = cycles_of(view.store, np.arange(end), names)  # the nominal joint, if the file has it, is before the samples
     settled = int((view.nominal["status"] == Status.OK).sum())
-    return _rows(whole, slice(first, None)), _rows(whole, slice(settled))
-
-
-def _rows(whole: Cycles, rows: slice) -> Cycles:
-    return whole._replace(ranges=whole.ranges[rows], means=whole.means[rows], number=whole.number[rows])
+    return whole.rows(slice(first, None)), whole.rows(slice(settled))
 
 
 def _check_same_joints(view: View, first: View) -> None:

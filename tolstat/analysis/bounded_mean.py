@@ -38,7 +38,7 @@ def interval(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float]
     --------
     >>> lower, upper = interval([0.001] * 1000)
     >>> round(lower, 4), round(upper, 4)
-    (0.0, 0.0055)
+    (0.0, 0.0059)
     """
     x = np.asarray(values, dtype=float)
     if not x.size:

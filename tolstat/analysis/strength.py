@@ -136,7 +136,7 @@ def sort_out(ranges: FloatArray, numbers: FloatArray, line: Line) -> Collective:
     Parameters
     ----------
     ranges : ndarray, shape (n, k)
-        Stress ranges at the stress ratio of the line, Pa; a range of 0 marks an empty place, NaN a joint without results.
+        Stress ranges at the stress ratio of the line, Pa; 0 marks an empty place, NaN a joint without results.
     numbers : ndarray, shape (n, k)
         Cycles of each range in the service life.
     line : Line
@@ -184,7 +184,7 @@ def critical_factor(collective: Collective, line: Line, lives: float = 1.0) -> F
         a, b = (np.take_along_axis(part, i, axis=1)[:, 0] / goal for part in (collective.above, collective.below))
         # a f^-k + b f^-k_2 = 1: convex in the logarithms, so that Newton's steps from the left do not overshoot
         u = np.maximum(np.log(a) / line.k, np.log(b) / line.k_2)
-        for _ in range(30):
+        for _ in range(10):
             first, second = a * np.exp(-line.k * u), b * np.exp(-line.k_2 * u)
             total = first + second
             u = np.where(np.isfinite(u), u + np.log(total) * total / (line.k * first + line.k_2 * second), u)
@@ -208,10 +208,11 @@ def failures(
 
     Parameters
     ----------
-    chances : ndarray, shape (m,)
-        Probability of failure of the part in each valid joint, in the order of the joints.
+    chances : ndarray, shape (n,)
+        Probability of failure of the part in each joint, in the order in which the joints were drawn; NaN for joints
+        without a valid load.
     n_failed, n_unsettled : int
-        Joints without a valid load.
+        Numbers of these.
     confidence : float
         Confidence level of the intervals: Clopper and Pearson (1934) where no strength scatters, so that the
         probabilities are 0 or 1, else `bounded_mean.interval`.
@@ -222,17 +223,16 @@ def failures(
     -------
     Failures
     """
-    others = n_failed + n_unsettled
-    n = chances.size + others
-    estimate = float(chances.mean()) if chances.size else math.nan
+    without = np.isnan(chances)
+    valid = chances[~without]
+    estimate = float(valid.mean()) if valid.size else math.nan
     if not iid:
-        return Failures(n, n_failed, n_unsettled, estimate, *[math.nan] * 4)
-    lower, upper = _ends(chances, confidence)
-    outer_lower, outer_upper = lower, upper
-    if others:
-        outer_lower = _ends(np.append(chances, np.zeros(others)), confidence)[0]
-        outer_upper = _ends(np.append(chances, np.ones(others)), confidence)[1]
-    return Failures(n, n_failed, n_unsettled, estimate, lower, upper, outer_lower, outer_upper)
+        return Failures(chances.size, n_failed, n_unsettled, estimate, *[math.nan] * 4)
+    lower, upper = outer_lower, outer_upper = _ends(valid, confidence)
+    if without.any():
+        outer_lower = _ends(np.where(without, 0.0, chances), confidence)[0]
+        outer_upper = _ends(np.where(without, 1.0, chances), confidence)[1]
+    return Failures(chances.size, n_failed, n_unsettled, estimate, lower, upper, outer_lower, outer_upper)
 
 
 def _ends(chances: FloatArray, confidence: float) -> tuple[float, float]:

@@ -47,10 +47,10 @@ def fatigue(
     """Print damage, life and probability of failure of the parts, and damage-equivalent loads.
 
     For each [fatigue.point] of the study: the damage sum, the life that 90 % of the parts reach, and the share of the
-    parts that fail in the service life, with 95 % intervals. Where the file holds no load histories, the joints are
-    simulated again. Where it holds cycles: quantiles of the damage-equivalent load over the joints, and for each S-N line
-    of a load the share of joints whose damage sum exceeds 1. Without --by, prints the most loaded component of each
-    bushing force and torque. All settings are those of [fatigue] in the study of the first FILE.
+    parts that fail in the service life, with 95 % intervals. Without load histories in the file, the joints are
+    simulated again. From cycles in the file: quantiles of the damage-equivalent load over the joints, and for each S-N
+    line of a load the share of joints whose damage sum exceeds 1. Without --by, prints the most loaded component of
+    each bushing force and torque. All settings are those of [fatigue] in the study of the first FILE.
 
     Several files form a duty cycle: the same joints at several operating points.
 

@@ -48,12 +48,7 @@ class Settings(Strict):
         default_factory=dict,
         description="points of the parts by name, with stress per load and S–N line",
         examples=[
-            {
-                "fork weld": {
-                    **{"bushing": "fork*", "F_z": "2.5 MPa/kN", "T_e": "0.2 MPa/(N*m)"},
-                    **{"k": 3, "N_D": 1e7, "S_D": "29 MPa", "T_S": 1.5},
-                }
-            }
+            {"pin root": {"bushing": "cross*", "T_t": "0.2 MPa/Nm", "k": 5, "N_D": 2e6, "S_D": "360 MPa", "T_S": 1.25}}
         ],
         json_schema_extra={"x-table": "points"},
     )

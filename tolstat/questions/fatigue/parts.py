@@ -38,25 +38,25 @@ class Course(NamedTuple):
     ----------
     points : sequence of Evaluated
         The points; the joint fails at the weakest.
-    valid : ndarray of bool, shape (n,)
-        Which joints have stresses.
+    done : ndarray of bool, shape (n,)
+        Which joints were simulated; those without stresses among them have NaN.
     n_failed, n_unsettled : int
-        Joints without.
+        Joints without stresses.
     iid : bool
         Whether the joints are independent samples.
     """
 
     points: Sequence[Evaluated]
-    valid: NDArray[np.bool_]
+    done: NDArray[np.bool_]
     n_failed: int
     n_unsettled: int
     iid: bool
 
     def chances(self, lives: float = 1.0) -> FloatArray:
-        """Probability for each valid joint that a part has failed after so many service lives, (m,)."""
-        survive = np.ones(int(self.valid.sum()))
+        """Probability for each simulated joint that a part has failed after so many service lives, (m,)."""
+        survive = np.ones(int(self.done.sum()))
         for collective, line in self.points:
-            factor = strength.critical_factor(collective, line, lives)[self.valid]
+            factor = strength.critical_factor(collective, line, lives)[self.done]
             survive *= 1.0 - strength.probability(factor, line.T_S)
         return 1.0 - survive
 
@@ -81,28 +81,20 @@ def part_failures(stressed: Stressed, confidence: float = 0.95) -> pd.DataFrame:
         One row per point, and one for all of them if there are several (the strengths of two points are independent):
         ``point``, ``bushing``, fields of `analysis.strength.Line` (S_D in Pa); ``nominal``, ``median``, ``upper_99``
         (damage sum at the median strength: of the nominal joint, and not exceeded by half and by 99 % of the joints);
-        ``life`` (revolutions after which a tenth of the parts has failed), ``life_lower``, ``life_upper`` (interval, joints
-        without a valid load counted both ways); ``nominal_failures`` (share of the parts that fail in the nominal
-        joint); the fields of `analysis.strength.Failures`, ``confidence``.
+        ``life`` (revolutions after which a tenth of the parts has failed), ``life_lower``, ``life_upper`` (joints without
+        a valid load counted both ways); ``nominal_failures`` (share of the parts that fail in the nominal joint); the fields of `analysis.strength.Failures`, ``confidence``.
     """
-    settings, rows = stressed.settings, list[dict[str, Any]]()
-    own, nominal = (evaluated(stresses, settings) for stresses in (stressed.own, stressed.nominal))
-    groups = [[i] for i in range(len(own))] + ([list(range(len(own)))] if len(own) > 1 else [])
-    for group in groups:
-        course = course_of(stressed, [own[i] for i in group])
-        ideal = Course([nominal[i] for i in group], np.ones(len(stressed.nominal.low), bool), 0, 0, False)
-        head: dict[str, Any] = (
-            {"point": ANY, "bushing": ""} if len(group) > 1 else _damage(stressed, group[0], own, nominal)
-        )
-        rows.append(
-            {
-                **head,
-                **_life(course, settings.revolutions, confidence),
-                "nominal_failures": ideal.failures().estimate,
-                **course.failures(1.0, confidence)._asdict(),
-                "confidence": confidence,
-            }
-        )
+    own, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
+    each = [(_damage(stressed, p, own[p], nominal[p]), [p]) for p in range(len(own))]
+    together = [({"point": ANY, "bushing": ""}, list(range(len(own))))] if len(own) > 1 else []
+    rows = []
+    for head, group in each + together:
+        course = course_of(stressed, [own[p] for p in group])
+        ideal = Course([nominal[p] for p in group], np.ones(len(stressed.nominal.low), bool), 0, 0, False)
+        life = _life(course, stressed.settings.revolutions, confidence)
+        found = course.failures(1.0, confidence)._asdict()
+        head |= life | {"nominal_failures": ideal.failures().estimate} | found | {"confidence": confidence}
+        rows.append(head)
     return pd.DataFrame(rows)
 
 
@@ -146,18 +138,22 @@ def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
 def course_of(stressed: Stressed, points: Sequence[Evaluated]) -> Course:
     """Failures of the joints at some points; joints that are not settled, or never repeat, have no stresses."""
     failed = exceedance.split(np.zeros(stressed.status.size), stressed.status)[1]
-    without = ~stressed.valid & (stressed.status != Status.PENDING)
-    n_failed = int(failed.sum())
-    return Course(points, stressed.valid, n_failed, int(without.sum()) - n_failed, stressed.iid)
+    done = stressed.status != Status.PENDING
+    n_failed, n_without = int(failed.sum()), int((done & ~stressed.valid).sum())
+    return Course(points, done, n_failed, n_without - n_failed, stressed.iid)
 
 
-def _damage(stressed: Stressed, p: int, own: Sequence[Evaluated], nominal: Sequence[Evaluated]) -> dict[str, Any]:
+def _damage(stressed: Stressed, p: int, own: Evaluated, nominal: Evaluated) -> dict[str, Any]:
     point = stressed.settings.points[p]
-    sums, ideal = strength.damage_at(*own[p]), strength.damage_at(*nominal[p])
+    sums, ideal = strength.damage_at(*own), strength.damage_at(*nominal)
     ends = [quantile.quantile(sums, stressed.status, share).estimate for share in (0.5, 0.99)]
     return {
-        **{"point": point.name, "bushing": point.bushing, **point.line._asdict()},
-        **{"nominal": float(ideal[0]) if ideal.size else np.nan, "median": ends[0], "upper_99": ends[1]},
+        "point": point.name,
+        "bushing": point.bushing,
+        **point.line._asdict(),
+        "nominal": float(ideal[0]) if ideal.size else np.nan,
+        "median": ends[0],
+        "upper_99": ends[1],
     }
 
 
@@ -165,7 +161,7 @@ def _life(course: Course, revolutions: float, confidence: float) -> dict[str, fl
     """Revolutions after which a share `SHARE` of the parts has failed, with the ends of an interval."""
 
     def estimate(lives: float) -> float:
-        return float(course.chances(lives).mean())
+        return float(np.nanmean(course.chances(lives)))
 
     def least(lives: float) -> float:
         return course.failures(lives, confidence).outer_lower
@@ -174,15 +170,16 @@ def _life(course: Course, revolutions: float, confidence: float) -> dict[str, fl
         return course.failures(lives, confidence).outer_upper
 
     found = {"life": np.nan, "life_lower": np.nan, "life_upper": np.nan}
-    if course.valid.any():
+    some = course.done.sum() > course.n_failed + course.n_unsettled
+    if some:
         found["life"] = revolutions * _reaches(estimate)
-    if course.valid.any() and course.iid:
+    if some and course.iid:
         found["life_lower"], found["life_upper"] = (revolutions * _reaches(end) for end in (most, least))
     return found
 
 
 def _reaches(share: Callable[[float], float]) -> float:
-    """Number of service lives at which a share that grows with them reaches `SHARE`; 0 or infinite beyond all bounds."""
+    """Number of service lives at which a share that grows with them reaches `SHARE`; 0 or infinite beyond `LONGEST`."""
     low, high = -np.log(LONGEST), np.log(LONGEST)
     if share(np.exp(low)) >= SHARE:
         return 0.0

@@ -25,7 +25,7 @@ JOINTS = 5000
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
-    """Section on fatigue; none for a sweep, a file without a settled joint, or one without both histories and points."""
+    """Section on fatigue; none for a sweep, without a settled joint, or without histories and points."""
     blocks: list[Block] = []
     if view.method != "sweep" and view.count(Status.OK):
         with asked.noting("load cycles are left out"):

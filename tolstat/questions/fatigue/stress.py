@@ -163,7 +163,7 @@ def _signal(loads: NDArray[np.floating], point: StressPoint) -> tuple[FloatArray
 
 def _nominal(view: View) -> NDArray[np.intp]:
     """File slots of the nominal joint if it settled, (1,) or (0,)."""
-    return view.nominal_slots[view.nominal["status"] == Status.OK]
+    return np.asarray(view.nominal_slots[view.nominal["status"] == Status.OK])
 
 
 def _spread(part: Stresses, settled: NDArray[np.intp], n: int) -> Stresses:

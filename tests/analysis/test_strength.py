@@ -37,14 +37,14 @@ def naive(cycles, line, factor):
     return total
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(CYCLES, st.floats(0.05, 20.0))
 def test_damage_is_that_of_the_naive_twin(cycles, factor):
     found = strength.damage_at(one(cycles, HAIBACH), HAIBACH, factor)
     assert found[0] == pytest.approx(naive(cycles, HAIBACH, factor), rel=1e-9)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(CYCLES, st.floats(1e-6, 1e6), st.floats(0.1, 1.0), st.sampled_from([5.0, 9.0, 40.0]))
 def test_the_critical_part_has_the_critical_damage(cycles, lives, critical, k_2):
     line = HAIBACH._replace(D_c=critical, k_2=k_2)

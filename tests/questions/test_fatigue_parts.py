@@ -134,6 +134,7 @@ def test_joints_are_simulated_again_where_the_file_has_no_loads(campaign):
     np.testing.assert_array_equal(part.own.low, again.own.low[:5])
 
 
+@pytest.mark.slow
 def test_a_duty_cycle_adds_damage_and_starts_reach_the_extremes_of_all_points(campaign):
     files = [campaign(), campaign(alpha=5.0)]
     both = stresses(files, [0.25, 0.75])
@@ -181,7 +182,7 @@ def synthetic(n=400, seed=3, scatter=1.3, status=None):
     )
     own = Stresses(cycles, -0.5 * size, 0.5 * size)
     settings = Fatigue(revolutions=1e6, points=(point(line), point(line, "b")))
-    return Stressed("made", own, state, own.rows(slice(0)), True, settings, 0.0), size, line
+    return Stressed("made", own, state, own.rows(slice(0)), True, settings, n, 0.0), size, line
 
 
 def test_failures_and_lives_of_one_cycle_in_closed_form():

@@ -19,7 +19,6 @@ Exponent = Annotated[units.Number, Field(ge=1, le=30)]
 PerForce = Annotated[float, units.Quantity("1/m^2")]
 PerTorque = Annotated[float, units.Quantity("1/m^3")]
 PositiveStress = Annotated[units.Stress, AfterValidator(units.positive)]
-Scatter = Annotated[units.Number, Field(ge=1)]
 COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 
@@ -45,8 +44,8 @@ class PointEntry(Strict):
     T_z: Annotated[PerTorque, Field(description=_per("torque about z"), examples=["0.1 MPa/(N*m)"])] = 0.0
     k: Annotated[Exponent, Field(description="exponent of the S–N line above the knee", examples=[3])]
     k_2: Annotated[
-        Annotated[units.Number, Field(ge=1, le=100)] | None,
-        Field(description="exponent below the knee; 2k - 1 (Haibach) by default", examples=[5]),
+        units.Number | None,
+        Field(ge=1, le=100, description="exponent below the knee; 2k - 1 (Haibach) by default", examples=[5]),
     ] = None
     N_D: Annotated[Positive, Field(description="cycles at the knee", examples=[1e7])]
     S_D: Annotated[
@@ -58,12 +57,12 @@ class PointEntry(Strict):
         Field(description="amplitude of the stress at the knee, half of S_D; instead of S_D", examples=["14.5 MPa"]),
     ] = None
     T_S: Annotated[
-        Scatter | None,
-        Field(description="scatter of the strength: 90 % quantile over 10 % quantile; 1: none", examples=[1.5]),
+        units.Number | None,
+        Field(ge=1, description="scatter of the strength: 90 % quantile over 10 % quantile; 1: none", examples=[1.5]),
     ] = None
     T_N: Annotated[
-        Scatter | None,
-        Field(description="scatter of the life at one range, T_S^k; instead of T_S", examples=[3.4]),
+        units.Number | None,
+        Field(ge=1, description="scatter of the life at one range, T_S^k; instead of T_S", examples=[3.4]),
     ] = None
     D_c: Annotated[Positive, Field(description="damage sum at which a part fails", examples=[0.3])] = 1.0
     M: Annotated[

@@ -81,8 +81,9 @@ def part_failures(stressed: Stressed, confidence: float = 0.95) -> pd.DataFrame:
         One row per point, and one for all of them if there are several (the strengths of two points are independent):
         ``point``, ``bushing``, fields of `analysis.strength.Line` (S_D in Pa); ``nominal``, ``median``, ``upper_99``
         (damage sum at the median strength: of the nominal joint, and not exceeded by half and by 99 % of the joints);
-        ``life`` (revolutions after which a tenth of the parts has failed), ``life_lower``, ``life_upper`` (joints without
-        a valid load counted both ways); ``nominal_failures`` (share of the parts that fail in the nominal joint); the fields of `analysis.strength.Failures`, ``confidence``.
+        ``life`` (revolutions after which a tenth of the parts has failed), ``life_lower``, ``life_upper`` (joints
+        without a valid load counted both ways); ``nominal_failures`` (share of the parts that fail in the nominal
+        joint); the fields of `analysis.strength.Failures`, ``confidence``.
     """
     own, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
     each = [(_damage(stressed, p, own[p], nominal[p]), [p]) for p in range(len(own))]

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
+from tolstat.analysis.strength import Line
 from tolstat.display import style, text
 from tolstat.display.table import Column, Row
 from tolstat.questions.fatigue.parts import ANY, failures_over_life
 from tolstat.questions.fatigue.stress import Stressed
+from tolstat.study.stress_point import StressPoint
 
 MAX_APART = 1e-6
 """Relative difference of joints simulated again from their stored loads above which a note says so."""
@@ -22,11 +25,21 @@ DECADES = 2.0
 """Decades drawn around the service life."""
 
 
-def _line(row: Row) -> str:
-    if row["point"] == ANY:
-        return ""
-    scatter = f", T_S = {row['T_S']:.3g}" if row["T_S"] > 1 else ""
-    return f"{row['S_D'] / 1e6:.4g} MPa at {row['N_D']:g} cycles, k = {row['k']:g} and {row['k_2']:g}{scatter}"
+def _line(line: Line) -> str:
+    scatter = f", T_S = {line.T_S:.3g}" if line.T_S > 1 else ""
+    mean = f", M = {line.M:g} (R = {line.R:g})" if line.M > 0 else ""
+    knee = f"range of {line.S_D / 1e6:.4g} MPa at {line.N_D:g} cycles"
+    return f"{knee}, k = {line.k:g}, {line.k_2:g} below{scatter}{mean}, damage sum {line.D_c:g}"
+
+
+def _lines(points: Sequence[StressPoint]) -> list[str]:
+    """One sentence for each S–N line, with the names of its points."""
+    names: dict[Line, list[str]] = {}
+    for point in points:
+        names.setdefault(point.line, []).append(point.name)
+    if len(names) == 1:
+        return [f"S–N line: {_line(points[0].line)}"]
+    return [f"S–N line of {'; '.join(own)}: {_line(line)}" for line, own in names.items()]
 
 
 def _life(x: float) -> str:
@@ -40,15 +53,14 @@ def _life_span(row: Row) -> str:
 
 PARTS = (
     Column("point", lambda row: str(row["point"])),
-    Column("S–N line (ranges)", _line, words=True, rank=6),
+    Column("failures", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["outer_lower"], row["outer_upper"])),
+    Column("B10 life", lambda row: _life(row["life"])),
+    Column("its 95 % interval", _life_span, rank=5),
     Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=3),
     Column("median damage", lambda row: text.formed(row["median"]), rank=2),
     Column("99 % damage", lambda row: text.formed(row["upper_99"]), rank=1),
-    Column("B10 life", lambda row: _life(row["life"])),
-    Column("95 % interval of it", _life_span, rank=5),
     Column("nominal joint fails", lambda row: text.percent(row["nominal_failures"]), rank=4),
-    Column("failures", lambda row: text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["outer_lower"], row["outer_upper"])),
 )
 """Columns of the table `parts.part_failures`."""
 
@@ -57,14 +69,15 @@ def notes(stressed: Stressed, failures: pd.DataFrame) -> str:
     """Notes to `parts.part_failures`: number of joints, meaning of the columns, restrictions."""
     settings = stressed.settings
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
+    n = stressed.status.size
+    first = f" (the first {n} of {stressed.total})" if stressed.total > n else ""
     lines = [
-        f"{int(stressed.valid.sum())} of {stressed.status.size} joints settled; service life {settings.revolutions:g} "
-        f"revolutions{starts}; B10 life: revolutions after which 10 % of the parts have failed",
-        "damage at the median strength; intervals count joints without a valid load as failing and as surviving",
+        f"{int(stressed.valid.sum())} of {n} joints settled{first}; "
+        f"service life {settings.revolutions:g} revolutions{starts}",
+        "B10 life: revolutions after which 10 % have failed; damage: at the median strength; intervals count joints "
+        "without a valid load as failing and as surviving",
+        *_lines(settings.points),
     ]
-    critical = sorted({point.line.D_c for point in settings.points})
-    if critical != [1.0]:
-        lines.append(f"parts fail at a damage sum of {', '.join(f'{value:g}' for value in critical)}")
     if (failures["point"] == ANY).any():
         lines.append(f"{ANY}: the joint fails with its first part; strengths of two points are independent")
     if not stressed.iid:
@@ -100,7 +113,9 @@ def panel(ax: Axes, stressed: Stressed, failures: pd.DataFrame) -> None:
     ax.annotate(
         "service life", (life, 1.0), (4, -2), xycoords=("data", "axes fraction"), textcoords="offset points", va="top"
     )
-    ax.set(xscale="log", xlim=(numbers[0], numbers[-1]), ylim=(0.0, 1.0))
+    ax.set(xscale="log", xlim=(numbers[0], numbers[-1]))
+    ax.set_ylim(0.0, min(1.0, 1.1 * float(curve[["estimate", "outer_upper"]].max(axis=None))) or 1.0)
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}".replace("e+0", "e").replace("e+", "e")))
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
     ax.set_xlabel("revolutions of the input shaft")
     ax.set_ylabel("joints with a failed part")

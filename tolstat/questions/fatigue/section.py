@@ -42,7 +42,7 @@ def _parts(stressed: Stressed) -> list[Block]:
     failures = part_failures(stressed)
     panel = Panel(
         "failures-over-life",
-        "Share of the joints with a failed part",
+        "Share of the joints with a failed part, with pointwise 95 % intervals",
         "Share of the joints in which a part has failed, against revolutions of the input shaft",
         partial(parts_rendering.panel, stressed=stressed, failures=failures),
         (6.5, 3.6),

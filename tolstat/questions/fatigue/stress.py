@@ -63,6 +63,8 @@ class Stressed:
         Whether the joints are independent samples.
     settings : Fatigue
         Section ``[fatigue]`` of the study; of the first study if there are several.
+    total : int
+        Number of samples of the campaign, those not evaluated included.
     apart : float
         As in `revolutions.Revolutions`.
     """
@@ -73,6 +75,7 @@ class Stressed:
     nominal: Stresses
     iid: bool
     settings: Fatigue
+    total: int
     apart: float
 
     @property
@@ -122,7 +125,7 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] = (1.0,), sampl
     nominal = [part.rows(slice(min(skips))) for part in parts]  # settled at all operating points, or no row
     own = [_spread(part.rows(slice(skip, None)), settled, status.size) for part, skip in zip(parts, skips, strict=True)]
     name = " + ".join(view.name for view in views)
-    return Stressed(name, _mixed(own, shares), status, _mixed(nominal, shares), first.iid, settings, apart)
+    return Stressed(name, _mixed(own, shares), status, _mixed(nominal, shares), first.iid, settings, first.n, apart)
 
 
 def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:

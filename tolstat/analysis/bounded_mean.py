@@ -60,7 +60,7 @@ def _lower(x: FloatArray, confidence: float) -> float:
 
 
 def _bets(x: FloatArray, gain: float) -> FloatArray:
-    """Bet on each value, from mean and variance of the values before it (equation 26 of the source)."""
+    """Bet on each value, by mean and variance of the values before it (predictable plug-in of the source)."""
     n = np.arange(1, x.size + 1)
     mean = (0.5 + np.cumsum(x)) / (n + 1)
     variance = (0.25 + np.cumsum((x - mean) ** 2)) / (n + 1)

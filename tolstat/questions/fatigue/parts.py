@@ -54,11 +54,12 @@ class Course(NamedTuple):
 
     def chances(self, lives: float = 1.0) -> FloatArray:
         """Probability for each simulated joint that a part has failed after so many service lives, (m,)."""
-        survive = np.ones(int(self.done.sum()))
-        for collective, line in self.points:
-            factor = strength.critical_factor(collective, line, lives)[self.done]
-            survive *= 1.0 - strength.probability(factor, line.T_S)
-        return 1.0 - survive
+        survive = np.zeros(int(self.done.sum()))  # logarithm of the probability
+        with np.errstate(divide="ignore"):
+            for collective, line in self.points:
+                factor = strength.critical_factor(collective, line, lives)[self.done]
+                survive += np.log1p(-strength.probability(factor, line.T_S))
+        return -np.expm1(survive)
 
     def failures(self, lives: float = 1.0, confidence: float = 0.95) -> Failures:
         """Share of the parts that have failed after so many service lives."""

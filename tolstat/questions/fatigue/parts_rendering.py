@@ -101,8 +101,8 @@ def panel(ax: Axes, stressed: Stressed, failures: pd.DataFrame) -> None:
     """
     life = stressed.settings.revolutions
     centre = failures["life"].iloc[-1]
-    ends = sorted([life, centre if math.isfinite(centre) and centre > 0 else life])
-    numbers = np.geomspace(ends[0] / 10**DECADES, ends[1] * 10**DECADES, POINTS)
+    first, last = sorted([life, centre if math.isfinite(centre) and centre > 0 else life])
+    numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
     curve = failures_over_life(stressed, numbers.tolist())
     if stressed.iid:
         ax.fill_between(
@@ -114,7 +114,8 @@ def panel(ax: Axes, stressed: Stressed, failures: pd.DataFrame) -> None:
         "service life", (life, 1.0), (4, -2), xycoords=("data", "axes fraction"), textcoords="offset points", va="top"
     )
     ax.set(xscale="log", xlim=(numbers[0], numbers[-1]))
-    ax.set_ylim(0.0, min(1.0, 1.1 * float(curve[["estimate", "outer_upper"]].max(axis=None))) or 1.0)
+    ends = curve["outer_upper"] if stressed.iid else curve["estimate"]
+    ax.set_ylim(0.0, min(1.0, 1.1 * float(ends.max())) or 1.0)
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}".replace("e+0", "e").replace("e+", "e")))
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
     ax.set_xlabel("revolutions of the input shaft")

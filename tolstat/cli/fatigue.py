@@ -44,7 +44,7 @@ def fatigue(
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print damage, life and probability of failure of the parts, and damage-equivalent loads.
+    """Print failures of parts, equivalent loads and damage sums.
 
     For each [fatigue.point] of the study: the damage sum, the life that 90 % of the parts reach, and the share of the
     parts that fail in the service life, with 95 % intervals. Without load histories in the file, the joints are

@@ -1,7 +1,8 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
-FOLDER holds the result files ``overnight.h5``, ``fuzz.h5`` and ``hard_cases.h5``, of some joints or all, and gets
-``tilted_pin.png``, ``overnight.png``, ``fuzz.png`` and ``hard_cases.png``.
+FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5`` and ``hard_cases.h5``, of some joints or
+all, and gets
+``tilted_pin.png``, ``welded_fork.png``, ``overnight.png``, ``fuzz.png`` and ``hard_cases.png``.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import tolstat
 from tests.support.environment import ROOT
 from tolstat.analysis.exceedance import clopper_pearson
 from tolstat.common.tables import Status
+from tolstat.display import style
+from tolstat.questions.fatigue import parts_rendering
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -47,6 +50,16 @@ def tilted_pin(folder: Path) -> None:
         ax.grid(alpha=0.3)
     panels[0].legend()
     save(figure, folder / "tilted_pin.png")
+
+
+def welded_fork(folder: Path) -> None:
+    """Draw the share of the joints with a failed part against revolutions, as the page does."""
+    with tolstat.open(folder / "welded_fork.h5") as store:
+        stressed = tolstat.load_stresses([store.view()])
+    with style.settings():
+        figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
+        parts_rendering.panel(ax, stressed, tolstat.part_failures(stressed))
+        save(figure, folder / "welded_fork.png")
 
 
 def overnight(folder: Path) -> None:
@@ -139,7 +152,7 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    for draw in (overnight, fuzz, hard_cases):
+    for draw in (welded_fork, overnight, fuzz, hard_cases):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)
 

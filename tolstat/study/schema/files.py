@@ -19,6 +19,7 @@ from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
 from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.stress_point import PointEntry
 from tolstat.study.swept import KEYS
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
@@ -166,6 +167,7 @@ def tables() -> dict[str, Schema]:
         "shift": numbers(-MAX_SHIFT, MAX_SHIFT),
         "quantity": {"type": ["string", "number"]},
         fits.KEY: of_model(fits.FitEntry),
+        "points": {"type": "object", "additionalProperties": of_model(PointEntry)},
         "lines": table({name: {"x-table": _of_unit(LineEntry.__name__, unit)} for name, unit in CHANNELS.items()}),
     }
     for name, unit in TOLERANCED.items():

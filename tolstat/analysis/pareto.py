@@ -12,6 +12,8 @@ from tolstat.analysis.exceedance import FloatArray
 
 STRAIGHT = 1e-8
 """``|k|`` below which the tail counts as exponential."""
+FEWEST_WEIGHTS = 50
+"""Minimum number of positive weights for the shape of their tail."""
 
 
 def fit(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -93,3 +95,35 @@ def anderson_darling(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> Fl
     odd: NDArray[np.int64] = 2 * np.arange(1, n + 1) - 1
     terms = odd * (np.log1p(-above) + np.log(above[..., ::-1]))
     return np.asarray(-n - terms.sum(axis=-1) / n)
+
+
+def shape_of_weights(weights: ArrayLike) -> float:
+    """Shape k of the tail of weights (Vehtari, Simpson, Gelman, Yao and Gabry 2024): 1 / k of their moments are finite.
+
+    Parameters
+    ----------
+    weights : array_like, shape (n,)
+        Not negative.
+
+    Returns
+    -------
+    float
+        k of the largest min(n / 5, 3 sqrt(n)) positive weights, drawn towards 1/2 as by ten observations; -inf if all
+        weights are equal, NaN if fewer than `FEWEST_WEIGHTS` are positive.
+    """
+    w = np.sort(np.asarray(weights, dtype=float))
+    w = w[w > 0]
+    if w.size < FEWEST_WEIGHTS:
+        return np.nan
+    if w[0] == w[-1]:
+        return -np.inf
+    m = min(w.size // 5, int(np.ceil(3.0 * np.sqrt(w.size))))
+    tail = w[-m:] - w[-m - 1]
+    if not tail[0] > 0:  # equal weights at the threshold: of those above it, as many as there are
+        tail = tail[tail > 0]
+    return float((fit(tail)[0] * tail.size + 0.5 * 10.0) / (tail.size + 10.0)) if tail.size >= 5 else 0.5
+
+
+def allowed_shape(n: int) -> float:
+    """Largest k at which an estimate from n weights has converged, min(1 - 1 / log10 n, 0.7) (Vehtari et al. 2024)."""
+    return float(min(1.0 - 1.0 / np.log10(max(n, 11)), 0.7))

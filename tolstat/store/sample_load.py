@@ -50,6 +50,8 @@ class SampleLoad:
         Weight of each joint; without it all joints count equally.
     iid : bool
         Whether the joints are independent samples.
+    heaviest : float
+        Largest weight that a joint can have; inf without a bound.
     """
 
     name: str
@@ -61,6 +63,7 @@ class SampleLoad:
     status: NDArray[np.uint8]
     weights: FloatArray | None
     iid: bool
+    heaviest: float = np.inf
 
     def __repr__(self) -> str:
         valid = self.valid
@@ -84,7 +87,7 @@ class SampleLoad:
     @cached_property
     def _weighted(self) -> weighted.Sample:
         assert self.weights is not None
-        return weighted.sort_out(self.values, self.status, self.weights, self.ends)
+        return weighted.sort_out(self.values, self.status, self.weights, self.ends, self.heaviest)
 
     @property
     def valid(self) -> FloatArray:

@@ -207,7 +207,7 @@ class View:
             values, ends = frozen(load.of(results)), load.ends(results)
             self._loads[name] = SampleLoad(
                 name, load.unit, self.limits.get(name), nominal, values, (frozen(ends[0]), frozen(ends[1])),
-                self.status, self.weights, self.iid,
+                self.status, self.weights, self.iid, self.store.heaviest,
             )  # fmt: skip
         return self._loads[name]
 

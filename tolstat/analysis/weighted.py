@@ -153,7 +153,7 @@ def _far_end(own: FloatArray, other: FloatArray, tail: float, least: float) -> F
     It is the share at which `other` joints or more would be found with the probability `tail`, if only cases with
     `least` or more are looked at.
     """
-    plain: FloatArray = betaincinv(own, other, 1.0 - tail)
+    plain: FloatArray = np.asarray(betaincinv(own, other, 1.0 - tail), dtype=float)
     if not least:
         return plain
     low, high = plain, np.ones_like(plain)

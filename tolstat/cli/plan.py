@@ -42,7 +42,7 @@ def plan(
 
     loaded = study.load(study_file, n=n)
     print_warnings(study_file, loaded.joints, loaded.variants)
-    warn_without_interval(loaded.sampling.method)
+    warn_without_interval(loaded.sampling)
     announce_compilation()
     with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)

@@ -167,9 +167,9 @@ def share_above(sample: Sample, ratios: Ratios, level: float, confidence: float 
     >>> ratios = Ratios(ratio, log_mean_square=0.0696, heaviest=1.25)
     >>> found = share_above(sort_out(errors, [1] * 400, ratios), ratios, 1.0)
     >>> [round(float(x), 3) for x in (found.lower, found.estimate, found.upper, norm.sf(1.0 / 0.8))]
-    [0.079, 0.106, 0.139, 0.106]
+    [0.079, 0.105, 0.135, 0.106]
     >>> found.support.usable, round(found.ess)
-    (True, 475)
+    (True, 518)
     """
     least = 0.0 if np.isfinite(ratios.heaviest) else LEAST_BESIDE
     row = weighted.curve_of(sample, [level], confidence, least)[0]

@@ -168,4 +168,4 @@ def test_run_and_plan_tell_before_that_shares_will_have_no_interval(tmp_path, mo
     monkeypatch.setattr("tolstat.campaign.plan.plan", lambda *given: 1 / 0)
     for command in ("run", "plan"):
         done = CliRunner().invoke(app, [command, str(source), "--quiet"])
-        assert ("have no interval: set sampling.method" in done.stderr) == told
+        assert ("have no interval: set sampling.replicates" in done.stderr) == told

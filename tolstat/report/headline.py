@@ -168,7 +168,7 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
 
 def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, of the worst limit."""
-    notes = () if view.iid else (without_interval(view.method),)
+    notes = () if view.has_intervals else (without_interval(view.method),)
     if view.weighted:
         known = [row for row in records if not np.isnan(row["estimate"])]
         if not known or _undecided(known):
@@ -201,7 +201,7 @@ def _reason(view: View, records: list[dict[Any, Any]]) -> str:
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
-    if not view.iid:
+    if not view.has_intervals:
         return without_interval(view.method)
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 

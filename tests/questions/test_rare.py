@@ -100,7 +100,7 @@ def load(folder, text=PLAN, name="plan"):
 
 def asked(plan, beta=2.5, **more):
     above = 700.0 + 100.0 * beta
-    question = {"load": "cross1.F", "above": above, "per_level": 100, "p0": 0.5}
+    question = {"load": "cross1.F", "levels": {"cross1.F": above}, "per_level": 100, "p0": 0.5}
     return study.subset_of(plan, question | more)
 
 
@@ -231,7 +231,7 @@ def test_joints_without_a_load_are_counted_on_the_side_asked_for(tmp_path, whole
 @pytest.mark.slow
 def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
     plan, _, path = whole
-    with pytest.raises(StoreError, match=r"sampling.above: 950.0 in the file, 960.0 in the study"):
+    with pytest.raises(StoreError, match=r"sampling.levels.cross1.F: 950.0 in the file, 960.0 in the study"):
         rare.run(asked(load(tmp_path), 2.6), path)
     with ResultStore.open_to_write(path) as store:
         results = store.results()

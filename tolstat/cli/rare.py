@@ -11,6 +11,7 @@ import typer
 from tolstat.cli._app import AsJson, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
 from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import ANY_LIMIT
 
 if TYPE_CHECKING:
     from tolstat.questions.rare.query import RareEvent
@@ -31,7 +32,11 @@ def rare(
     ],
     limit: Annotated[
         str | None,
-        typer.Option("--limit", metavar="LIMIT", help='Load and level: "cross1.F > 900 N"; required with STUDY.'),
+        typer.Option(
+            "--limit",
+            metavar="LIMIT",
+            help='"cross1.F > 900 N", "cross*.F > 900 N" or "any limit"; required with STUDY.',
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -92,12 +97,12 @@ def rare(
         fail(f"error: {error}")
         raise typer.Exit(1) from error
     sampling = found.sampling
-    levels = tables.table(found.levels, sampling.load)
+    levels = tables.table(found.levels, sampling.limit)
     if as_json:
         typer.echo(as_text(_summary(found) | {"levels": text.records(levels)}))
     else:
         print_table(tables.LEVELS, levels, wide)
-        typer.echo(tables.sentence(found.estimate, sampling.load, sampling.above))
+        typer.echo(tables.sentence(found.estimate, sampling.limit))
     _print_messages(found, path)
 
 
@@ -109,8 +114,9 @@ def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study
     if limit is None:
         faults.append(Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"'))
     else:
-        with gather(faults):
-            parse_limit(limit)
+        if limit.split() != ANY_LIMIT.split():
+            with gather(faults):
+                parse_limit(limit, {})
     with gather(faults):
         plan = study.load(source)
     if faults or limit is None:
@@ -138,7 +144,7 @@ def _summary(found: RareEvent) -> dict[str, Any]:
 
     numbers = found.estimate._asdict() | {"as_sure_as": found.as_sure_as, "upper_if_above": found.upper_if_above}
     plain = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
-    head = {"load": found.sampling.load, "above": found.sampling.above, "reached": found.reached}
+    head = {"load": found.sampling.load, "above": found.sampling.limit.level, "reached": found.reached}
     return head | plain | {"joints": found.joints, "unresolved": found.unresolved}
 
 

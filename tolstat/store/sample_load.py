@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -9,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import exceedance, quantile, replicates, weighted
+from tolstat.analysis import exceedance, prediction, quantile, replicates, weighted
 from tolstat.analysis.exceedance import Exceedance, FloatArray, Mask
 from tolstat.analysis.quantile import Quantile
 from tolstat.common.shown import table
@@ -54,6 +55,10 @@ class SampleLoad:
         Largest weight that a joint can have; inf without a bound.
     replicates : int
         Number of independent replicates, consecutive blocks of the joints; 1 without them.
+    scale : float
+        Value of one in `unit` as a load, SI: 1 but for ratios of load to limit.
+    parts : tuple of SampleLoad
+        Loads of which this is the largest; empty for a single one. See `largest_of`.
     """
 
     name: str
@@ -67,6 +72,8 @@ class SampleLoad:
     iid: bool
     heaviest: float = np.inf
     replicates: int = 1
+    scale: float = 1.0
+    parts: tuple[SampleLoad, ...] = ()
 
     def __repr__(self) -> str:
         valid = self.valid
@@ -148,6 +155,21 @@ class SampleLoad:
         """Whether the weights of the joints support a share above a level; equal weights always do."""
         return self.weights is None or self.trust(level).usable
 
+    def delivery(self, level: float, number: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+        """Prediction interval for the number above a level among further joints; see `analysis.prediction`.
+
+        Joints without a valid load count below the level for its lower end, above it for its upper end. NaN without an
+        interval.
+        """
+        if self.weights is None and self.replicates == 1:
+            found = self.above(level, confidence)
+            if np.isnan(found.lower):
+                return np.nan, np.nan
+            least, most = round(found.n * found.bound_lower), round(found.n * found.bound_upper)
+            return prediction.of_counts(least, most, found.n, number, confidence)
+        found = self.above(level, prediction.half(confidence))
+        return prediction.of_share(found.outer_lower, found.outer_upper, number, confidence)
+
     def shifted(self, by: FloatArray) -> SampleLoad:
         """Return the load of the same joints with `by`, (n,), added to values and ends."""
         return replace(self, values=self.values + by, ends=(self.ends[0] + by, self.ends[1] + by))
@@ -157,7 +179,8 @@ class SampleLoad:
         assert self.limit is not None
         ends = (self.ends[0] / self.limit, self.ends[1] / self.limit)
         values, nominal = self.values / self.limit, self.nominal / self.limit
-        return replace(self, unit="1", limit=1.0, nominal=nominal, values=values, ends=ends)
+        scale = self.scale * self.limit
+        return replace(self, unit="1", limit=1.0, nominal=nominal, values=values, ends=ends, scale=scale)
 
     def only(self, samples: NDArray[np.intp] | Mask) -> SampleLoad:
         """Return the load of some of the joints."""
@@ -168,4 +191,13 @@ class SampleLoad:
             status=self.status[samples],
             replicates=1,
             weights=None if self.weights is None else self.weights[samples],
+            parts=tuple(part.only(samples) for part in self.parts),
         )
+
+
+def largest_of(name: str, loads: Sequence[SampleLoad]) -> SampleLoad:
+    """Largest of several loads of the same joints; their limits are equal. Computed load by load to save memory."""
+    first = loads[0]
+    ends = (np.maximum.reduce([load.ends[k] for load in loads]) for k in (0, 1))
+    values, nominal = np.maximum.reduce([load.values for load in loads]), max(load.nominal for load in loads)
+    return replace(first, name=name, nominal=nominal, values=values, ends=tuple(ends), parts=tuple(loads))

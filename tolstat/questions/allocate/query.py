@@ -209,8 +209,8 @@ def _read_request(view: View, limits: Sequence[str], cost_file: Path | None, kee
     statements: list[Statement] = []
     for text in limits:
         with gather(faults):
-            statements.append(rule.parse(text, "", "--target", EXAMPLE))
-            lacking = [name for name in statements[-1].loads if not selected_results.holds(view.columns, name)]
+            statements.append(rule.parse(text, "", "--target", EXAMPLE, view.limits))
+            lacking = [name for name in statements[-1].limit.loads if not selected_results.holds(view.columns, name)]
             if lacking:
                 kept = f"give one of: {', '.join(view.kept_loads)}"
                 faults.append(Fault("--target", f"the file does not keep {', '.join(lacking)}", kept))
@@ -239,9 +239,8 @@ def _read_request(view: View, limits: Sequence[str], cost_file: Path | None, kee
 
 def _above(view: View, statement: Statement) -> NDArray[np.bool_]:
     """Which joints are above the level in any load of a statement, or have no valid load, (n,)."""
-    loads = view.loads(statement.loads)
-    valid = np.all([load.is_valid for load in loads], axis=0)
-    return np.asarray(~valid | (np.max([load.values for load in loads], axis=0) > statement.level))
+    load = view.largest(statement.limit)
+    return np.asarray(~load.is_valid | (load.values > statement.limit.level))
 
 
 def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: NDArray[np.intp]) -> allocation.Choice:

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import pandas as pd
 
 from tolstat.analysis import exceedance
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
 from tolstat.display.table import Column, Row
-from tolstat.questions.capability.query import NOT_NORMAL, TOGETHER
+from tolstat.questions.capability.query import NOT_NORMAL
 
 
 def _with_ends(row: Row, key: str, form: str) -> str:
@@ -19,7 +20,7 @@ def _with_ends(row: Row, key: str, form: str) -> str:
 
 LIMITS = (
     Column("load", lambda row: str(row["load"])),
-    Column("limit", lambda row: "-" if row["load"] == TOGETHER else text.value(row["limit"], row["unit"])),
+    Column("limit", lambda row: "-" if row["load"] == ALL_LIMITS else text.value(row["limit"], row["unit"])),
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("yield", lambda row: text.percent(row["good"])),
     Column("total interval", lambda row: text.span(row["good_lower"], row["good_upper"])),

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -25,18 +24,17 @@ from tolstat.campaign.blocks import Execution
 from tolstat.campaign.extend import grow
 from tolstat.campaign.progress import note
 from tolstat.common.draw_records import SUBSET
-from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import LOADS
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.loads import Limit
 from tolstat.common.shown import shown
 from tolstat.store import Reader, ResultStore
 from tolstat.store.recall import differing_keys
-from tolstat.study import Study, subset_of
+from tolstat.study import Study, rule, subset_of
 from tolstat.study.model import Subset
-from tolstat.study.selection import limit_of
 
 MIN_PARALLEL = 2000
 """Minimum number of joints of a stage for which worker processes are started: some seconds of work."""
-_LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
+EXAMPLE = 'write --limit "cross1.F > 900 N"'
 
 
 @shown
@@ -81,18 +79,15 @@ class RareEvent(NamedTuple):
         return min(1.0, self.estimate.upper + self.unresolved_first / self.sampling.per_level)
 
 
-def parse_limit(text: str) -> tuple[str, float]:
-    """Load and level (SI) from a text such as ``"cross1.F > 900 N"``.
+def parse_limit(text: str, limits: Mapping[str, float]) -> Limit:
+    """Read a limit such as ``"cross*.F > 900 N"``; `limits` are those of the study, which ``"any limit"`` names.
 
     Raises
     ------
     InputError
         When the text is not of this form.
     """
-    found = _LIMIT.fullmatch(text)
-    if found is None:
-        raise InputError([Fault("--limit", f"{text!r} is not a limit", 'write --limit "cross1.F > 900 N"')])
-    return found["load"], limit_of(found["load"], found["level"], "--limit")
+    return rule.limit_of(text, limits, "--limit", EXAMPLE)
 
 
 def subset_study(
@@ -108,9 +103,9 @@ def subset_study(
     Parameters
     ----------
     study : Study
-        Study whose tolerances are used; its number of joints and its limits are ignored.
+        Study whose tolerances are used; its number of joints is ignored.
     limit : str
-        Load and level, ``"cross1.F > 15 kN"``.
+        Load or pattern and level, ``"cross*.F > 15 kN"``, or ``"any limit"``.
     n : int
         Number of joints per level.
     p0 : float
@@ -130,9 +125,10 @@ def subset_study(
     InputError
         With every fault of limit and settings.
     """
-    load, above = parse_limit(limit)
+    found = parse_limit(limit, study.limits)
     own = {} if seed is None else {"seed": seed}
-    fields = {"load": load, "above": above, "per_level": n, "p0": p0, "unresolved": unresolved}
+    levels = dict(zip(found.loads, found.levels, strict=True))
+    fields = {"load": found.name, "levels": levels, "per_level": n, "p0": p0, "unresolved": unresolved}
     return subset_of(study, fields | own)
 
 
@@ -153,7 +149,7 @@ def rare_event(
     study : Study
         The study.
     limit : str
-        Load and level, ``"cross1.F > 15 kN"``.
+        Load or pattern and level, ``"cross*.F > 15 kN"``, or ``"any limit"``.
     out : str or Path
         Result file; an existing one of the same study, limit and settings is resumed.
     workers : int, optional
@@ -209,7 +205,7 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     """
     settings = plan.sampling
     assert isinstance(settings, Subset)
-    walk = Walk(Settings(settings.per_level, settings.p0, settings.above), lambda *which: _noise(plan, *which))
+    walk = Walk(Settings(settings.per_level, settings.p0, settings.limit.level), lambda *which: _noise(plan, *which))
     unresolved: list[int] = []
     first, told = plan.first_sample, 0
     rows = _rows(out) or first + settings.per_level
@@ -294,7 +290,7 @@ def _loads(plan: Study, settings: Subset, out: Path, stage: range, joints: Candi
     if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():
         found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
         raise StoreError(str(Fault(str(out), found, "run the study again into another file (--out)")))
-    loads = LOADS[settings.load].of(results).copy()
+    loads = settings.limit.of(results).copy()
     valid = split(loads, results["status"])[0]
     loads[~valid] = math.inf if settings.unresolved == "above" else -math.inf
     return loads, int(np.count_nonzero(~valid))

@@ -9,7 +9,7 @@ from operator import mul
 import pandas as pd
 
 from tolstat.analysis.subset import Estimate, Level
-from tolstat.common.loads import UNIT_OF_LOAD, unit_text
+from tolstat.common.loads import Limit
 from tolstat.display import text
 from tolstat.display.table import Column
 
@@ -26,15 +26,15 @@ LEVELS = (
 """Columns of the table `table`; the deviation is the coefficient of variation of the share."""
 
 
-def table(levels: list[Level], load: str) -> pd.DataFrame:
+def table(levels: list[Level], limit: Limit) -> pd.DataFrame:
     """Levels of a subset simulation.
 
     Parameters
     ----------
     levels : list of Level
         Loads in SI units.
-    load : str
-        The load whose probability is estimated.
+    limit : Limit
+        The limit whose exceedance is estimated.
 
     Returns
     -------
@@ -44,16 +44,15 @@ def table(levels: list[Level], load: str) -> pd.DataFrame:
     """
     frame = pd.DataFrame([level._asdict() for level in levels])
     frame.insert(0, "level", range(len(levels)))
-    frame.insert(1, "load", load)
-    frame.insert(2, "unit", UNIT_OF_LOAD[load])
+    frame.insert(1, "load", limit.name)
+    frame.insert(2, "unit", limit.unit)
     frame.insert(4, "probability", list(accumulate([1.0, *frame["share"][:-1]], mul)))
     return frame
 
 
-def sentence(estimate: Estimate, load: str, above: float) -> str:
+def sentence(estimate: Estimate, limit: Limit) -> str:
     """The probability with its interval, or its upper bound if the levels did not reach the limit."""
-    unit = UNIT_OF_LOAD[load]
-    head = f"P({load} > {above:g} {unit_text(unit)}".strip() + ")"
+    head = f"P({limit})"
     if math.isnan(estimate.probability):
         return f"{head} < {estimate.upper:.2g}: the limit was not reached"
     return f"{head} = {estimate.probability:.3g}, 95 % interval {estimate.lower:.3g} .. {estimate.upper:.3g}"

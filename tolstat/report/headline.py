@@ -197,7 +197,7 @@ def _reason(view: View, records: list[dict[Any, Any]]) -> str:
     if poor:
         trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
         limit = text.limit(poor[0]) + (f" (and {len(poor) - 1} more)" if len(poor) > 1 else "")
-        return f"too few effective joints are above {limit}: {trust.effective:.0f}"
+        return f"few joints have most of the weight above {limit} (Pareto k {trust.k:.2f}, 0.7 allowed)"
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"

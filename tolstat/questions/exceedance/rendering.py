@@ -129,7 +129,7 @@ def note(view: View) -> str:
 
 
 def _distrust(view: View) -> str:
-    """Words on limits without a share, because too few effective joints are above them."""
+    """Words on limits without a share, because few joints have most of the weight above them."""
     poor = []
     for name, level in view.limits.items():
         load = view.load(name)

@@ -90,7 +90,7 @@ def system_life(lives: ArrayLike) -> FloatArray:
     Examples
     --------
     >>> round(float(system_life([100.0, 100.0])), 2)
-    54.01
+    54.0
     """
     with np.errstate(divide="ignore"):
         return np.asarray((np.asarray(lives, float) ** -WEIBULL_SLOPE).sum(axis=-1) ** (-1.0 / WEIBULL_SLOPE))
@@ -116,7 +116,7 @@ def critical_amplitude(needles: int, needle_diameter: float, pitch_diameter: flo
 
     Examples
     --------
-    >>> round(np.rad2deg(critical_amplitude(32, 4.0, 42.0)), 2)
+    >>> round(float(np.rad2deg(critical_amplitude(32, 4.0, 42.0))), 2)
     12.43
     """
     return float(2.0 * np.pi / (needles * (1.0 - needle_diameter / pitch_diameter)))

@@ -305,8 +305,8 @@ RESULT_FIELDS = (
     Field(
         "equivalent_load",
         "N",
-        f"dynamic equivalent load of the pin's bearing: mean resultant contact force in the power 10/3, weighted by "
-        f"the travel of the pin in its hole, {OVER}",
+        "dynamic equivalent load of the pin's bearing: mean of the resultant contact force with exponent 10/3, "
+        f"weighted by the travel of the pin in its hole, {OVER}",
         shape=(len(PINS),),
         columns=tuple(f"{pin}.equivalent_load" for pin in PINS),
     ),

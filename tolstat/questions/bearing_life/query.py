@@ -29,6 +29,8 @@ PLACES = (*PINS, JOINT)
 SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints that reach a life."""
 HOUR = 3600.0
+ANY = "any"
+"""At least one of the four bearings."""
 MOSTLY = 0.5
 """Share of a revolution above which a bearing counts as loaded in a mode."""
 LOADED = {"one_end": Mode.ONE_POINT, "opposite_ends": Mode.TWO_POINT, "along": Mode.UNIFORM}
@@ -182,7 +184,9 @@ def load_error(view: View) -> float:
     base = view.verification.base
     changes = {
         name: np.where(
-            np.isin(base["status"], VALID)[:, None], base["equivalent_load"] / check.results["equivalent_load"] - 1.0, np.nan
+            np.isin(base["status"], VALID)[:, None],
+            base["equivalent_load"] / check.results["equivalent_load"] - 1.0,
+            np.nan,
         )
         for name, check in view.verification.checks.items()
     }
@@ -204,32 +208,34 @@ def quantiles(lives: Lives, shares: Sequence[float] = SHARES, confidence: float 
     Returns
     -------
     DataFrame
-        One row per place of `PLACES` and share: ``place``, ``share``, ``unit`` (h), ``nominal``, ``estimate``,
-        ``lower``, ``upper``, ``bound_lower``, ``bound_upper`` (joints without a life among the shortest, the longest),
-        ``load`` (N, equivalent load that the share of the joints stays at or below; NaN for the joint), ``rating`` (N,
-        load rating C with which the share reaches the required life), ``n``, ``n_failed`` (those without a rating
-        included), ``n_unsettled``, ``confidence``. Ends are 0 or infinite where the joints are too few.
+        One row per place of `PLACES` and share: ``place``, ``share``; lives in h: ``nominal``, ``estimate``, ``lower``,
+        ``upper``, ``bound_lower``, ``bound_upper`` (joints without a life among the shortest, the longest); ``rating``
+        (N, load rating C with which the share reaches the required life) with ``_lower`` and ``_upper``;
+        ``nominal_load`` and ``load`` (N, equivalent load that the share of the joints stays at or below; NaN for the
+        joint); ``n``, ``n_failed`` (those without a rating included), ``n_unsettled``, ``confidence``. Ends are 0 or
+        infinite where the joints are too few.
     """
     rows = []
     for place in PLACES:
         rate = lives.rate(place)
         for share in shares:
             q = rate.quantile(share, confidence)
-            life = _life(q.estimate)
-            load = lives.load(place).quantile(share).estimate if place in PINS else np.nan
+            load = lives.load(place) if place in PINS else None
             rows.append(
                 {
                     "place": place,
                     "share": share,
-                    "unit": "h",
                     "nominal": _life(rate.nominal),
-                    "estimate": life,
+                    "estimate": _life(q.estimate),
                     "lower": _life(q.upper),
                     "upper": _life(q.lower),
                     "bound_lower": _life(q.bound_upper),
                     "bound_upper": _life(q.bound_lower),
-                    "load": load,
-                    "rating": lives.bearing.C * (lives.required / life) ** (1.0 / LIFE_EXPONENT),
+                    "rating": _rating(q.estimate, lives),
+                    "rating_lower": _rating(q.lower, lives),
+                    "rating_upper": _rating(q.upper, lives),
+                    "nominal_load": load.nominal if load else np.nan,
+                    "load": load.quantile(share).estimate if load else np.nan,
                     "n": q.n,
                     "n_failed": q.n_failed,
                     "n_unsettled": q.n_unsettled,
@@ -237,6 +243,11 @@ def quantiles(lives: Lives, shares: Sequence[float] = SHARES, confidence: float 
                 }
             )
     return pd.DataFrame(rows)
+
+
+def _rating(rate: float, lives: Lives) -> float:
+    """Load rating, N, of bearings with which a life of so many 1/h becomes the required one."""
+    return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
 
 
 def _life(rate: float) -> float:
@@ -281,7 +292,7 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per pin, and one for "any" of them: ``place``; ``one_end``, ``opposite_ends`` and ``along``, shares of
+        One row per pin, and one for `ANY` of them: ``place``; ``one_end``, ``opposite_ends`` and ``along``, shares of
         the joints in which this holds for more than `MOSTLY` of a revolution, with ``_lower`` and ``_upper``.
         No rows if the study does not keep the contact modes.
     """
@@ -289,7 +300,7 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
         return pd.DataFrame()
     spent = view.read_results(("mode_share",))["mode_share"]
     rows = []
-    for place in (*PINS, "any"):
+    for place in (*PINS, ANY):
         own = spent[:, [PINS.index(place)]] if place in PINS else spent
         row: dict[str, Any] = {"place": place}
         for name, mode in LOADED.items():

@@ -1,7 +1,7 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
-FOLDER holds the result files ``overnight.h5``, ``fuzz.h5`` and ``hard_cases.h5``, of some joints or all, and gets
-``tilted_pin.png``, ``overnight.png``, ``fuzz.png`` and ``hard_cases.png``.
+FOLDER holds the result files ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5`` and ``needle_bearings.h5``, of some joints
+or all, and gets a picture of each, and ``tilted_pin.png``.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import tolstat
 from tests.support.environment import ROOT
 from tolstat.analysis.exceedance import clopper_pearson
 from tolstat.common.tables import Status
+from tolstat.questions.bearing_life.rendering import curve
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -81,6 +82,17 @@ def overnight(folder: Path) -> None:
     save(figure, folder / "overnight.png")
 
 
+def needle_bearings(folder: Path) -> None:
+    """Draw the share of joints whose bearings have a shorter life."""
+    with tolstat.open(folder / "needle_bearings.h5") as store:
+        draw = curve(tolstat.lives_of(store.view()))
+    assert draw is not None
+    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
+    draw(ax)
+    ax.grid(alpha=0.3)
+    save(figure, folder / "needle_bearings.png")
+
+
 def kind(status: np.ndarray) -> np.ndarray:
     """Name of the colour of each joint."""
     names = np.full(len(status), "other", dtype="U10")
@@ -139,7 +151,7 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    for draw in (overnight, fuzz, hard_cases):
+    for draw in (overnight, fuzz, hard_cases, needle_bearings):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tolstat.analysis.exceedance import unresolved_matter
 from tolstat.analysis.rating_life import A1
@@ -34,6 +34,12 @@ def _span(lower: float, upper: float) -> str:
 
 def _place(row: Row) -> str:
     return "all four" if row["place"] == JOINT else str(row["place"])
+
+
+def _undecided(row: Row) -> bool:
+    """Whether joints without a life make a share as uncertain as sampling does, or no joint has one."""
+    without = row["n_failed"] + row["n_unsettled"]
+    return bool(without == row["n"] or unresolved_matter(row["count"], row["n"], without))
 
 
 def _life_of(share: float) -> Column:
@@ -64,7 +70,7 @@ LOADS = (
 BELOW = (
     Column("bearing", _place),
     Column("below", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
-    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("share", lambda row: "-" if _undecided(row) else text.percent(row["estimate"])),
     Column(
         "95 % interval",
         lambda row: text.span(row["lower"], row["upper"]),
@@ -112,32 +118,31 @@ def verdict(lives: Lives, below: pd.DataFrame, quantiles: pd.DataFrame) -> list[
         return [f"no rating: {_unrated(lives, 'every joint')}"]
     if not len(below):
         return ["no required life is given: bearing.required_life"]
-    row = below.iloc[-1]
-    valid, without = int(row["n"] - row["n_failed"] - row["n_unsettled"]), int(row["n_failed"] + row["n_unsettled"])
+    row = below.iloc[-1].to_dict()
+    without = row["n_failed"] + row["n_unsettled"]
     required = f"the required {hours(lives.required)}"
     bounds = f"{text.span(row['bound_lower'], row['bound_upper'])} with joints without a life counted above, then below"
-    if not valid or unresolved_matter(int(row["count"]), int(row["n"]), without):
+    if _undecided(row):
         return [f"no verdict: {without} of {row['n']} joints have no life; below {required} are {bounds}"]
-    interval = (
-        ""
-        if math.isnan(row["total_lower"])
-        else f" (total interval {text.span(row['total_lower'], row['total_upper'])})"
-    )
-    said = [f"{text.percent(row['estimate'])} of the joints{interval} do not reach {required}"]
+    said = [f"{text.percent(row['estimate'])} of the joints{_interval(row)} do not reach {required}"]
     if without:
         said.append(f"{without} of {row['n']} joints have no life: {bounds}")
-    end = quantiles.iloc[-1]
-    if end["rating"] > 0.0:
-        high = FEW if math.isinf(end["rating_upper"]) else f"{text.number(end['rating_upper'] / 1e3)} kN"
-        ends = (
-            ""
-            if math.isnan(end["rating_lower"])
-            else f" (95 % interval {text.number(end['rating_lower'] / 1e3)} .. {high})"
-        )
-        said.append(
-            f"{100.0 * end['share']:g} % of the joints reach it with C = {text.number(end['rating'] / 1e3)} kN{ends}"
-        )
-    return said
+    return [*said, *_better_bearings(quantiles.iloc[-1].to_dict())]
+
+
+def _interval(row: Row) -> str:
+    low, high = row["total_lower"], row["total_upper"]
+    return "" if math.isnan(low) else f" (total interval {text.span(low, high)})"
+
+
+def _better_bearings(row: Row) -> list[str]:
+    """Sentence on the load rating with which the share of a row of `query.quantiles` reaches the required life."""
+    if not row["rating"] > 0.0:
+        return []
+    low, high = row["rating_lower"], row["rating_upper"]
+    top = FEW if math.isinf(high) else f"{text.number(high / 1e3)} kN"
+    ends = "" if math.isnan(low) else f" (95 % interval {text.number(low / 1e3)} .. {top})"
+    return [f"{100.0 * row['share']:g} % of the joints reach it with C = {text.number(row['rating'] / 1e3)} kN{ends}"]
 
 
 def _unrated(lives: Lives, joints: str) -> str:
@@ -194,6 +199,7 @@ def curve(lives: Lives) -> Callable[[Axes], None] | None:
         ax.step(x, shares["estimate"], where="pre", color=style.COLOURS[0])
         ax.set_xscale("log")
         style.share_axis(ax, floor)
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: text.number(value)))
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.set(xlabel=f"life {lives.bearing.symbol} of the joint [h]", ylabel="share of joints with a shorter life")

@@ -1,7 +1,7 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
-FOLDER holds the result files ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5`` and ``needle_bearings.h5``, of some joints
-or all, and gets a picture of each, and ``tilted_pin.png``.
+FOLDER holds the result files ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5`` and ``needle_bearings.h5``, of some
+joints or all, and gets a picture of each, and ``tilted_pin.png``.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ def bearing_life(file: ResultFile, wide: Wide = False, as_json: AsJson = False) 
     The bearings are those of [bearing] in the joint file, or of [joint.bearing] in the study. To change them, edit the
     file and repeat tolstat run: no joint is simulated again.
 
-    Example: tolstat bearing-life bearings.h5
+    Example: tolstat bearing-life needle_bearings.h5
     """
     from tolstat.questions.bearing_life import query, rendering
     from tolstat.store import Reader

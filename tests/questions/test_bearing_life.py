@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from tolstat.common.tables import PINS, Mode, Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table, Text
 from tolstat.questions.bearing_life import query, rendering
+from tolstat.questions.bearing_life.lives import PLACES, lives_of
 from tolstat.questions.bearing_life.section import sections
 
 BEARING = {"C": "22 kN", "needles": 32, "needle_diameter": "4 mm", "pitch_diameter": "42 mm", "required_life": "8e6 h"}
@@ -30,13 +33,13 @@ def view(n=201, alpha=None, **kwargs):
 
 
 def answer(made):
-    lives = query.lives_of(made)
+    lives = lives_of(made)
     return rendering.verdict(lives, query.below(lives), query.quantiles(lives))
 
 
 def test_lives_in_hours():
     made = view(alpha=np.radians(15))
-    lives, loads = query.lives_of(made), made.read_results(("equivalent_load",))["equivalent_load"]
+    lives, loads = lives_of(made), made.read_results(("equivalent_load",))["equivalent_load"]
     rpm = 52.36 * 30 / np.pi
     pins = 1.5e6 / (15 * rpm) * (22e3 / loads) ** (10 / 3)  # the formula of catalogues
     np.testing.assert_allclose(lives.hours[:, :4], pins, rtol=1e-12)
@@ -46,23 +49,23 @@ def test_lives_in_hours():
 
 
 def test_shares_and_quantiles_are_those_of_the_lives():
-    lives = query.lives_of(view())
+    lives = lives_of(view())
     table, hours = query.below(lives).set_index("place"), lives.hours[:, 4]
     count = int((hours < 8e6).sum())
     assert 20 < count < 180
     assert (table.loc["joint", "count"], table.loc["joint", "n"]) == (count, 200)
     assert (table.loc["joint", "lower"], table.loc["joint", "upper"]) == clopper_pearson(count, 200)
-    assert list(table.index) == list(query.PLACES)
+    assert list(table.index) == list(PLACES)
     row = query.quantiles(lives).set_index(["place", "share"]).loc[("joint", 0.9)]
     assert (hours >= row["estimate"]).mean() == pytest.approx(0.9)
     assert row["lower"] < row["estimate"] < row["upper"]
     # with the load rating given, this share reaches the required life
-    better = query.lives_of(view(joint=held(C=f"{row['rating']} N")))
+    better = lives_of(view(joint=held(C=f"{row['rating']} N")))
     assert (better.hours[:, 4] >= 8e6 * (1 - 1e-9)).mean() == pytest.approx(0.9)
 
 
 def test_joints_without_a_life_are_counted_both_ways():
-    lives = query.lives_of(view(failed=6, unsettled=4))
+    lives = lives_of(view(failed=6, unsettled=4))
     row = query.below(lives).iloc[-1]
     count = int((lives.hours[:190, 4] < 8e6).sum())
     assert (row["n_failed"], row["n_unsettled"], row["count"]) == (6, 4, count)
@@ -72,8 +75,8 @@ def test_joints_without_a_life_are_counted_both_ways():
 
 
 def test_the_numerical_error_widens_the_total_interval():
-    lives = query.lives_of(view())
-    wide = query.below(query.replace(lives, load_error=0.05)).iloc[-1]
+    lives = lives_of(view())
+    wide = query.below(replace(lives, load_error=0.05)).iloc[-1]
     plain = query.below(lives).iloc[-1]
     assert wide["total_lower"] < plain["total_lower"] < plain["total_upper"] < wide["total_upper"]
     assert (wide["estimate"], wide["lower"]) == (plain["estimate"], plain["lower"])
@@ -84,7 +87,7 @@ def test_half_of_the_joints_failed_gives_no_verdict():
     first, *others = answer(made)
     assert first.startswith("no verdict: 100 of 200 joints have no life")
     assert not others
-    assert rendering.BELOW[2].cell(query.below(query.lives_of(made)).iloc[-1].to_dict()) == "-"
+    assert rendering.BELOW[2].cell(query.below(lives_of(made)).iloc[-1].to_dict()) == "-"
 
 
 def test_all_joints_failed_gives_no_verdict():
@@ -94,7 +97,7 @@ def test_all_joints_failed_gives_no_verdict():
 @pytest.mark.parametrize("alpha", [0.0, np.radians(12.4), -np.radians(3)])
 def test_below_the_critical_amplitude_there_is_no_rating(alpha):
     made = view(alpha=alpha)
-    lives = query.lives_of(made)
+    lives = lives_of(made)
     assert (np.isnan(lives.hours).all(), lives.unrated) == (True, 200)
     assert answer(made)[0].startswith("no rating: every joint swings by less than 12.4 deg")
     (section,) = sections(made, Asked(made.path))
@@ -106,7 +109,7 @@ def test_below_the_critical_amplitude_there_is_no_rating(alpha):
 def test_some_joints_without_a_rating():
     alpha = np.full(201, np.radians(15))
     alpha[1:5] = np.radians(12)
-    lives = query.lives_of(view(alpha=alpha))
+    lives = lives_of(view(alpha=alpha))
     assert (lives.unrated, int(query.below(lives)["n_failed"].iloc[-1])) == (4, 4)
     assert any(
         note.startswith("4 of 200 joints have no rating") for note in rendering.notes(lives, query.contacts(view()))
@@ -114,7 +117,7 @@ def test_some_joints_without_a_rating():
 
 
 def test_reliability_and_lubrication_shorten_the_life():
-    plain, strict = (query.lives_of(view(joint=held(**more))) for more in ({}, {"reliability": 0.99, "a_iso": 0.8}))
+    plain, strict = (lives_of(view(joint=held(**more))) for more in ({}, {"reliability": 0.99, "a_iso": 0.8}))
     np.testing.assert_allclose(strict.hours, 0.25 * 0.8 * plain.hours)
 
 
@@ -122,7 +125,7 @@ def test_no_required_life():
     bearing = {key: value for key, value in BEARING.items() if key != "required_life"}
     made = view(joint=joint.load("cirelli2021", {"bearing": bearing}, "x.toml").given("json"))
     assert answer(made) == ["no required life is given: bearing.required_life"]
-    assert query.below(query.lives_of(made)).empty
+    assert query.below(lives_of(made)).empty
 
 
 def test_joints_loaded_at_one_end():
@@ -136,12 +139,12 @@ def test_joints_loaded_at_one_end():
     assert table["one_end"].tolist() == [0.0, 0.0, 0.15, 0.0, 0.15]
     assert table["opposite_ends"].tolist() == [0.0, 0.0, 0.0, 0.15, 0.15]
     assert table.loc["any", "along"] == 1.0
-    notes = rendering.notes(query.lives_of(view(change=change)), query.contacts(view(change=change)))
+    notes = rendering.notes(lives_of(view(change=change)), query.contacts(view(change=change)))
     assert any("In 15 % of the joints at least one bearing is loaded at one end only" in note for note in notes)
 
 
 def test_without_independent_joints_there_are_no_intervals():
-    table = query.below(query.lives_of(view(method="sobol")))
+    table = query.below(lives_of(view(method="sobol")))
     assert table[["lower", "upper", "total_lower", "total_upper"]].isna().all(axis=None)
     assert "interval" not in answer(view(method="sobol"))[0]
 
@@ -160,12 +163,12 @@ def test_the_page_and_the_json():
 
 def test_refused_files():
     with pytest.raises(StoreError, match="joint without bearings"):
-        query.lives_of(views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json")))
+        lives_of(views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json")))
     some = tuple(column for column in RESULT_COLUMNS if column.name != "pin2.equivalent_load")
     with pytest.raises(StoreError, match="does not keep the equivalent loads"):
-        query.lives_of(view(columns=some))
+        lives_of(view(columns=some))
     with pytest.raises(StoreError, match="no sample"):
-        query.lives_of(view(method="sweep"))
+        lives_of(view(method="sweep"))
 
 
 STUDY = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import typer
 
 from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
@@ -20,19 +22,21 @@ def bearing_life(file: ResultFile, wide: Wide = False, as_json: AsJson = False) 
 
     Example: tolstat bearing-life needle_bearings.h5
     """
+    from tolstat.display.table import WIDTH
     from tolstat.questions.bearing_life import query, rendering
+    from tolstat.questions.bearing_life.lives import lives_of
     from tolstat.store import Reader
 
     with progress("lives"), Reader.open(file) as store:
         view = store.view()
-        lives = query.lives_of(view)
+        lives = lives_of(view)
         if as_json:
             typer.echo(as_text(query.summary(view, 0.95)["bearing_life"]))
             return
         quantiles, below, contacts = query.quantiles(lives), query.below(lives), query.contacts(view)
     table = rendering.by_place(quantiles)
     first, *others = rendering.verdict(lives, below, quantiles)
-    typer.echo(first)
+    typer.echo(first if wide else textwrap.fill(first, WIDTH))
     if lives.unrated < lives.valid:
         typer.echo(f"\nlife {lives.bearing.symbol} that a share of the joints reaches")
         print_table(rendering.LIVES, table, wide)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tolstat.display.asked import Asked
     from tolstat.display.blocks import Section
     from tolstat.questions.allocate.query import allocated as allocated
-    from tolstat.questions.bearing_life.query import lives_of as lives_of
+    from tolstat.questions.bearing_life.lives import lives_of as lives_of
     from tolstat.questions.causes.angles import against_angle as against_angle
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
@@ -61,7 +61,7 @@ QUESTIONS = (
     Question("causes", ("query.causes_of", "angles.against_angle", "tail.worst_joints"), has_section=True),
     Question("show", ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"), has_section=True),
     Question("fatigue", ("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"), has_section=True),
-    Question("bearing_life", ("query.lives_of",), has_section=True, has_summary=True),
+    Question("bearing_life", ("lives.lives_of",), has_section=True, has_summary=True),
     Question("accuracy", has_section=True, has_summary=True),
     Question("joints", has_section=True),
     Question("time_above", ("query.time_above",)),

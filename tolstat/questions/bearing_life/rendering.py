@@ -15,7 +15,8 @@ from tolstat.analysis.rating_life import A1
 from tolstat.common.tables import PINS
 from tolstat.display import style, text
 from tolstat.display.table import Column, Row
-from tolstat.questions.bearing_life.query import ANY, JOINT, SHARES, Lives
+from tolstat.questions.bearing_life.lives import JOINT, Lives
+from tolstat.questions.bearing_life.query import ANY, SHARES
 
 FEW = "needs more joints"
 

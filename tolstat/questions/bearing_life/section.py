@@ -8,12 +8,13 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Text
 from tolstat.display.table import as_block
 from tolstat.questions.bearing_life import query, rendering
+from tolstat.questions.bearing_life.lives import bearing_of, lives_of
 from tolstat.store.view import View
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
     """Section on bearing life, for samples of joints with bearings; none before the first joint has a result."""
-    if not (view.sampled and view.count(*VALID)) or query.bearing_of(view) is None:
+    if not (view.sampled and view.count(*VALID)) or bearing_of(view) is None:
         return []
     with asked.noting("bearing life is left out"):
         return [_section(view)]
@@ -21,7 +22,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
 
 
 def _section(view: View) -> Section:
-    lives = query.lives_of(view)
+    lives = lives_of(view)
     quantiles, below, contacts = query.quantiles(lives), query.below(lives), query.contacts(view)
     table = rendering.by_place(quantiles)
     first, *others = rendering.verdict(lives, below, quantiles)

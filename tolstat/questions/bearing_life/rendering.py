@@ -150,7 +150,7 @@ def _unrated(lives: Lives, joints: str) -> str:
     angle = f"{math.degrees(lives.bearing.critical_amplitude):.3g} deg"
     return (
         f"{joints} swings by less than {angle} to either side, so that the tracks of neighbouring needles do not "
-        "overlap; a rating life does not hold there: the lubricant is not renewed, and raceways fail by wear"
+        "overlap; the rating life does not hold there, since the lubricant between needles and raceways is not renewed"
     )
 
 

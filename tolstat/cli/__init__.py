@@ -10,7 +10,7 @@ __all__ = ["COMMANDS", "app", "main"]
 COMMANDS = {
     "Plan": ("new", "schema", "show", "simulate", "plan"),
     "Run": ("run", "extend", "merge", "status", "verify", "replay"),
-    "Read": ("report", "capability", "worst", "causes", "fatigue", "time_above"),
+    "Read": ("report", "capability", "worst", "causes", "fatigue", "bearing_life", "time_above"),
     "Decide": ("reweight", "allocate", "compare", "rare", "multifidelity"),
     "Share": ("export", "docs"),
 }

@@ -15,11 +15,14 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import data_dir
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
+from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, GIVEN, LAWS, Contact
 from tolstat.joint.derived import DERIVED
 from tolstat.joint.overrides import leaves, overridden
 from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
 
+AFFECT_NOTHING = ("description", "bearing")
+"""Keys of a joint that affect no result of its simulation."""
 NO_FIT = "the pin does not fit into the hole: D_P, by default pin.d, is not above zero and up to D_H", "give D_P <= D_H"
 
 
@@ -40,6 +43,9 @@ class Joint(Strict):
     shaft: Shaft
     bushing: Bushing
     contact: Contact
+    bearing: Annotated[
+        Bearing | None, Field(description="Needle bearing of each pin, for its rating life; affects no load")
+    ] = None
     _inherited: tuple[Fault, ...] = ()
 
     @field_validator("pin", "arm", "cross", "hub", "bushing", "contact")

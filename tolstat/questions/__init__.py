@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tolstat.display.asked import Asked
     from tolstat.display.blocks import Section
     from tolstat.questions.allocate.query import allocated as allocated
+    from tolstat.questions.bearing_life.lives import lives_of as lives_of
     from tolstat.questions.causes.angles import against_angle as against_angle
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
@@ -69,6 +70,7 @@ QUESTIONS = (
         ),
         has_section=True,
     ),
+    Question("bearing_life", ("lives.lives_of",), has_section=True, has_summary=True),
     Question("accuracy", has_section=True, has_summary=True),
     Question("joints", has_section=True),
     Question("time_above", ("query.time_above",)),

@@ -124,7 +124,6 @@ class Reader(CheckedTables):
         self.git_commit = text(attrs, "git_commit")
         self.identity = checks.mapping(file, "identity")
         self.columns = selected_results.columns(self.identity)
-        self.joint = checks.mapping(file, "joint")
         self.options = checks.mapping(file, "options")
         self.sampling = checks.mapping(file, "sampling")
         self.fidelity = checks.mapping(file, "fidelity") if "fidelity" in attrs else {}
@@ -306,6 +305,7 @@ class Reader(CheckedTables):
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
         self.limits: dict[str, float] = json.loads(text(attrs, "limits"))
+        self.joint = checks.mapping(self._file, "joint")
 
     def _reopen(self) -> bool:
         """Switch to the file that has replaced this one and includes the histories; return whether there is one."""

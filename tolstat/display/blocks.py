@@ -1,4 +1,4 @@
-"""Blocks that a report page is composed of: text, cards, tables, pictures."""
+"""Blocks that a report page is composed of: the decision, text, tables, pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Card:
-    """One number of the headline.
+    """One number of the first section.
 
     Attributes
     ----------
@@ -37,11 +37,26 @@ class Card:
 
 
 @dataclass(frozen=True)
-class Cards:
-    """The headline: the most important numbers of the page."""
+class Decision:
+    """The head of the page: what was asked, the verdict, numbers that it stands on, and a drawing beside them.
 
-    kind: ClassVar[str] = "cards"
+    Attributes
+    ----------
+    question : str
+        The question; empty if the study has none.
+    verdict : Card
+        The verdict in one sentence: its first words, the rest, causes and remedies.
+    cards : sequence of Card
+        Other numbers.
+    picture : Panel, optional
+        The drawing.
+    """
+
+    kind: ClassVar[str] = "decision"
+    question: str
+    verdict: Card
     cards: Sequence[Card]
+    picture: Panel | None = None
 
 
 @dataclass(frozen=True)
@@ -59,7 +74,8 @@ class Table:
     words : frozenset of int
         Indices of columns of words, which are aligned to the left.
     verdicts : sequence of str
-        Verdict of each row, ``yes``, ``no``, ``open`` or empty, which styles its last cell. Empty if nothing is judged.
+        Verdict of each row, ``yes``, ``no``, ``open`` or empty, which styles its second cell. Empty if nothing is
+        judged.
     """
 
     kind: ClassVar[str] = "table"
@@ -92,6 +108,9 @@ class Panel:
         Loads whose exceedance the picture shows, for the cursor.
     bare : bool
         Whether the axes fill the picture: a drawing without scales beside it.
+    switches : sequence of (str, str)
+        Parts of the picture that are hidden until the reader asks for them: the name that `drawing.switched` gives
+        them, and the words beside the switch.
     """
 
     key: str
@@ -102,14 +121,17 @@ class Panel:
     left: float = 0.72
     reads: tuple[str, ...] = ()
     bare: bool = False
+    switches: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True)
 class Panels:
-    """Pictures side by side."""
+    """Pictures side by side, two in a row where there is room, `small` ones four; a single one with what stands `beside` it."""
 
     kind: ClassVar[str] = "panels"
     panels: Sequence[Panel]
+    small: bool = False
+    beside: Sequence[Table | Text] = ()
 
 
 @dataclass(frozen=True)
@@ -137,16 +159,17 @@ class Listing:
     text: str
 
 
-Block = Text | Cards | Table | Panels | Reader | Facts | Listing
+Block = Text | Decision | Table | Panels | Reader | Facts | Listing
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page with a heading."""
+    """A part of the page with a heading; one with `lead` stands directly below the verdict, before the contents."""
 
     key: str
     title: str
     blocks: Sequence[Block] = field(default_factory=tuple)
+    lead: bool = False
 
 
 @dataclass(frozen=True)

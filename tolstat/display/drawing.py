@@ -12,9 +12,11 @@ from typing import Any, NamedTuple
 import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
-from tolstat.display import style
+from tolstat.display import schemes, style, text
 from tolstat.display.blocks import Panel
 
 BOTTOM, RIGHT, TOP = 0.5, 0.12, 0.26
@@ -83,9 +85,20 @@ def svg(panel: Panel) -> tuple[str, Frame]:
     return _inline(buffer.getvalue(), panel), frame
 
 
-def _inline(text: str, panel: Panel) -> str:
-    body = text[text.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+def switched(artist: Artist, name: str) -> None:
+    """Let an artist be drawn only while a switch of its panel is on, see `blocks.Panel.switches`."""
+    artist.set_gid(f"switch-{name}")
+
+
+def _inline(drawn: str, panel: Panel) -> str:
+    """Body of an SVG file as an element of the page, whose style sheet has fonts, joins and colours of all pictures."""
+    body = schemes.with_variables(text.visible(drawn[drawn.index("<svg") :]))
+    body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
+    body = body.replace("font-family: 'DejaVu Sans'; ", "")
+    body = re.sub(r'<path d="[^"]*" style="fill: none"/>', "", body)  # background of figure and axes
+    body = re.sub(r' d="[^"]+"', lambda m: m[0].replace("\n", ""), body)
+    body = re.sub(r">\s+<", "><", body)
+    body = re.sub(r' id="switch-([^"]+)"', r' class="\1"', body)
     used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
     body = re.sub(r' id="([^"]+)"', lambda m: f' id="{panel.key}-{m[1]}"' if m[1] in used else "", body)
     body = re.sub(r'(href="#|url\(#)', rf"\1{panel.key}-", body)
@@ -94,8 +107,8 @@ def _inline(text: str, panel: Panel) -> str:
     assert box is not None
     spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     head = f'<svg {spaces} {box[0]} role="img" aria-labelledby="{panel.key}-title {panel.key}-desc">'
-    said = f'<title id="{panel.key}-title">{escape(panel.title)}</title>'
-    said += f'<desc id="{panel.key}-desc">{escape(panel.description)}</desc>'
+    title, description = (escape(text.visible(words)) for words in (panel.title, panel.description))
+    said = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
     return head + said + body[body.index(">") + 1 :].strip()
 
 
@@ -114,9 +127,17 @@ def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> 
     ax.legend(handles, labels, ncols=len(labels), handlelength=1.2, columnspacing=1.2, **where)
 
 
-def empty(ax: Axes, text: str) -> None:
+def loads_axis(axis: Axis, largest: float, unit: str) -> str:
+    """Let an axis of loads show multiples of their unit, see `text.multiple`; return the text of the unit."""
+    size, name = text.multiple(largest, unit)
+    if size != 1.0:
+        axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / size:g}"))
+    return name
+
+
+def empty(ax: Axes, why: str) -> None:
     """Say in an empty panel why it is empty."""
-    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes)
+    ax.text(0.5, 0.5, why, ha="center", va="center", transform=ax.transAxes)
     ax.set(xticks=[], yticks=[])
 
 

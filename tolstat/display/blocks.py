@@ -104,6 +104,8 @@ class Panel:
         Width and height in inches at its natural scale.
     left : float
         Room for the labels of the y axis, inches.
+    top : float
+        Room above the axes, inches.
     reads : tuple of str
         Loads whose exceedance the picture shows, for the cursor.
     bare : bool
@@ -119,6 +121,7 @@ class Panel:
     draw: Callable[[Axes], None]
     size: tuple[float, float] = (5.0, 3.5)
     left: float = 0.72
+    top: float = 0.26
     reads: tuple[str, ...] = ()
     bare: bool = False
     switches: Sequence[tuple[str, str]] = ()
@@ -126,7 +129,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Panels:
-    """Pictures side by side, two in a row where there is room, `small` ones four; a single one with what stands `beside` it."""
+    """Pictures side by side: two in a row where there is room, `small` ones four; blocks `beside` a single one."""
 
     kind: ClassVar[str] = "panels"
     panels: Sequence[Panel]
@@ -136,10 +139,19 @@ class Panels:
 
 @dataclass(frozen=True)
 class Reader:
-    """Interactive tool that shows the exceedance at a chosen load; `curves` as `loads.readings` returns them."""
+    """Interactive tool that shows the exceedance at a chosen load.
+
+    Attributes
+    ----------
+    curves : mapping
+        As `questions.exceedance.query.readings` returns them.
+    start : str
+        The load shown first; empty for the first of `curves`.
+    """
 
     kind: ClassVar[str] = "reader"
     curves: Mapping[str, Any]
+    start: str = ""
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,17 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tolstat.display import schemes, style, text
 from tolstat.display.blocks import Panel
 
-BOTTOM, RIGHT, TOP = 0.5, 0.12, 0.26
-"""Margins around the axes, inches; `Panel.left` is the left margin."""
+BOTTOM, RIGHT = 0.5, 0.12
+"""Margins below and beside the axes, inches; `Panel.left` and `Panel.top` are the others."""
+WIDTH = 4.9
+"""Usual width of a panel, inches."""
+LETTER, KEY = 0.071, 0.5
+"""Width of a letter of a legend, and of the rest of an entry, inches."""
 GREY = "#B8B8B8"
 
 
@@ -67,7 +71,7 @@ def _place(panel: Panel) -> tuple[float, float, float, float]:
         panel.left / width,
         BOTTOM / height,
         1.0 - (panel.left + RIGHT) / width,
-        1.0 - (BOTTOM + TOP) / height,
+        1.0 - (BOTTOM + panel.top) / height,
     )
 
 
@@ -122,9 +126,25 @@ def rows(ax: Axes, labels: list[str]) -> None:
 
 
 def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    """Put a legend in one row above the axes, for panels without free space inside."""
+    """Put a legend above the axes, where it covers nothing; `legend_room` is the room that it takes."""
     where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0}
-    ax.legend(handles, labels, ncols=len(labels), handlelength=1.2, columnspacing=1.2, **where)
+    columns = _legend_columns(labels, ax.get_window_extent().width / ax.figure.dpi)
+    ax.legend(handles, labels, ncols=columns, handlelength=2.2, columnspacing=1.2, **where)
+
+
+def legend_room(labels: Sequence[str], left: float = Panel.left) -> float:
+    """Room that a legend takes above the axes of a panel of usual width, inches; `left` as in `Panel`."""
+    return 0.08 + 0.2 * -(-len(labels) // _legend_columns(labels, WIDTH - left - RIGHT))
+
+
+def _legend_columns(labels: Sequence[str], width: float) -> int:
+    """Largest number of columns, filled one after the other, that fit a width, inches."""
+    for columns in range(len(labels), 1, -1):
+        rows = -(-len(labels) // columns)
+        letters = sum(max(map(len, labels[i : i + rows])) for i in range(0, len(labels), rows))
+        if LETTER * letters + KEY * columns <= width:
+            return columns
+    return 1
 
 
 def loads_axis(axis: Axis, largest: float, unit: str) -> str:
@@ -132,6 +152,17 @@ def loads_axis(axis: Axis, largest: float, unit: str) -> str:
     size, name = text.multiple(largest, unit)
     if size != 1.0:
         axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / size:g}"))
+    return name
+
+
+def log_loads(ax: Axes, low: float, high: float, unit: str) -> str:
+    """Make the x axis logarithmic, over loads from `low` to `high`, SI; return the text of the unit that it shows."""
+    size, name = text.multiple(high, unit)
+    ax.set_xscale("log")
+    ax.set_xlim(low, high)
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / size:g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
     return name
 
 
@@ -148,4 +179,4 @@ def rows_left(labels: Sequence[str]) -> float:
 
 def rows_height(count: int) -> float:
     """Height of a panel of horizontal rows, inches."""
-    return 0.235 * count + BOTTOM + TOP + 0.1
+    return 0.235 * count + BOTTOM + 0.36

@@ -1,4 +1,4 @@
-"""Colours of the page and its pictures, light and dark: CSS variables by the light colour that pictures are drawn with."""
+"""Colours of the page: a CSS variable and a dark value for each colour that its pictures are drawn with."""
 
 from __future__ import annotations
 
@@ -31,22 +31,21 @@ COLOURS = {
     "#cfe4f3": Colour("cross", "#24465e"),
     "#f6dfc6": Colour("input", "#5c4527"),
     "#cdebdd": Colour("output", "#24513d"),
-}
-"""Every colour of the page's pictures, as matplotlib writes it; 4.5:1 or more between letters and paper in both schemes."""
+} | {shade: Colour(f"shade{i}", style.SHADES[-1 - i] if i else "#fde725") for i, shade in enumerate(style.SHADES)}
+"""Colours of the page's pictures, as matplotlib writes them."""
 
 
 def with_variables(svg: str) -> str:
     """Replace the colours of an SVG by CSS variables; `style_sheet` gives their values.
 
-    Raises
-    ------
-    KeyError
-        When the picture has a colour that is not in `COLOURS`.
+    Colours that are not in `COLOURS` stay as they are in both schemes.
     """
     svg = re.sub(r' fill="(#[0-9a-f]{6})"', r' style="fill: \1"', svg)
-    return re.sub(
-        r'style="[^"]+"', lambda own: re.sub("#[0-9a-f]{6}", lambda m: f"var(--{COLOURS[m[0]].variable})", own[0]), svg
-    )
+    return re.sub(r'style="[^"]+"', lambda own: re.sub("#[0-9a-f]{6}", _variable, own[0]), svg)
+
+
+def _variable(found: re.Match[str]) -> str:
+    return f"var(--{COLOURS[found[0]].variable})" if found[0] in COLOURS else found[0]
 
 
 def style_sheet() -> str:

@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -25,6 +28,8 @@ DASHES: tuple[Dash, ...] = (
     (0.0, (1.2, 0.9)),
 )
 """Dashes of bushings 1 to 4: where curves coincide, the lower one shows through the gaps."""
+SHADES = tuple(to_hex(colormaps["viridis"](x)) for x in np.linspace(0.0, 0.88, 12))
+"""Colours in order from dark to light, which stay in order in grey and for colour-blind readers."""
 INK, FAINT = "#222222", "#777777"
 
 _SETTINGS: Any = {

@@ -56,7 +56,7 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
 
 
 def multiple(largest: float, unit: str) -> tuple[float, str]:
-    """Multiple of a unit for values up to `largest`: its size, and its text; forces and torques from 1e4 on in kN, kN m."""
+    """Multiple of a unit for values up to `largest`: its size and text; kN and kN m from 1e4 N and N m on."""
     kilo = unit in ("N", "N*m") and abs(largest) >= 1e4
     return (1e3, f"k{unit_text(unit)}") if kilo else (1.0, unit_text(unit))
 

@@ -25,7 +25,7 @@ from tolstat.store.view import View
 
 
 def section(view: View, asked: Asked) -> Section:
-    """Decide on the limits: question, verdict, drawing with the worst bushing marked, and what the verdict stands on."""
+    """Decide on the limits: question, verdict, drawing with the worst bushing marked, numbers behind the verdict."""
     found = headline(view, asked.accepted)
     load = found.load if found else next(iter(view.leading), "")
     head = Decision(
@@ -116,28 +116,28 @@ def _how(view: View, asked: Asked) -> list[str]:
     """Paragraphs on what the picture shows, and what decides."""
     if not view.iid:
         return [
-            "Points: share of the joints with a valid load. Grey: with failed and unsettled joints counted below and above "
-            "every limit.",
+            "Points: share of the joints with a valid load. Grey: with failed and unsettled joints counted below and "
+            "above every limit.",
             "No intervals: Clopper–Pearson holds for independent samples only; replicates with other seeds show the "
             "scatter.",
         ]
     said = "Joints are counted by their weights. " if view.weighted else ""
     paragraphs = [
-        f"{said}Points: share of the joints with a valid load. Blue: its interval by Clopper and Pearson, 95 % for each limit "
-        "by itself.",
-        "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above it at "
-        "its upper end; it covers the numerical error, too, where it is known.",
+        f"{said}Points: share of the joints with a valid load. Blue: its interval by Clopper and Pearson, 95 % for each "
+        "limit by itself.",
+        "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above "
+        "it at its upper end; it covers the numerical error, too, where it is known.",
     ]
     if asked.judges:
         paragraphs.append(
-            f"A limit is kept if its total interval lies below {text.percent(asked.accepted)}, not kept if it lies above. It "
-            "has no verdict where joints without a valid load decide, and is open otherwise."
+            f"A limit is kept if its total interval lies below {text.percent(asked.accepted)}, not kept if it lies above. "
+            "It has no verdict where joints without a valid load decide, and is open otherwise."
         )
     return paragraphs
 
 
 def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
-    """Estimate, interval and total interval of each limit on an axis of shares, from the least to the largest of them."""
+    """Estimate, interval and total interval of each limit, on an axis from the least to the largest of them."""
     rows = table.to_dict("records")
     spans = [ends(row) if not np.isnan(ends(row)[0]) else (row["bound_lower"], row["bound_upper"]) for row in rows]
     n = max(int(table["n"].max()), 1)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.loads import BUSHING_LOADS, unit_text
-from tolstat.display import style, text
+from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.questions.causes import angles_figure
 from tolstat.questions.causes.angles import AgainstAngle, modulus
@@ -100,6 +100,7 @@ def _history_panel(found: _Histories) -> Panel:
         f"Histories of the worst joints: {rows}",
         partial(_draw, found=found),
         (4.9, 3.3),
+        top=drawing.legend_room(["row 100000"] * DRAWN + ["5 to 95 %", "limit"]),
     )
 
 
@@ -116,5 +117,5 @@ def _draw(ax: Axes, found: _Histories) -> None:
     if found.limit is not None:
         ax.axhline(found.limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
     unit = unit_text(tail.unit)
-    ax.set(ylabel=f"|{tail.by}| [{unit}]", ylim=(0.0, 1.3 * np.nanmax([*found.loads.flat, found.limit or 0.0])))
-    ax.legend(loc="upper right", ncols=3, columnspacing=1.2, handlelength=2.0)
+    ax.set(ylabel=f"|{tail.by}| [{unit}]", ylim=(0.0, 1.05 * np.nanmax([*found.loads.flat, found.limit or 0.0])))
+    drawing.legend_above(ax, *ax.get_legend_handles_labels())

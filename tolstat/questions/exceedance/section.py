@@ -31,7 +31,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
         return []
     blocks: list[Block] = [Panels([_leading_panel(view, name) for name in view.leading])] if view.leading else []
     blocks.append(Text(_note(view), small=True))
-    blocks.append(Reader(query.readings(view)))
+    blocks.append(Reader(query.readings(view), query.most_exceeded(view)))
     blocks.append(_quantiles(view))
     if view.limits and view.sampled and view.numerical_error:
         title = "What makes the shares above limits uncertain, in per cent of the joints"
@@ -122,6 +122,7 @@ def _of_sweep(view: View) -> Section:
             f"Largest {'forces' if letter == 'F' else 'torques'} of the {group} bushings against the swept value",
             partial(_sweep, view=view, group=group, letter=letter),
             (4.9, 3.6),
+            top=drawing.legend_room(sweep.key(view)[1]),
         )
         for group, letter in GROUPS
         if any(f"{group}{i}.{letter}" in view.bushing_loads for i in (1, 2, 3, 4))
@@ -135,4 +136,4 @@ def _of_sweep(view: View) -> Section:
 
 def _sweep(ax: Axes, view: View, group: str, letter: str) -> None:
     sweep.panel(ax, view, group, letter)
-    ax.legend(*sweep.key(view), loc="best", handlelength=2.6)
+    drawing.legend_above(ax, *sweep.key(view))

@@ -14,7 +14,7 @@ FOLDER = Path(__file__).parent
 
 
 def environment() -> jinja2.Environment:
-    """Make the Jinja environment of the templates: inserted values are escaped, and characters without a glyph shown."""
+    """Make the Jinja environment of the templates: inserted values are escaped, unseen characters shown."""
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER), autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown
     )

@@ -21,7 +21,7 @@ from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.exceedance.rendering import LIMIT_DASH, LIMITS, above
 from tolstat.questions.show import section as show
 from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, verdict
-from tolstat.store.view import View
+from tolstat.store.view import METHODS, View
 
 
 def section(view: View, asked: Asked) -> Section:
@@ -76,7 +76,7 @@ def question_of(text: str) -> str:
 
 def _answer(view: View, found: Headline | None) -> Card:
     if found is None:
-        why = "The study sets no limits" if view.sampled else "Its joints are no sample of a production"
+        why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
         return Card("", f"{why}, so there is no verdict.", "")
     note = " ".join(text.sentence(note) for note in found.notes)
     return Card(found.value, found.words, note, "open" if found.answer == "none" else found.answer)
@@ -123,15 +123,15 @@ def _how(view: View, asked: Asked) -> list[str]:
         ]
     said = "Joints are counted by their weights. " if view.weighted else ""
     paragraphs = [
-        f"{said}Points: share of the joints with a valid load. Blue: its interval by Clopper and Pearson, 95 % for each "
-        "limit by itself.",
+        f"{said}Points: share of the joints with a valid load. Blue: its interval by Clopper and Pearson, 95 % for "
+        "each limit by itself.",
         "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above "
         "it at its upper end; it covers the numerical error, too, where it is known.",
     ]
     if asked.judges:
         paragraphs.append(
-            f"A limit is kept if its total interval lies below {text.percent(asked.accepted)}, not kept if it lies above. "
-            "It has no verdict where joints without a valid load decide, and is open otherwise."
+            f"A limit is kept if its total interval lies below {text.percent(asked.accepted)}, not kept if it lies "
+            "above. It has no verdict where joints without a valid load decide, and is open otherwise."
         )
     return paragraphs
 
@@ -141,15 +141,15 @@ def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
     rows = table.to_dict("records")
     spans = [ends(row) if not np.isnan(ends(row)[0]) else (row["bound_lower"], row["bound_upper"]) for row in rows]
     n = max(int(table["n"].max()), 1)
-    shown = np.array([accepted, *table["estimate"], *np.ravel(spans)], float)
-    shown = shown[shown >= 0.5 / n] if (shown >= 0.5 / n).any() else np.array([0.5 / n])
+    shown = np.array([*table["estimate"], *np.ravel(spans)], float)
+    shown = np.array([*shown[shown >= 0.5 / n], *([accepted] if accepted > 0 else ())])
+    high = min(1.4 * shown.max(initial=0.5 / n), 1.0)
     drawing.rows(ax, [text.limit(row) for row in rows])
-    low, high = (0.7 * shown.min(), min(1.4 * shown.max(), 1.0))
-    style.share_axis(ax, min(low, 0.3 * high), "x", high)
+    style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
     low = ax.get_xlim()[0]
     for i, (row, span) in enumerate(zip(rows, spans, strict=True)):
         ax.plot([max(span[0], 0.1 * low), span[1]], [i, i], color=drawing.GREY, lw=5.0, solid_capstyle="butt")
-        if not np.isnan(row["lower"]):
+        if not np.isnan(row["estimate"] + row["lower"]):
             ax.plot([max(row["lower"], 0.1 * low), row["upper"]], [i, i], color=style.COLOURS[0], lw=2.0)
         if row["estimate"] >= low:
             ax.plot(row["estimate"], i, "o", color=style.COLOURS[0], ms=5.5)

@@ -77,7 +77,9 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
     if not len(table):
         drawing.empty(ax, "no joint with a valid result")
         return
-    low, high = rendering.axis_range(table["level"], [] if load.limit is None else [load.limit])
+    thin = {other: query.curve(view.load(other), 0.95, THIN_LEVELS) for other in others}
+    levels = np.concatenate([table["level"], *(own["level"] for own in thin.values())])
+    low, high = rendering.axis_range(levels, [] if load.limit is None else [load.limit])
     floor = 0.5 * rendering.least(view, table)
     ax.set_xlim(low, high)
     style.share_axis(ax, floor)
@@ -88,13 +90,11 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
         for end in (table["bound_upper"] + half, table["bound_lower"] - half):
             drawn = ax.step(x, end.clip(1e-3 * floor, 1.0), where="post", color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))
             drawing.switched(drawn[0], "curve-band")
-    for other in view.loads(others):
-        own = query.curve(other, 0.95, THIN_LEVELS)
-        if len(own):
-            dash = "-" if other.name.startswith("cross") else (0.0, (4.0, 1.5))
-            along, shares = np.append(low, own["level"][1:]), own["estimate"].clip(1e-3 * floor, 1.0)
-            drawn = ax.step(along, shares, where="post", color=style.FAINT, lw=0.7, ls=dash)
-            drawing.switched(drawn[0], "others")
+    for other, own in thin.items():
+        dash = "-" if other.startswith("cross") else (0.0, (4.0, 1.5))
+        along, shares = np.append(low, own["level"][1:]), own["estimate"].clip(1e-3 * floor, 1.0)
+        drawn = ax.step(along, shares, where="post", color=style.FAINT, lw=0.7, ls=dash)
+        drawing.switched(drawn[0], "others")
     if load.limit is not None:
         rendering.limit_lines(ax, {load.limit: [1, 2, 3, 4]}, load.unit)
     if low <= load.nominal <= high:

@@ -147,17 +147,17 @@ def _legend_columns(labels: Sequence[str], width: float) -> int:
     return 1
 
 
-def loads_axis(axis: Axis, largest: float, unit: str) -> str:
-    """Let an axis of loads show multiples of their unit, see `text.multiple`; return the text of the unit."""
-    size, name = text.multiple(largest, unit)
+def loads_axis(axis: Axis, typical: float, unit: str) -> str:
+    """Let an axis of loads show the multiple of their unit that a load has, see `text.multiple`; return its text."""
+    size, name = text.multiple(typical, unit)
     if size != 1.0:
         axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / size:g}"))
     return name
 
 
-def log_loads(ax: Axes, low: float, high: float, unit: str) -> str:
-    """Make the x axis logarithmic, over loads from `low` to `high`, SI; return the text of the unit that it shows."""
-    size, name = text.multiple(high, unit)
+def log_loads(ax: Axes, low: float, high: float, typical: float, unit: str) -> str:
+    """Make the x axis logarithmic, over loads from `low` to `high`, SI; otherwise as `loads_axis`."""
+    size, name = text.multiple(typical, unit)
     ax.set_xscale("log")
     ax.set_xlim(low, high)
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))

@@ -186,7 +186,8 @@ def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.9
     marked = _limit_levels(view, group, letter)
     low, high = axis_range(levels, list(marked))
     ax.set_xlim(low, high)
-    ax.set_xlabel(f"x: largest |{letter}| over the revolution [{drawing.loads_axis(ax.xaxis, high, unit)}]")
+    shown = drawing.loads_axis(ax.xaxis, max(marked, default=high), unit)
+    ax.set_xlabel(f"x: largest |{letter}| over the revolution [{shown}]")
     floor = 0.5 * min(least(view, table) for table in tables if table.size)
     style.share_axis(ax, floor)
     for i, table in enumerate(tables):

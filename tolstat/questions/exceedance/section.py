@@ -100,7 +100,7 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
     if low <= load.nominal <= high:
         style.mark(ax, load.nominal, 1.0, style.COLOURS[0])
     ax.xaxis.set_major_locator(MaxNLocator(5 if load.unit != "1" else 3))
-    unit = drawing.loads_axis(ax.xaxis, high, load.unit)
+    unit = drawing.loads_axis(ax.xaxis, load.limit or high, load.unit)
     ax.set_xlabel(f"x: {load.name} [{unit or '1'}], largest over the revolution")
     ax.set_ylabel("share of joints above x")
 

@@ -68,12 +68,12 @@ def _load(ax: Axes, load: SampleLoad) -> None:
             ha="center", va="bottom",
         )  # fmt: skip
     if load.long_tailed:
-        unit = drawing.log_loads(ax, 0.95 * low, 1.05 * high, load.unit)
+        unit = drawing.log_loads(ax, 0.95 * low, 1.05 * high, load.limit or high, load.unit)
     else:
         margin = 0.03 * (high - low)
         ax.set_xlim(low - margin, high + margin)
         ax.xaxis.set_major_locator(MaxNLocator(6))
-        unit = drawing.loads_axis(ax.xaxis, high, load.unit)
+        unit = drawing.loads_axis(ax.xaxis, load.limit or high, load.unit)
     left, right = ax.get_xlim()
     if left <= load.nominal <= right:
         style.mark(ax, load.nominal, ax.get_ylim()[1], style.COLOURS[0])

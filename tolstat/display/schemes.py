@@ -31,7 +31,10 @@ COLOURS = {
     "#cfe4f3": Colour("cross", "#24465e"),
     "#f6dfc6": Colour("input", "#5c4527"),
     "#cdebdd": Colour("output", "#24513d"),
-} | {shade: Colour(f"shade{i}", style.SHADES[-1 - i] if i else "#fde725") for i, shade in enumerate(style.SHADES)}
+} | {
+    light: Colour(f"shade{i}", dark)
+    for i, (light, dark) in enumerate(zip(style.SHADES, style.DARK_SHADES, strict=True))
+}
 """Colours of the page's pictures, as matplotlib writes them."""
 
 

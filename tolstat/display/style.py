@@ -28,8 +28,10 @@ DASHES: tuple[Dash, ...] = (
     (0.0, (1.2, 0.9)),
 )
 """Dashes of bushings 1 to 4: where curves coincide, the lower one shows through the gaps."""
-SHADES = tuple(to_hex(colormaps["viridis"](x)) for x in np.linspace(0.0, 0.88, 12))
-"""Colours in order from dark to light, which stay in order in grey and for colour-blind readers."""
+SHADES, DARK_SHADES = (
+    tuple(to_hex(colormaps["viridis"](x)) for x in np.linspace(*ends, 12)) for ends in ((0.0, 0.88), (1.0, 0.35))
+)
+"""Colours in order, which stay in order in grey and for colour-blind readers, on white and on dark paper."""
 INK, FAINT = "#222222", "#777777"
 
 _SETTINGS: Any = {

@@ -77,7 +77,8 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
     if not len(table):
         drawing.empty(ax, "no joint with a valid result")
         return
-    thin = {other: query.curve(view.load(other), 0.95, THIN_LEVELS) for other in others}
+    known = [other for other in view.loads(others) if other.valid.size]
+    thin = {other.name: query.curve(other, 0.95, THIN_LEVELS) for other in known}
     levels = np.concatenate([table["level"], *(own["level"] for own in thin.values())])
     low, high = rendering.axis_range(levels, [] if load.limit is None else [load.limit])
     floor = 0.5 * rendering.least(view, table)
@@ -115,14 +116,15 @@ def _quantiles(view: View) -> Table:
 
 def _of_sweep(view: View) -> Section:
     """Loads against the swept value."""
+    room = drawing.legend_room(sweep.key(view)[1])
     panels = [
         Panel(
             f"sweep-{group}-{letter}",
             f"{group.capitalize()} bushings, {'force' if letter == 'F' else 'torque'}",
             f"Largest {'forces' if letter == 'F' else 'torques'} of the {group} bushings against the swept value",
             partial(_sweep, view=view, group=group, letter=letter),
-            (4.9, 3.6),
-            top=drawing.legend_room(sweep.key(view)[1]),
+            (4.9, 3.3 + room),
+            top=room,
         )
         for group, letter in GROUPS
         if any(f"{group}{i}.{letter}" in view.bushing_loads for i in (1, 2, 3, 4))

@@ -22,6 +22,8 @@ LEGEND = (
     "the pins, those of fork1–4 on the arms; their components are along and about the axes e, t, z of each."
 )
 """Text below the drawings of the joint."""
+WORST = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
+"""Text below the drawings of the worst joints."""
 
 
 def worst(view: View, load: str, asked: Asked) -> Panel | None:
@@ -59,15 +61,9 @@ def sections(view: View, asked: Asked) -> list[Section]:
     found = []
     if view.method != "sweep":
         with asked.noting("the worst joints are not drawn"):
-            said = (
-                "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
-            )
             panels = _worst(view)
-            found += (
-                [Section("drawn", "The worst joints, drawn", [Panels(panels), Text(said, small=True)])]
-                if panels
-                else []
-            )
+            if panels:
+                found.append(Section("drawn", "The worst joints, drawn", [Panels(panels), Text(WORST, small=True)]))
     with asked.noting("the joint and its errors are not drawn"):
         marked = sorted({name.rpartition(".")[0] for name in view.leading} - {""})
         joint = joint_of(view.store, 0)

@@ -179,7 +179,8 @@ def test_text_of_the_study_is_shown_and_not_run(html):
     assert "Question: how often is too much too much?<" in html
 
 
-def test_names_and_comments_are_escaped_and_unseen_characters_shown(tmp_path):
+def test_names_and_comments_are_escaped_and_unseen_characters_shown(tmp_path, monkeypatch):
+    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
     text = "# Question: \u202ewhy</p><script>1</script>\n" + TEXT
     path = synthetic.store(tmp_path, text, name="""a"b'<script>c&\u202d""")
     page.write_page(path, tmp_path / "page.html", replay=0)

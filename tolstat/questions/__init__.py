@@ -59,6 +59,7 @@ class Question(NamedTuple):
 
 QUESTIONS = (
     Question("exceedance", has_section=True, has_summary=True),
+    Question("histograms", has_section=True),
     Question("capability", has_section=True, has_summary=True),
     Question("causes", ("query.causes_of", "angles.against_angle", "tail.worst_joints"), has_section=True),
     Question("show", ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"), has_section=True),

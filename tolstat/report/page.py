@@ -76,14 +76,19 @@ def write_page(
 
 
 def compose(view: View, asked: Asked) -> Page:
-    """Compose the page; what cannot be evaluated is left out, and a note in the first section says why."""
+    """Compose the page: verdict, the sections that stand with it, the others, provenance.
+
+    What cannot be evaluated is left out, and a note in the first section says why.
+    """
     asked.notes.extend(
         note for note in (fidelity.sentence(view.store.options, view.store.fidelity), _stopped(view)) if note
     )
-    sections = questions.sections(view, asked)
+    sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
     facts = Facts(tuple(_facts(view.store)))
     provenance = Section("provenance", "Provenance", [facts, Listing("The study as it was run", view.store.study_text)])
-    return Page(view.name, f"{view.head()}.", [verdict.section(view, asked), *sections, provenance])
+    lead = [section for section in sections if section.lead]
+    rest = [section for section in sections if not section.lead]
+    return Page(view.name, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
 
 
 def _stopped(view: View) -> str:

@@ -96,8 +96,8 @@ def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
 
 
 def most_exceeded(view: View) -> str:
-    """Name of the load whose limit the largest share of the joints exceeds; without limits see `View.leading`."""
-    shares = {load.name: load.above(load.limit).estimate for load in view.loads(list(view.limits)) if load.limit}
+    """Name of the leading load whose limit the largest share of the joints exceeds; see `View.leading`."""
+    shares = {load.name: load.above(load.limit).estimate for load in view.loads(view.leading) if load.limit}
     known = {name: share for name, share in shares.items() if share == share}
     return max(known, key=lambda name: known[name]) if known else next(iter((*view.leading, "cross1.F")))
 

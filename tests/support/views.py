@@ -34,7 +34,7 @@ def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=Non
         change(results[1:])
     limits = {"cross1.F": 700.0} if limits is None else limits
     made = View(FakeStore(method, limits, synthetic.errors(n), results, columns=columns))
-    made.verification = None
+    made.verification, made.altered = None, {}
     return made
 
 
@@ -50,5 +50,5 @@ def swept(second=1, limits=None, named=True, columns=RESULT_COLUMNS, change=None
         change(results[1:])
     keys = '[sweep]\n"pin*.diameter" = { from = "-0.1 mm" }\npin1.tilt_z = { from = "0.5 deg" }\n' if named else ""
     made = View(FakeStore("sweep", limits or {}, errors, results, keys, columns))
-    made.verification = None
+    made.verification, made.altered = None, {}
     return made

@@ -255,6 +255,13 @@ class View:
         return tuple(name for _, name in found.values())
 
     @property
+    def most_exceeded(self) -> str:
+        """Load whose limit the largest share of the joints exceeds; without limits see `leading`."""
+        shares = {load.name: load.above(load.limit).estimate for load in self.loads(list(self.limits)) if load.limit}
+        known = {name: share for name, share in shares.items() if share == share}
+        return max(known, key=lambda name: known[name]) if known else next(iter((*self.leading, "cross1.F")))
+
+    @property
     def iid(self) -> bool:
         """Whether the joints are independent samples."""
         return self.method in ("random", "importance")

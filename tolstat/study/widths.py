@@ -2,8 +2,8 @@
 
 A distribution is narrowed or widened about the middle of its band, so its shape and Cpk stay: 0 to +30 um becomes +7.5
 to +22.5 um if it is half as wide, and exactly +15 um if it is exact. An entry without a band (a standard deviation,
-measured parts) is narrowed about its mean, a zone about the ideal axis. Random numbers belong to names, so the joints of
-a changed study have the same scores as those of the study.
+measured parts) is narrowed about its mean, a zone about the ideal axis. Random numbers belong to names, so the joints
+of a changed study have the same scores as those of the study.
 """
 
 from __future__ import annotations
@@ -64,9 +64,7 @@ class Rescaled(Distribution):
         off = x - self.shift - self.middle
         if self.factor == 0.0:
             return np.where(off == 0.0, 0.0, -np.inf)
-        return self.every.logpdf(self.middle + off / self.factor) - (
-            0.0 if self.discrete else math.log(self.factor)
-        )
+        return self.every.logpdf(self.middle + off / self.factor) - (0.0 if self.discrete else math.log(self.factor))
 
     @property
     def discrete(self) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 from tolstat.analysis import difference, exceedance, pick_freeze
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.campaign import what_if as sets
-from tolstat.campaign.what_if import AS_DRAWN, EXCHANGE, WIDTH
-from tolstat.common.errors import Fault, StoreError
+from tolstat.campaign.what_if import EXCHANGE, WIDTH
+from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -196,7 +197,7 @@ def is_settled(values: list[FloatArray], base: FloatArray, level: float, confide
     ranked = sorted(values, key=lambda own: float(np.mean(own[:n] > level)))
     drawn = float(np.mean(base[:n] > level))
     own = 1.0 - (1.0 - confidence) / (len(values) - 1)
-    for one, other in zip(ranked, ranked[1:], strict=False):
+    for one, other in pairwise(ranked):
         found = difference.shares(one[:n], other[:n], [level], paired=True, confidence=own)
         low, high = float(found.lower[0]), float(found.upper[0])
         if low <= 0.0 <= high and max(-low, high) > NEGLIGIBLE * drawn:
@@ -204,10 +205,10 @@ def is_settled(values: list[FloatArray], base: FloatArray, level: float, confide
     return True
 
 
-def best(found: WhatIf) -> dict[str, object] | None:
+def best(found: WhatIf) -> Mapping[Any, Any] | None:
     """Row of the line that lowers the share most if half as wide; None if none surely lowers it."""
-    rows = found.table[(found.table["step"] == HALF) & (found.table["change_upper"] < 0.0)]
-    return None if rows.empty else dict(rows.loc[rows["share"].idxmin()])
+    rows = [row for row in found.table.to_dict("records") if row["step"] == HALF and row["change_upper"] < 0.0]
+    return min(rows, key=lambda row: float(row["share"]), default=None)
 
 
 _STEPS = {step: number for number, step in enumerate(widths.STEPS)}
@@ -304,8 +305,6 @@ def find_lines(view: View, each: str, groups: list[str]) -> list[Line]:
     """
     kinds = {"entry": widths.lines, "feature": widths.features, "error": widths.errors}
     if each not in kinds:
-        from tolstat.common.errors import InputError
-
         raise InputError([Fault("--each", f"{each!r} is not allowed", did_you_mean(each, list(kinds)))])
     return [*kinds[each](view.study), *widths.named(view.study, groups)]
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.shown import shown
 from tolstat.common.tables import VALID
+from tolstat.store import meanings
 from tolstat.store.new_file import GROUPS
 from tolstat.store.result_file import put_attributes, text
 
@@ -21,11 +22,13 @@ if TYPE_CHECKING:
     from tolstat.store.result_store import ResultStore
 
 GROUP = "what_if"
-DESCRIPTIONS = {
-    "loads": ("f8", "SI", "largest loads over the revolution, in the order of the attribute `loads`; NaN without one"),
-    "status": ("u1", "1", "status of each joint, as in results"),
+DATASETS = {
+    "sample": ("i8", "1", "number of the sample; of an exchange, of the pair of samples 2 i and 2 i + 1"),
+    "load": (h5py.string_dtype(), "1", "name of the load"),
+    "loads": ("f8", "N, N*m", "largest loads over the revolution; NaN without a result"),
+    "status": ("u1", "1", "outcome of the simulation"),
 }
-"""Type, unit and description of each dataset of a set."""
+"""Type, unit and description of each dataset of a set; the first two are the scales of the others."""
 
 
 @shown
@@ -77,13 +80,13 @@ def read(store: Reader) -> dict[str, Altered]:
         try:
             one = Altered(
                 json.loads(text(attrs, "change")),
-                int(attrs["first"]),
-                tuple(json.loads(text(attrs, "loads"))),
+                int(group["sample"][0]),
+                tuple(group["load"].asstr()[:].tolist()),
                 np.asarray(group["loads"][:], float),
                 np.asarray(group["status"][:], np.uint8),
             )
             sound = text(attrs, "check") == _check(one) and key(one.about) == name
-        except (KeyError, ValueError):
+        except (KeyError, ValueError, IndexError, TypeError, AttributeError):  # not what `write` writes
             sound = False
         if sound:
             found[name] = one
@@ -109,14 +112,20 @@ def _write(file: h5py.File, sets: Mapping[str, Altered]) -> None:
         if name in group:
             del group[name]
         own = group.create_group(name)
-        change, loads = json.dumps(dict(one.about), allow_nan=False), json.dumps(one.names)
-        about = f"{one.about['kind']}: {one.about['label']}"
-        put_attributes(own, {"description": about, "change": change, "first": one.first, "loads": loads})
-        put_attributes(own, {"seed": int(one.about["seed"]), "check": _check(one)})
-        for column, values in (("loads", one.loads), ("status", one.status)):
-            dtype, unit, description = DESCRIPTIONS[column]
-            dataset = own.create_dataset(column, data=values.astype(dtype))
+        change, seed = json.dumps(dict(one.about), allow_nan=False), int(one.about["seed"])
+        about = ": ".join(str(one.about[word]) for word in ("kind", "label", "step") if word in one.about)
+        put_attributes(own, {"description": about, "change": change, "seed": seed, "check": _check(one)})
+        columns = {"sample": np.arange(one.first, one.end), "load": np.array(one.names, dtype=object)}
+        for column, values in (columns | {"loads": one.loads, "status": one.status}).items():
+            dtype, unit, description = DATASETS[column]
+            dataset = own.create_dataset(column, data=values, dtype=dtype)
             put_attributes(dataset, {"units": unit, "description": description})
+            if column in columns:
+                dataset.make_scale(column)
+                continue
+            for k, scale in enumerate(list(columns)[: dataset.ndim]):
+                dataset.dims[k].attach_scale(own[scale])
+        meanings.put(own["status"], meanings.FIXED["status"])
 
 
 def _check(one: Altered) -> str:

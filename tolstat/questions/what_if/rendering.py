@@ -20,6 +20,7 @@ from tolstat.study.widths import COARSER, EXACT, FINER, HALF
 
 if TYPE_CHECKING:
     from tolstat.questions.what_if.query import WhatIf
+    from tolstat.store.view import View
 
 CURVES = 4
 """Number of lines whose curve has a colour; the others are grey."""
@@ -104,6 +105,12 @@ def sentence(found: WhatIf) -> str:
     size = f" ({row['size']})" if row["size"] else ""
     low, high = 100.0 * row["share_lower"], text.percent(row["share_upper"])
     return f"Halve the {phrase(row)}{size} and it is {text.percent(row['share'])} ({low:.3g} to {high})"
+
+
+def advice(view: View, load: str) -> str:
+    """Return the `sentence` of a load for the verdict; empty where the file holds no joints with other widths."""
+    found = query.what_if(view, load) if view.altered else None
+    return "" if found is None else sentence(found)
 
 
 def phrase(row: Row) -> str:

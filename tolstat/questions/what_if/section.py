@@ -44,8 +44,8 @@ def _blocks(found: query.WhatIf, asked: Asked) -> list[Block]:
     steps = [column for column in rendering.columns(found) if column.rank <= SHOWN]
     how = (
         "Each line is an entry of [tolerances]: made half as wide about the middle of its band, exact (in the middle "
-        "of its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. The joints have the same "
-        f"seeds, {found.n} as drawn; whiskers and bands are 95 % intervals of the change, joint by joint. "
+        "of its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. The joints have the "
+        f"same seeds, {found.n} as drawn; whiskers and bands are 95 % intervals of the change, joint by joint. "
         f"{_rest(found)}"
     )
     blocks: list[Block] = [

@@ -13,6 +13,7 @@ import tolstat
 from tests.support import synthetic
 from tolstat import sampling, study
 from tolstat.campaign import what_if as sets
+from tolstat.campaign.extend import extend
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
@@ -213,6 +214,17 @@ def test_a_damaged_set_is_not_used(path):
     with Reader.open(path) as store:
         assert name not in what_if.read(store)
         assert len(what_if.read(store)) > 5
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_longer_campaign_keeps_them(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        before = what_if.read(store)
+    extend(path, N + 50)
+    with Reader.open(path) as store:
+        assert what_if.read(store).keys() == before.keys()
+        assert query.what_if(store.view(), "cross1.F").n == max(N, *(one.end for one in before.values()))
 
 
 @pytest.mark.usefixtures("quick")

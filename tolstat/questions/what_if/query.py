@@ -97,7 +97,7 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
     InputError
         When there is no such load, or the study does not keep it.
     StoreError
-        When the joints are not drawn from tolerances.
+        When the joints are not drawn from tolerances, or differ in weight.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
 
 
 def check(view: View) -> None:
-    """Refuse a file whose joints are not drawn from tolerances, or that holds a part of them.
+    """Refuse a file whose joints are not drawn from tolerances, differ in weight, or are a part of the campaign's.
 
     Raises
     ------
@@ -144,9 +144,10 @@ def check(view: View) -> None:
         The hint names what can be used.
     """
     view.check_drawn()
-    if view.method == "subset" or view.study.listed is not None or view.study.sweep:
+    view.check_sample(allow_weights=False)
+    if view.study.groups:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(view.path), "holds joints that are no sample of a production", remedy)))
+        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
         raise StoreError(str(Fault(str(view.path), "holds a part of the campaign only", remedy)))

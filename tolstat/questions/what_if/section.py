@@ -20,7 +20,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
 
     Where the file holds no joints with other widths, it says which command simulates them.
     """
-    if not (view.sampled and view.limits and view.count(*VALID)):
+    if not (view.sampled and view.limits and view.count(*VALID)) or view.weighted or not view.store.whole:
         return []
     with asked.noting("nothing on the lines of the drawing"):
         found = query.what_if(view, view.most_exceeded)
@@ -45,7 +45,8 @@ def _blocks(found: query.WhatIf, asked: Asked) -> list[Block]:
     how = (
         "Each line is an entry of [tolerances]: made half as wide about the middle of its band, exact (in the middle "
         "of its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. The joints have the "
-        f"same seeds, {found.n} as drawn; whiskers and bands are 95 % intervals of the change, joint by joint. "
+        f"same seeds, {found.n} as drawn ({rendering.joints(found)}); whiskers and bands are 95 % intervals of the "
+        "change, joint by joint. "
         f"{_rest(found)}"
     )
     blocks: list[Block] = [

@@ -98,7 +98,7 @@ def causes(
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print which tolerances to change, and which errors cause the scatter of a load.
+    """Print which tolerances and errors cause the largest loads.
 
     Prints for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
     half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these

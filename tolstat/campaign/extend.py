@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
-from tolstat.store import Counts, Reader, ResultStore
+from tolstat.store import Counts, Reader, ResultStore, what_if
 from tolstat.store.assembly import DifferingResults, assemble, check_free
 from tolstat.store.recall import differing_keys, recall
 from tolstat.store.result_file import BLOCK
@@ -78,8 +78,12 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
         _check_extendable(store, n)
         study = recall(store, n, study_path)
         more = range(store.n, study.rows)
+        altered = what_if.read(store)
         grow(store, study, draw_blocks(study, more), origin_blocks(study, more))
-        return study
+    if altered:  # their joints are still samples of the campaign
+        with ResultStore.open_to_write(path) as store:
+            what_if.write(store, altered)
+    return study
 
 
 def grow(

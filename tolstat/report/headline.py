@@ -15,6 +15,7 @@ from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.joints import query as joints
+from tolstat.questions.what_if import rendering as what_if
 from tolstat.store.view import View
 
 WORDS = {"yes": "kept", "no": "not kept", "open": "open", "none": "no verdict"}
@@ -160,6 +161,8 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
         share = share_of(worst)
         interval = "total interval" if _matter([worst]) else interval
         said = f"{share} of the joints exceed {limit} ({interval}); {most} is accepted"
+        better = what_if.advice(view, worst["load"])
+        said += f". {better}" if better else ""
     elif answer == "yes":
         which = limit if count == 1 else f"each of the {count} limits"
         said = f"at most {most} of the joints exceed {which} (largest share {share_of(worst)}, {interval})"

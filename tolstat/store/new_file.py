@@ -35,8 +35,9 @@ GROUPS = {
     "results": "status, diagnostics and loads of each joint; NaN where there are none",
     "ledger": "what gave the results of each joint, and checksums of its rows",
     "session": "the run under way",
+    "what_if": "largest loads of joints with other tolerances, drawn with the seed of the campaign",
 }
-"""Description of each group that a new file has."""
+"""Description of each group; `what_if` comes later, the others are in a new file if it needs them."""
 SESSION = {
     "started": ("f8", "seconds since 1970-01-01 00:00:00", "start of the run under way; NaN where none is"),
     "done": ("i8", "1", "joints that were done when it started"),

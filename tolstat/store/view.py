@@ -19,12 +19,13 @@ from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS, limits_in_wo
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, FAILED, RESULT, UNSETTLED, VALID, Status
-from tolstat.store import verification
+from tolstat.store import verification, what_if
 from tolstat.store.counts import Counts
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
 from tolstat.store.sample_load import SampleLoad, frozen
 from tolstat.store.verification import Verification
+from tolstat.store.what_if import Altered
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -113,6 +114,11 @@ class View:
     def verification(self) -> Verification | None:
         """The verification that the file holds, if any."""
         return verification.read(self.store)
+
+    @cached_property
+    def altered(self) -> dict[str, Altered]:
+        """Loads of joints with other tolerances that the file holds, by the digest of the change."""
+        return what_if.read(self.store)
 
     @cached_property
     def numerical_error(self) -> dict[str, float]:
@@ -247,6 +253,13 @@ class View:
                 kind = load.name.rpartition(".")[2]
                 found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
         return tuple(name for _, name in found.values())
+
+    @property
+    def most_exceeded(self) -> str:
+        """The leading load whose limit the largest share of the joints exceeds; see `leading`."""
+        shares = {load.name: load.above(load.limit).estimate for load in self.loads(self.leading) if load.limit}
+        known = {name: share for name, share in shares.items() if share == share}
+        return max(known, key=lambda name: known[name]) if known else next(iter((*self.leading, "cross1.F")))
 
     @property
     def iid(self) -> bool:

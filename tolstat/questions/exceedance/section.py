@@ -31,7 +31,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
         return []
     blocks: list[Block] = [Panels([_leading_panel(view, name) for name in view.leading])] if view.leading else []
     blocks.append(Text(_note(view), small=True))
-    blocks.append(Reader(query.readings(view), query.most_exceeded(view)))
+    blocks.append(Reader(query.readings(view), view.most_exceeded))
     blocks.append(_quantiles(view))
     if view.limits and view.sampled and view.numerical_error:
         title = "What makes the shares above limits uncertain, in per cent of the joints"

@@ -114,17 +114,16 @@ def _basis(view: View) -> list[Card]:
 
 def _how(view: View, asked: Asked) -> list[str]:
     """Paragraphs on what the picture shows, and what decides."""
-    if not view.iid:
+    if not view.has_intervals:
         return [
             "Points: share of the joints with a valid load. Grey: with failed and unsettled joints counted below and "
             "above every limit.",
-            "No intervals: Clopper–Pearson holds for independent samples only; replicates with other seeds show the "
-            "scatter.",
+            "No intervals: Clopper–Pearson holds for independent samples only; sampling.replicates gives intervals.",
         ]
     said = "Joints are counted by their weights. " if view.weighted else ""
     paragraphs = [
-        f"{said}Points: share of the joints with a valid load. Blue: its interval by Clopper and Pearson, 95 % for "
-        "each limit by itself.",
+        f"{said}Points: share of the joints with a valid load. Blue: its interval ({view.interval_of}), 95 % "
+        "for each limit by itself.",
         "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above "
         "it at its upper end; it covers the numerical error, too, where it is known.",
     ]

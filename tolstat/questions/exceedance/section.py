@@ -109,9 +109,10 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
 def _quantiles(view: View) -> Table:
     """Quantiles of every load with their intervals, and its tolerance limit."""
     table = rendering.by_load(query.quantiles(view))
-    title = "Quantiles with 95 % intervals of order statistics, and one-sided tolerance limits (Wilks)"
+    kind = "over replicates" if view.replicates > 1 else "of order statistics"
+    title = f"Quantiles with 95 % intervals {kind}, and one-sided tolerance limits (Wilks)"
     columns = rendering.quantile_columns(query.tolerance_limits(view))
-    return as_block(title if view.iid else "Quantiles", columns, table)
+    return as_block(title if view.has_intervals else "Quantiles", columns, table)
 
 
 def _of_sweep(view: View) -> Section:

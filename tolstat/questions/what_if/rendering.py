@@ -154,7 +154,7 @@ def tornado_panel(found: WhatIf, accepted: float) -> Panel:
         f"Share of the joints with {limit}, if one line is changed",
         f"As drawn {text.percent(found.share)}. Half as wide: {halves}",
         partial(_tornado, found=found, table=table, labels=labels, accepted=accepted),
-        (drawing.WIDTH, 0.34 * (len(table) + 1) + drawing.BOTTOM + top),
+        (drawing.WIDTH, 0.34 * (len(table) + 2.2) + drawing.BOTTOM + top),
         left,
         top,
     )
@@ -188,12 +188,12 @@ def _labels(table: pd.DataFrame) -> list[str]:
 
 def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], accepted: float) -> None:
     drawing.rows(ax, labels)
-    ax.set_ylim(len(labels) + 0.5, -0.6)  # one more row, for what the vertical lines are
+    ax.set_ylim(len(labels) + 0.6, -1.2)  # a row above and one below, for what the vertical lines are
     ax.tick_params(axis="y", labelsize=7.6)
     floor = _floor(found, accepted)
     style.share_axis(ax, floor, "x")
     shares = [found.upper, *found.table["share"], *(found.share + found.table["change_upper"])]
-    ax.set_xlim(floor, min(1.0, 1.25 * float(np.nanmax(shares))))
+    ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax(shares))))
     ax.axvspan(max(found.lower, floor), found.upper, color=drawing.GREY, alpha=0.3, lw=0)
     ax.axvline(found.share, color=style.INK, lw=1.2)
     for step, colour, height in ((COARSER, style.COLOURS[1], 0.3), (HALF, style.COLOURS[0], 0.56)):
@@ -207,11 +207,11 @@ def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], ac
         if not np.isnan(row.get(EXACT, np.nan)):
             marks: dict[str, Any] = {"mfc": "white", "mec": style.INK, "ms": 5.5, "zorder": 4, "clip_on": False}
             ax.plot(max(row[EXACT], floor), place, "o", **marks)
-    below: dict[str, Any] = {"y": len(labels) + 0.1, "va": "center", "fontsize": 8.0}
-    ax.text(found.upper * 1.03, s=f"as drawn {text.percent(found.share)}", **below)
+    said: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0}
+    ax.text(found.share, -0.9, f"as drawn {text.percent(found.share)}", backgroundcolor="white", **said)
     if accepted > 0.0:
         ax.axvline(accepted, **_ACCEPTED)
-        ax.text(accepted * 1.03, s=f"accepted {text.percent(accepted)}", **below)
+        ax.text(accepted, len(labels) + 0.1, f"accepted {text.percent(accepted)}", backgroundcolor="white", **said)
     handles: list[Patch | Line2D] = [Patch(color=style.COLOURS[0]), Patch(color=style.COLOURS[1])]
     handles.append(Line2D([], [], ls="", marker="o", mfc="white", mec=style.INK, ms=5.5))
     drawing.legend_above(ax, handles, _STEPS)

@@ -27,6 +27,7 @@ from tolstat.store.axes import attach_scales
 from tolstat.store.histories import create_dataset, create_group
 from tolstat.store.new_file import attributes, fill
 from tolstat.store.recorded import perturbed, settings, variants
+from tolstat.study import swept
 from tolstat.study.tolerances import meaning
 
 if TYPE_CHECKING:
@@ -146,6 +147,8 @@ class Plan:
         Joints that do not go together.
     fit : list of str
         What the fit of the study means, as lines of text; empty without one.
+    sweep : list of str
+        Axes of a sweep whose values are deviations where a value of the joint is easily meant, as lines of text.
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
     wilks : dict of float to int
@@ -169,6 +172,7 @@ class Plan:
     reversals: Reversals
     assembly: Assembly
     fit: list[str]
+    sweep: list[str]
     tolerances: list[dict[str, Any]]
 
     @property
@@ -230,9 +234,18 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(params, simulation.results),
         assembly=_assembly(study, iid),
-        fit=[] if study.fit is None else study.fit.meaning,
+        fit=fit_in_words(study),
+        sweep=swept.meaning(study.sweep, study.joint),
         tolerances=text.records(meaning.table(study.entries)),
     )
+
+
+def fit_in_words(study: Study) -> list[str]:
+    """Lines about the fit of a study, also which values of the joint file it replaces; empty without one."""
+    if study.fit is None:
+        return []
+    values = " and ".join(f"{key} = {value}" for key, value in study.joint.replaced_bearing.items())
+    return [*study.fit.meaning, *([f"fit: replaces {values} of the joint file"] if values else [])]
 
 
 def _assembly(study: Study, iid: bool) -> Assembly:

@@ -64,6 +64,7 @@ def _lines(made: Plan) -> str:
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",
         *made.fit,
+        *made.sweep,
     ]
     lines += [
         f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"

@@ -20,6 +20,7 @@ from tolstat.study.tolerances import distributions, fits, iso286
 
 SAMPLING = '[sampling]\nmethod = "random"\nn = 8\nseed = 1\n'
 H7_F7 = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
+OTHER = 'pin1.offset_e = { plus_minus = "1 mm", distribution = "uniform" }'
 
 
 def load(tolerances: str, contact: str = "", method: str = "random") -> study.Study:
@@ -36,13 +37,13 @@ def faults(tolerances: str, contact: str = "") -> str:
 def test_values_of_the_joint_file_that_a_fit_replaces_are_told(tmp_path: Path) -> None:
     held = {"contact.D_H": "76.2 mm", "contact.D_P": "76.0 mm"}
     assert load(H7_F7).joint.replaced_bearing == held
-    assert load("", 'contact.clearance = "0.1 mm"').joint.replaced_bearing == {"contact.D_P": "76.0 mm"}
+    assert load(OTHER, 'contact.clearance = "0.1 mm"').joint.replaced_bearing == {"contact.D_P": "76.0 mm"}
     own = tmp_path / "own.toml"
     own.write_text(joint_text(), encoding="utf-8")
     text = f"{HEAD}[tolerances]\n{H7_F7}\n{SAMPLING}".replace('"cirelli2021"', '"./own.toml"')
     loaded = study.load(tmp_path / "x.toml", text=text)
     assert plan.fit_in_words(loaded)[-1] == "fit: replaces contact.clearance = 0.03 mm of the joint file"
-    assert plan.fit_in_words(load("pin1.offset_e = { plus_minus = '1 mm', distribution = 'uniform' }")) == []
+    assert plan.fit_in_words(load(OTHER)) == []
 
 
 PUBLISHED = """

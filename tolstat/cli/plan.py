@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_warnings, warn_without_interval
-from tolstat.cli._talk import progress, say
+from tolstat.cli._talk import progress, say, wrapped
 
 if TYPE_CHECKING:
     from tolstat.campaign.plan import Plan
@@ -78,7 +78,7 @@ def _lines(made: Plan) -> str:
     lines += [
         f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}" for q, n in made.wilks.items()
     ]
-    return "\n".join(lines + _meanings(made))
+    return wrapped("\n".join(lines)) + "\n".join(["", *_meanings(made)])
 
 
 def _meanings(made: Plan) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tolstat.cli._app import AsJson, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
-from tolstat.cli._talk import fail, progress, say
+from tolstat.cli._talk import fail, progress, say, wrapped
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def rare(
         typer.echo(as_text(_summary(found) | {"levels": text.records(levels)}))
     else:
         print_table(tables.LEVELS, levels, wide)
-        typer.echo(tables.sentence(found.estimate, sampling.load, sampling.above))
+        typer.echo(wrapped(tables.sentence(found.estimate, sampling.load, sampling.above)))
     _print_messages(found, path)
 
 

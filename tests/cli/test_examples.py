@@ -53,6 +53,13 @@ def too_wide(done: Result) -> list[str]:
     return [line for line in lines if len(line) > 80 and "/tmp" not in line]
 
 
+@pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
+def test_help_has_plain_words_for_arguments(command: str) -> None:
+    shown = call(*command.split(), "--help").stdout
+    arguments = shown.partition("\nArguments:\n")[2].partition("\nOptions:\n")[0]
+    assert not re.search(r"<\w|\[Path|list\[", arguments)
+
+
 @pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
@@ -64,7 +71,7 @@ def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch:
     assert done.exit_code == 0, done.stderr
     assert "Traceback" not in done.stderr
     if command not in bench.INSTRUMENTS:
-        assert too_wide(done) == []
+        assert too_wide(done) == [] or command == "docs"  # whose pages have lines of any length
 
 
 TABLES = {

@@ -62,7 +62,7 @@ def rare(
     """Estimate a rare exceedance by subset simulation.
 
     Estimates P(load > level) down to 1e-9. Each level of the simulation starts from the joints of the previous level
-    with the largest loads. docs/questions/rare.md states what the interval does not cover.
+    with the largest loads. What the interval does not cover: tolstat docs rare
 
     Prints threshold and share of each level, and the probability with its 95 % interval. Writes all joints to a result
     file. To resume after an interruption, run the same command again.

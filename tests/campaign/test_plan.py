@@ -285,6 +285,17 @@ def test_a_plan_chooses_the_fidelity_that_the_campaign_chooses(tmp_path: Path) -
     assert told[0].startswith(made.fidelity)
 
 
+def test_start_and_report_take_longer_on_a_slower_machine(small: study.Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    for slower in (1.0, 3.0):
+        monkeypatch.setattr(plan, "_loop", lambda slower=slower: slower * plan.LOOP_S)
+        found.append(plan.plan(small, workers=1, pilot=2).stages)
+    for stage in ("start", "report"):
+        assert found[1][stage] == pytest.approx(3.0 * found[0][stage])
+    monkeypatch.undo()
+    assert plan._loop() > 0.0
+
+
 def test_plan_command(small: study.Study) -> None:
     done = CliRunner().invoke(cli.app, ["plan", str(small.path), "--n", "2000", "--pilot", "4"])
     assert done.exit_code == 0

@@ -59,7 +59,7 @@ def _lines(made: Plan) -> str:
         *_rattle_warning(made),
         *_misfit_warning(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
-        f"time: {_duration(made.seconds)} on {made.workers} cores, of which",
+        f"time: about {_duration(made.seconds)} on {made.workers} cores, of which",
         *(f"  {stage}: {_duration(seconds)}" for stage, seconds in made.stages.items()),
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",

@@ -83,8 +83,8 @@ def rare(
         plan, path = _recall(source, study_file, [limit, out, *given.values()]), source
     announce_compilation()
     try:
-        with progress("levels of the subset simulation"):
-            found = simulation.run(plan, path, workers, say)
+        with progress("levels of the subset simulation") as shown:
+            found = simulation.run(plan, path, workers, shown.note, shown)
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop

@@ -65,7 +65,9 @@ def test_an_installed_package_finds_the_clone_around_the_current_folder(
     monkeypatch.chdir("/")
     done = CliRunner().invoke(cli.app, ["docs"])
     assert done.exit_code == 0
-    assert {"study", "tolerances", "tutorial", "causes", "time-above"} <= set(done.stdout.splitlines())
+    titles = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    assert {"study", "tolerances", "causes", "time-above"} <= titles.keys()
+    assert titles["tutorial"] == "Your own joint"
     assert "next: tolstat docs study" in done.stderr
 
 
@@ -75,6 +77,13 @@ def test_a_page_is_printed(name: str) -> None:
     assert (done.exit_code, done.stderr) == (0, "")
     assert done.stdout.rstrip("\n") == own.pages()[own.page_name(name)].read_text(encoding="utf-8").rstrip("\n")
     assert done.stdout.startswith("# ")
+
+
+def test_a_page_has_no_settings_of_the_site() -> None:
+    shown = CliRunner().invoke(cli.app, ["docs", "tutorial"]).stdout
+    assert shown.startswith("# Your own joint")
+    assert "tolstat new shaft --joint own" in shown
+    assert not re.search(r"code-cell|:tags:|IPython|subprocess", shown)
 
 
 def test_an_unknown_page_is_refused() -> None:

@@ -263,6 +263,7 @@ WARNED = [
     ({"contact.D_P": "20 mm"}, {"contact.D_H": "20.0 mm"}),
     ({"contact.D_P": "20 mm", "contact.D_H": "20.1 mm"}, {"pin.d": "20.0 mm"}),
     ({"contact.D_P": "74.68 mm"}, {}),
+    ({"contact.D_P": "75.955 mm", "contact.D_H": "76.015 mm"}, {}),
     ({"material.rho": "2700 kg/m^3"}, {"hub.mass": "0.347 kg"}),
     ({"contact.clearance": "0.05 mm", "material.E": "70 GPa"}, {}),
     ({"material.E": "70 GPa", "material.nu": 0.33, "material.G": "79 GPa"}, {"material.G": "26.32 GPa"}),

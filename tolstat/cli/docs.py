@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import webbrowser
 from pathlib import Path
@@ -46,7 +47,7 @@ def docs(
     clone = find_clone([Path(__file__).parents[2], Path.cwd(), *Path.cwd().parents])
     if clone is None:
         say("pages of the installed package; the site with all pages and pictures is built from a clone")
-        typer.echo("\n".join(pages()))
+        typer.echo(_titled())
         say("next: tolstat docs study")
         return
     built = clone / BUILT
@@ -80,7 +81,7 @@ def _print_page(name: str) -> None:
     file = known.get(page_name(name))
     if file is None:
         raise InputError([Fault(name, "is not a page", did_you_mean(name, list(known)))])
-    text = file.read_text(encoding="utf-8")
+    text = _plain(file.read_text(encoding="utf-8"))
     if not sys.stdout.isatty():
         typer.echo(text)
         return
@@ -91,6 +92,23 @@ def _print_page(name: str) -> None:
     console.width = min(console.width, PAGE_WIDTH)
     with console.pager():
         console.print(Markdown(text))
+
+
+def _plain(text: str) -> str:
+    """Text of a page without what only builds the site: settings at its top, code that the site does not show."""
+    text = re.sub(r"\A---\n.*?\n---\n+", "", text, flags=re.DOTALL)
+    hidden = r"```\{code-cell\}\n:tags: \[remove-(?:input|cell)\]\n.*?\n```\n+"
+    text = re.sub(hidden, "", text, flags=re.DOTALL)
+    return re.sub(r"```\{code-cell\}\n(?::tags: .*\n)?", "```\n", text)
+
+
+def _titled() -> str:
+    """Names of the pages, and their titles."""
+    found = {}
+    for name, file in pages().items():
+        found[name] = next(line for line in _plain(file.read_text(encoding="utf-8")).splitlines() if line[:2] == "# ")
+    width = max(map(len, found))
+    return "\n".join(f"{name:{width}}  {title[2:]}" for name, title in found.items())
 
 
 def find_clone(folders: list[Path]) -> Path | None:

@@ -93,7 +93,7 @@ def _meanings(made: Plan) -> list[str]:
     columns = [
         table.Column("tolerance", lambda row: str(row["entry"])),
         table.Column("its number", lambda row: str(row["number"])),
-        table.Column("error", lambda row: str(row["errors"])),
+        table.Column("error", lambda row: str(row["errors"]), rank=1),
         table.Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
         table.Column("outside", lambda row: text.percent(math.nan if row["outside"] is None else row["outside"])),
     ]

@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field, ValidationInfo, field_validator
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import data_dir
+from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
 from tolstat.joint.contact import COEFFICIENTS, GIVEN, LAWS, Contact
@@ -255,11 +256,18 @@ def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], p
     changed = derived.changed(given, held)
     stay = held.keys() - changed - derived.replaced(given, held)
     for key, (expected, reason, instead) in derived.expected(joint, given, changed, stay).items():
+        if key == "pin.d" and _as_before(held.get("contact.D_P"), joint.contact.D_P):
+            continue  # the joint file has pins of two diameters itself
         text, unit = held[key], derived.UNITS[key]
         words = [_written(one, unit, like) for one, like in zip(*map(_listed, (expected, text)), strict=True)]
         new = _quoted(words if isinstance(text, list) else words[0])
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
         yield Fault(key, f"{_quoted(text)} is inherited from {path.stem}; {reason} {new}", remedy)
+
+
+def _as_before(held: object, diameter: float) -> bool:
+    """Whether a diameter is, but for a few per cent, that of the joint file."""
+    return held is not None and math.isclose(units.to_si(held, "m", DIAMETER), diameter, rel_tol=derived.WIDE)
 
 
 def _listed(value: Any) -> list[Any]:

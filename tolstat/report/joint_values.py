@@ -16,7 +16,7 @@ from tolstat.joint.sections import quantities
 from tolstat.store import Reader
 
 UNIT = UNITS | quantities(Joint)
-DIGITS = 4
+DIGITS = 5
 
 
 def listing(store: Reader) -> Listing:

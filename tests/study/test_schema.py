@@ -138,7 +138,7 @@ def test_every_vector_of_a_zone_can_be_shifted() -> None:
     }
     drawn = set()
     for entries in tables.values():
-        text = f'{GOOD.partition("[errors]")[0]}[tolerances]\n{entries}\n[sampling]\nn = 8\n'
+        text = f"{GOOD.partition('[errors]')[0]}[tolerances]\n{entries}\n[sampling]\nn = 8\n"
         drawn |= study.load("x.toml", text=text).tolerances.keys()
     assert {"pin1.position", "pin1.position_outer", "input_pins.coaxiality_pin3", "hole1.angularity_t"} <= drawn
     for key in ("shift", "widen"):

@@ -19,7 +19,9 @@ each with a function of the same name; on the command line ``-`` stands for ``_`
 
 for heading, names in COMMANDS.items():
     for name in names:
-        app.command(name.replace("_", "-"), cls=OneCommand)(command(getattr(import_module(f"tolstat.cli.{name}"), name)))
+        app.command(name.replace("_", "-"), cls=OneCommand)(
+            command(getattr(import_module(f"tolstat.cli.{name}"), name))
+        )
     GROUPS[heading] = tuple(name.replace("_", "-") for name in names)
 for words, instrument in bench.INSTRUMENTS.items():
     app.command(words, cls=OneCommand, epilog=bench.SEE_ALSO)(command(instrument))

@@ -204,9 +204,7 @@ def _simulate(
         with Reader.open(plan.path) as store:
             n = store.n - store.first_sample
     stage(f"{name} fidelity")
-    campaign.run(
-        _sized(plan.study, n), plan.path, execution=Execution(workers=workers), check=False, progress=progress
-    )
+    campaign.run(_sized(plan.study, n), plan.path, execution=Execution(workers=workers), check=False, progress=progress)
     return n
 
 

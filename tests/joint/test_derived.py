@@ -89,7 +89,7 @@ def test_values_by_hand(own: Joint) -> None:
     assert_allclose(own.arm.inertia, arm / 12 * (np.sum(sides**2) - sides**2))
     assert own.cross.r_b == pytest.approx(0.022)
     E, G = 210e9, 210e9 / 2.6
-    assert own.material.G == pytest.approx(G)
+    assert pytest.approx(G) == own.material.G
     assert_allclose(own.k_cross[:3], [E * A / 0.018, *2 * [G * A / (1.11 * 0.018)]])
     assert_allclose(own.k_cross[3:], [G * 2 * J / 0.018, *2 * [E * J / 0.018]])
     assert_allclose(own.k_fork[:3], [*2 * [G * 5.6e-4 / (1.2 * 0.025)], E * 5.6e-4 / 0.025])

@@ -136,8 +136,8 @@ class Plan:
         Number of processes of the campaign.
     stages : dict of str to float
         Time of each stage of the whole command ``tolstat run`` if every process has a core of its own, s: ``start`` (of
-        this process and the workers, kernels compiled), ``joints``, ``check`` of the numerical error, ``report``. Joints
-        and check are timed in the pilot; start and report are scaled by the speed of this machine, and rough.
+        this process and the workers, kernels compiled), ``joints``, ``check`` of the numerical error, ``report``.
+        Joints and check are timed in the pilot; start and report are scaled by the speed of this machine, and rough.
     process_bytes : int
         Peak memory of this process so far; the campaign needs as much for each worker and for its parent process.
     file_bytes : int

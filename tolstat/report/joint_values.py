@@ -1,4 +1,4 @@
-"""Values of the nominal joint for the provenance of the page: those that differ from the joint that comes with tolstat."""
+"""Values of the joint for the provenance of the page: those that differ from the joint that comes with tolstat."""
 
 from __future__ import annotations
 

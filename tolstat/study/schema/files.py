@@ -13,13 +13,13 @@ from tolstat.common.tables import CHANNELS
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import DEFAULT_JOINT
+from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.fatigue import LineEntry, Settings
 from tolstat.study.listed import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
-from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.selection import TOLERANCED, UNITS
 from tolstat.study.swept import KEYS
 from tolstat.study.tolerances import fits

@@ -103,7 +103,7 @@ def test_tables_fit_80_columns_and_wide_ones_have_all(
         lines = lines[lines.index("") :]
     assert len(lines) > 1
     assert [line for line in lines if len(line) > 80] == []
-    named = re.findall(r"^with --wide also: (.*)$", done.stderr.replace("\n  ", " "), flags=re.MULTILINE)
+    named = re.findall(r"^with --wide also: (.*)$", done.stderr.replace("\n    ", " "), flags=re.MULTILINE)
     heads = [head for line in named for head in line.split(", ")]
     assert all(head in wide.stdout for head in heads)
     assert "--wide" not in wide.stderr

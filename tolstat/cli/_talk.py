@@ -41,14 +41,14 @@ class _Stderr(logging.Handler):
 
 
 def wrapped(text: str) -> str:
-    """Break lines of prose above `WIDTH` characters; paths and commands to type are never broken."""
+    """Break lines of prose above `WIDTH` characters; those with a long path or a command to type stay whole."""
     return "\n".join(_broken(line) if len(line) > WIDTH else line for line in text.split("\n"))
 
 
 def _broken(line: str) -> str:
-    if ": tolstat " in line:
+    if ": tolstat " in line or max(map(len, line.split())) > WIDTH // 2:
         return line
-    indent = " " * (len(line) - len(line.lstrip()) + 2)
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
     return textwrap.fill(line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 

@@ -30,7 +30,7 @@ def docs(
         typer.Argument(metavar="PAGE", help="Page to read in the terminal, such as study; without it: the browser."),
     ] = None,
 ) -> None:
-    """Read a page of the documents, or open all of them in the browser.
+    """Print a page of the documents, or open their site.
 
     With PAGE, prints this page: study (all keys of study and joint files), tolerances, tutorial, model, report, or the
     name of a command, such as causes.

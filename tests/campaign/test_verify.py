@@ -332,6 +332,7 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
             assert word in done.stderr
     with pytest.raises(InputError, match="less than one"):
         verify.check_study(study.load(written(tmp_path)), joints=-1)
+    other = synthetic.store(tmp_path, name="other")
     monkeypatch.setattr(provenance, "source_hash", lambda: "0")
     with pytest.raises(StoreError, match="was made by another version of the code"):
-        verify.check_file(synthetic.store(tmp_path, name="other"))
+        verify.check_file(other)

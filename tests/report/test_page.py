@@ -286,7 +286,10 @@ def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
     assert f"{60 - max(0, simulated - 1)} still pending" in said
     if not simulated:
         assert page.write_page(path, tmp_path / "page.html", replay=0) == tmp_path / "page.html"
-        assert said in (tmp_path / "page.html").read_text(encoding="utf-8")
+        text = (tmp_path / "page.html").read_text(encoding="utf-8")
+        assert said in text
+        with Reader.open(path) as store:
+            assert page.write_page(store.view(), tmp_path / "b.html", replay=0).read_text(encoding="utf-8") == text
 
 
 def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):

@@ -3,7 +3,7 @@
 from importlib import import_module
 
 from tolstat.cli import bench
-from tolstat.cli._app import GROUPS, app, command, main
+from tolstat.cli._app import GROUPS, OneCommand, app, command, main
 
 __all__ = ["COMMANDS", "app", "main"]
 
@@ -19,8 +19,10 @@ each with a function of the same name; on the command line ``-`` stands for ``_`
 
 for heading, names in COMMANDS.items():
     for name in names:
-        app.command(name.replace("_", "-"))(command(getattr(import_module(f"tolstat.cli.{name}"), name)))
+        app.command(name.replace("_", "-"), cls=OneCommand)(
+            command(getattr(import_module(f"tolstat.cli.{name}"), name))
+        )
     GROUPS[heading] = tuple(name.replace("_", "-") for name in names)
 for words, instrument in bench.INSTRUMENTS.items():
-    app.command(words, epilog=bench.SEE_ALSO)(command(instrument))
+    app.command(words, cls=OneCommand, epilog=bench.SEE_ALSO)(command(instrument))
 GROUPS["Measure tolstat itself"] = tuple(bench.INSTRUMENTS)

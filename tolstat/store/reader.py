@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -337,3 +339,15 @@ class Reader(CheckedTables):
 def parts_folder(path: Path) -> Path:
     """Folder of the histories of a campaign that is not complete yet."""
     return path.with_name(path.name + ".parts")
+
+
+@contextmanager
+def viewed(source: str | Path | Reader | View) -> Iterator[View]:
+    """View of a result file: of its path, which is opened and closed, or of the open file; a view stays as it is."""
+    if isinstance(source, View):
+        yield source
+    elif isinstance(source, Reader):
+        yield source.view()
+    else:
+        with Reader.open(source) as store:
+            yield store.view()

@@ -262,11 +262,11 @@ def _simulate(
 ) -> Timed:
     """Simulate a block and measure the time that it takes."""
     begin = time.perf_counter()
-    simulation = _simulate_finite(simulate, histories, n_harmonics, specs, block)
+    simulation = simulate_finite(simulate, histories, n_harmonics, specs, block)
     return Timed(simulation, time.perf_counter() - begin)
 
 
-def _simulate_finite(
+def simulate_finite(
     simulate: Callable[..., Simulation],
     histories: str,
     n_harmonics: int,

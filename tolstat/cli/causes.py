@@ -23,6 +23,14 @@ from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 
 
+class Each(StrEnum):
+    """What a line is."""
+
+    ENTRY = "entry"
+    FEATURE = "feature"
+    ERROR = "error"
+
+
 class Groups(StrEnum):
     """Errors that a pick-freeze design exchanges together."""
 
@@ -59,6 +67,26 @@ def causes(
             "indices, and a figure beside it.",
         ),
     ] = None,
+    run: Annotated[
+        bool,
+        typer.Option("--run", help="Simulate joints with each line narrower and wider, and keep their loads in FILE."),
+    ] = False,
+    budget: Annotated[
+        str,
+        typer.Option("--budget", metavar="TIME", help="With --run: time limit, with unit s, min or h."),
+    ] = "5 min",
+    each: Annotated[
+        Each,
+        typer.Option(
+            "--each", help="With --run: a line is an entry of [tolerances], a pin with its hole, or an error."
+        ),
+    ] = Each.ENTRY,
+    group: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--group", metavar="NAME=PATTERN,...", help="With --run: also change these errors together; repeatable."
+        ),
+    ] = None,
     workers: Workers = None,
     against_angle: Annotated[
         bool, typer.Option("--against-angle", help="Print the indices over the input angle instead.")
@@ -70,7 +98,12 @@ def causes(
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print which errors cause the scatter of a load.
+    """Print which tolerances and errors cause the largest loads.
+
+    Prints for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
+    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these
+    joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled or the
+    time is up. To go on, run the same command again.
 
     Prints for each error: the share of the load's variance that it explains alone and in interactions (first-order and
     total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
@@ -90,9 +123,16 @@ def causes(
             raise InputError([Fault("--against-angle", "cannot be combined with --pick-freeze", "remove one of them")])
         _against_angle(file, by, top, logarithm, out, joints, study_file, wide)
         return
+    if run:
+        if points is not None or out is not None:
+            raise InputError([Fault("--run", "cannot be combined with --pick-freeze or --out", "remove one of them")])
+        _run_lines(file, by, each, group or [], budget, workers)
+    elif group or each != Each.ENTRY:
+        raise InputError([Fault("--each, --group", "say what --run simulates", "add --run")])
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
-    from tolstat.questions.exceedance.query import most_exceeded
+    from tolstat.questions.what_if import rendering as whatifs
+    from tolstat.questions.what_if.query import what_if
     from tolstat.store import Reader
 
     if points is not None:
@@ -102,12 +142,36 @@ def causes(
         raise InputError([Fault("--out", "is used with --pick-freeze or --against-angle only", remedy)])
     with progress("causes"), Reader.open(file) as store:
         view = store.view(study_file)
-        found = causes_of(view, by or most_exceeded(view), log=logarithm)
+        load = by or view.most_exceeded
+        lines = what_if(view, load) if points is None and not view.study.groups else None
+        found = causes_of(view, load, log=logarithm)
     if as_json:
-        typer.echo(as_text(rendering.values(found)))
+        typer.echo(as_text(rendering.values(found) | ({"what_if": whatifs.values(lines)} if lines else {})))
         return
+    if lines is not None:
+        typer.echo(whatifs.heading(lines))
+        print_table(whatifs.columns(lines), whatifs.rows(lines), wide)
+        say(whatifs.note(lines))
+        typer.echo()
+    elif not found.from_design:
+        say(f"which line of the drawing to change: tolstat causes {file} --run")
     print_table(rendering.columns(found), rendering.largest(found, top), wide)
     say(rendering.note(found, logarithm))
+
+
+def _run_lines(path: Path, by: str | None, each: Each, groups: list[str], budget: str, workers: int | None) -> None:
+    """Simulate joints with other widths of each line into the result file."""
+    from tolstat.cli.run import parse_time
+    from tolstat.questions.what_if.run import simulate
+
+    seconds = parse_time(budget, "--budget")
+    announce_compilation()
+    with progress() as shown:
+        done = simulate(path, by, each.value, groups, seconds, workers, say, shown)
+    order = "settled" if done.settled else "not settled: a longer --budget goes on"
+    say(
+        f"simulated {done.simulated} joints in {done.seconds:.0f} s, {done.each} of each change; order of lines {order}"
+    )
 
 
 def _run_design(path: Path, points: int, groups: Groups, out: Path | None, workers: int | None) -> Path:
@@ -137,7 +201,6 @@ def _against_angle(
     from tolstat.common.files import check_target
     from tolstat.questions.causes import angles_figure
     from tolstat.questions.causes.angles import against_angle
-    from tolstat.questions.exceedance.query import most_exceeded
     from tolstat.store import Reader, revolutions
 
     if out is not None:
@@ -145,7 +208,7 @@ def _against_angle(
             check_target(path, file)
     with progress("causes over the input angle"), Reader.open(file) as store:
         view = store.view(study_file)
-        load = by or most_exceeded(view)
+        load = by or view.most_exceeded
         if not revolutions.held(store):
             announce_compilation()
         found = against_angle(view, [load], joints, (load,) if logarithm else ())[0]

@@ -27,12 +27,11 @@ def worst(
     """
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.tail import worst_joints
-    from tolstat.questions.exceedance.query import most_exceeded
     from tolstat.store import Reader
 
     with progress("worst joints"), Reader.open(file) as store:
         view = store.view(study_file)
-        found = worst_joints(view, by or most_exceeded(view), top)
+        found = worst_joints(view, by or view.most_exceeded, top)
     if as_json:
         typer.echo(as_text(rendering.worst_values(found)))
         return

@@ -28,6 +28,7 @@ EXAMPLES = {
     "m^4": "1.02e-7 m^4",
     "rad": "0.5 deg",
     "rad/s": "500 rpm",
+    "s": "5000 h",
     "N": "700 N",
     "N*m": "100 N*m",
     "N*m/rad": "5.9e5 N*m/rad",
@@ -334,6 +335,7 @@ Angle = Annotated[float, Quantity("rad")]
 Speed = Annotated[float, Quantity("rad/s")]
 Torque = Annotated[float, Quantity("N*m")]
 Stress = Annotated[float, Quantity("Pa")]
+Time = Annotated[float, Quantity("s")]
 Mass = Annotated[float, Quantity("kg")]
 Inertia = Annotated[float, Quantity("kg*m^2")]
 Density = Annotated[float, Quantity("kg/m^3")]

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from tolstat.display.asked import Asked
     from tolstat.display.blocks import Section
     from tolstat.questions.allocate.query import allocated as allocated
+    from tolstat.questions.bearing_life.lives import lives_of as lives_of
     from tolstat.questions.causes.angles import against_angle as against_angle
+    from tolstat.questions.causes.pairs import pairs_of as pairs_of
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
     from tolstat.questions.compare.query import compared as compared
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
     from tolstat.questions.time_above.query import time_above as time_above
+    from tolstat.questions.what_if.query import what_if as what_if
     from tolstat.store.view import View
 
 
@@ -57,9 +60,13 @@ class Question(NamedTuple):
 
 
 QUESTIONS = (
+    Question("what_if", ("query.what_if",), has_section=True),
     Question("exceedance", has_section=True, has_summary=True),
+    Question("histograms", has_section=True),
     Question("capability", has_section=True, has_summary=True),
-    Question("causes", ("query.causes_of", "angles.against_angle", "tail.worst_joints"), has_section=True),
+    Question(
+        "causes", ("query.causes_of", "angles.against_angle", "pairs.pairs_of", "tail.worst_joints"), has_section=True
+    ),
     Question("show", ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"), has_section=True),
     Question(
         "fatigue",
@@ -69,6 +76,7 @@ QUESTIONS = (
         ),
         has_section=True,
     ),
+    Question("bearing_life", ("lives.lives_of",), has_section=True, has_summary=True),
     Question("accuracy", has_section=True, has_summary=True),
     Question("joints", has_section=True),
     Question("time_above", ("query.time_above",)),

@@ -15,6 +15,7 @@ from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.joints import query as joints
+from tolstat.questions.what_if import rendering as what_if
 from tolstat.store.view import View
 
 WORDS = {"yes": "kept", "no": "not kept", "open": "open", "none": "no verdict"}
@@ -33,12 +34,15 @@ class Headline(NamedTuple):
         The answer or, without one, a share or its interval; the rest of the sentence.
     notes : tuple of str
         Causes, remedies, and what else restricts the verdict.
+    load : str
+        The load whose limit it is about: of several, that most joints exceed. Empty if there is no verdict.
     """
 
     answer: str
     value: str
     words: str
     notes: tuple[str, ...] = ()
+    load: str = ""
 
     @property
     def sentence(self) -> str:
@@ -72,7 +76,7 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limits(view).to_dict("records")
     found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
-    worst = max(records, key=lambda row: np.nan_to_num(row["estimate"], nan=-1.0))
+    worst = _worst(view, records)
     unresolved = _causes(view) if _matter(records if found.answer == "none" else [worst]) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
 
@@ -150,20 +154,27 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
     concerned = [row for row, own in zip(records, answers, strict=True) if own == answer]
     if answer == "none":
         return Headline(answer, WORDS[answer], _reason(view, concerned), notes)
-    worst = max(concerned, key=lambda row: row["estimate"])
+    worst = _worst(view, concerned)
     limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
     interval = f"total interval {text.span(*ends(worst))}"
     if answer == "no":
         share = share_of(worst)
         interval = "total interval" if _matter([worst]) else interval
         said = f"{share} of the joints exceed {limit} ({interval}); {most} is accepted"
+        better = what_if.advice(view, worst["load"])
+        said += f". {better}" if better else ""
     elif answer == "yes":
         which = limit if count == 1 else f"each of the {count} limits"
         said = f"at most {most} of the joints exceed {which} (largest share {share_of(worst)}, {interval})"
     else:
         which = limit if len(concerned) == 1 else f"{len(concerned)} limits, most of all {limit}"
         said = f"the joints that exceed {which} may be more or fewer than {most} ({interval})"
-    return Headline(answer, WORDS[answer], said, notes)
+    return Headline(answer, WORDS[answer], said, notes, worst["load"])
+
+
+def _worst(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
+    """Limit that the largest share of the joints exceeds; of equal shares that of a leading load."""
+    return max(records, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
 
 
 def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
@@ -173,16 +184,15 @@ def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
         known = [row for row in records if not np.isnan(row["estimate"])]
         if not known or _undecided(known):
             return Headline("none", WORDS["none"], _reason(view, records), notes)
-        worst = max(known, key=lambda row: row["estimate"])
+        worst = _worst(view, known)
         limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
         interval = "total interval" if _matter([worst]) else f"total interval {text.span(*ends(worst))}"
-        return Headline(
-            "", share_of(worst), f"of the joints exceed {limit}, the limit exceeded most ({interval})", notes
-        )
+        said = f"of the joints exceed {limit}, the limit exceeded most ({interval})"
+        return Headline("", share_of(worst), said, notes, worst["load"])
     found = capabilities.together(capability.limits(view))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, records), notes)
-    return Headline("", found.value, found.words, notes)
+    return Headline("", found.value, found.words, notes, _worst(view, records)["load"])
 
 
 def _undecided(records: list[dict[Any, Any]]) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
 from tolstat.common.loads import ANY_LIMIT, LOADS
-from tolstat.store.sample_load import largest_of
+from tolstat.store.several_loads import largest_of, together
 
 if TYPE_CHECKING:
     from tolstat.store.sample_load import SampleLoad
@@ -72,7 +72,7 @@ def _together(
 
 def unknown(view: View) -> str:
     """Words on the numerical error near the limits of the study if it is not known; empty if it is."""
-    if not view.limits or near(view, view.together) is not None:
+    if not view.limits or near(view, together(view)) is not None:
         return ""
     return f'numerical error at the limits: not known; tolstat verify {view.path} --near "{ANY_LIMIT}"'
 

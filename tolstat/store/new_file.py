@@ -35,8 +35,9 @@ GROUPS = {
     "results": "status, diagnostics and loads of each joint; NaN where there are none",
     "ledger": "what gave the results of each joint, and checksums of its rows",
     "session": "the run under way",
+    "what_if": "largest loads of joints with other tolerances, drawn with the seed of the campaign",
 }
-"""Description of each group that a new file has."""
+"""Description of each group; `what_if` comes later, the others are in a new file if it needs them."""
 SESSION = {
     "started": ("f8", "seconds since 1970-01-01 00:00:00", "start of the run under way; NaN where none is"),
     "done": ("i8", "1", "joints that were done when it started"),
@@ -46,7 +47,9 @@ SESSION = {
 
 def study_attributes(study: Study) -> dict[str, str]:
     """Return the attributes of a study that do not affect results and may change between runs of a campaign."""
-    return {"study": study.text, "study_name": study.name, "limits": json.dumps(study.limits, allow_nan=False)}
+    structured = {"limits": study.limits, "joint": study.joint.given("json")}
+    plain = {"study": study.text, "study_name": study.name}
+    return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
 
 
 def attributes(
@@ -72,7 +75,6 @@ def attributes(
     sampling = study.sampling.model_dump(mode="json")
     structured = {
         "identity": study.identity(),
-        "joint": study.joint.given("json"),
         "options": to_names(options or study.solver.options()),
         "fidelity": dict(fidelity or {}),
         "design": {"cases": study.case_names, "variants": [variant._asdict() for variant in study.variants]},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -193,11 +192,3 @@ class SampleLoad:
             weights=None if self.weights is None else self.weights[samples],
             parts=tuple(part.only(samples) for part in self.parts),
         )
-
-
-def largest_of(name: str, loads: Sequence[SampleLoad]) -> SampleLoad:
-    """Largest of several loads of the same joints; their limits are equal. Computed load by load to save memory."""
-    first = loads[0]
-    ends = (np.maximum.reduce([load.ends[k] for load in loads]) for k in (0, 1))
-    values, nominal = np.maximum.reduce([load.values for load in loads]), max(load.nominal for load in loads)
-    return replace(first, name=name, nominal=nominal, values=values, ends=tuple(ends), parts=tuple(loads))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,16 +15,17 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS, BUSHING_LOADS, LOAD_FIELDS, LOADS, Limit, limits_in_words
+from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS, limits_in_words
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, FAILED, RESULT, UNSETTLED, VALID, Status
-from tolstat.store import verification
+from tolstat.store import verification, what_if
 from tolstat.store.counts import Counts
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
-from tolstat.store.sample_load import SampleLoad, frozen, largest_of
+from tolstat.store.sample_load import SampleLoad, frozen
 from tolstat.store.verification import Verification
+from tolstat.store.what_if import Altered
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -119,6 +119,11 @@ class View:
     def near(self) -> Verification | None:
         """The verification of joints near limits that the file holds, if any."""
         return verification.read(self.store, verification.NEAR)
+
+    @cached_property
+    def altered(self) -> dict[str, Altered]:
+        """Loads of joints with other tolerances that the file holds, by the digest of the change."""
+        return what_if.read(self.store)
 
     @cached_property
     def numerical_error(self) -> dict[str, float]:
@@ -221,21 +226,6 @@ class View:
         """Several loads; see `load`."""
         return [self.load(name) for name in names]
 
-    def largest(self, limit: Limit) -> SampleLoad:
-        """Load of a limit; of a limit on several loads the largest, or the largest ratio of load to level.
-
-        Its limit is the level. Raises as `load`.
-        """
-        loads = [replace(self.load(n), limit=level) for n, level in zip(limit.loads, limit.levels, strict=True)]
-        if not limit.has_one_level:
-            loads = [load.of_limit() for load in loads]
-        return loads[0] if len(loads) == 1 and limit.name == loads[0].name else largest_of(limit.name, loads)
-
-    @property
-    def together(self) -> SampleLoad:
-        """Largest ratio of load to limit of each joint, over all limits of the study; above 1, a limit is exceeded."""
-        return self.largest(Limit(ALL_LIMITS, tuple(self.limits), tuple(self.limits.values())))
-
     @property
     def kept_loads(self) -> tuple[str, ...]:
         """Loads that the study keeps."""
@@ -268,6 +258,13 @@ class View:
                 kind = load.name.rpartition(".")[2]
                 found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
         return tuple(name for _, name in found.values())
+
+    @property
+    def most_exceeded(self) -> str:
+        """The leading load whose limit the largest share of the joints exceeds; see `leading`."""
+        shares = {load.name: load.above(load.limit).estimate for load in self.loads(self.leading) if load.limit}
+        known = {name: share for name, share in shares.items() if share == share}
+        return max(known, key=lambda name: known[name]) if known else next(iter((*self.leading, "cross1.F")))
 
     @property
     def iid(self) -> bool:

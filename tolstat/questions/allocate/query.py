@@ -17,6 +17,7 @@ from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.questions.allocate.ratios import DensityRatios, Entries
+from tolstat.store.several_loads import load_of
 from tolstat.store.view import View
 from tolstat.study import Study, axes, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
@@ -239,7 +240,7 @@ def _read_request(view: View, limits: Sequence[str], cost_file: Path | None, kee
 
 def _above(view: View, statement: Statement) -> NDArray[np.bool_]:
     """Which joints are above the level in any load of a statement, or have no valid load, (n,)."""
-    load = view.largest(statement.limit)
+    load = load_of(view, statement.limit)
     return np.asarray(~load.is_valid | (load.values > statement.limit.level))
 
 

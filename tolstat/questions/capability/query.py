@@ -11,6 +11,7 @@ import pandas as pd
 from tolstat.analysis import capability, exceedance, extreme
 from tolstat.display import text
 from tolstat.store import error_budget
+from tolstat.store.several_loads import together
 from tolstat.store.view import View
 
 NOT_NORMAL = 0.01
@@ -38,7 +39,7 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         matter (`analysis.exceedance.unresolved_matter`).
     """
     rows = []
-    for load in [*view.loads(list(view.limits)), view.together]:
+    for load in [*view.loads(list(view.limits)), together(view)]:
         assert load.limit is not None
         pair = error_budget.shifted(view, load)
         c = capability.of_sample(load.sample, load.limit, confidence, view.iid)

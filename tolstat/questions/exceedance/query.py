@@ -95,13 +95,6 @@ def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def most_exceeded(view: View) -> str:
-    """Name of the load whose limit the largest share of the joints exceeds; without limits see `View.leading`."""
-    shares = {load.name: load.above(load.limit).estimate for load in view.loads(list(view.limits)) if load.limit}
-    known = {name: share for name, share in shares.items() if share == share}
-    return max(known, key=lambda name: known[name]) if known else next(iter((*view.leading, "cross1.F")))
-
-
 def tolerance_limits(view: View) -> dict[str, float]:
     """One-sided tolerance limit of each load shown: covers the share `COVERED` of the joints with 95 % confidence.
 

@@ -1,4 +1,4 @@
-"""Stop rules: coverage, cost and bias from the exact distribution over look and count, beside campaigns that are drawn."""
+"""Stop rules: coverage, cost and bias from the exact distribution over look and count; drawn campaigns agree."""
 
 import itertools
 
@@ -57,7 +57,7 @@ def test_the_distribution_at_the_stop_is_that_of_counted_paths():
 
 
 def test_the_interval_at_the_stop_covers_every_share(scheme):
-    """Between two ends of intervals one miss grows with the share, the other falls: both ends of each piece bound it."""
+    """Between two ends of intervals one miss grows with the share, the other falls: both ends bound it."""
     shares = scheme.critical_shares(most=800)
     found = [scheme.performance(float(p)) for p in shares]
     assert min(one.coverage for one in found) >= 0.95

@@ -152,7 +152,7 @@ def test_a_campaign_without_a_valid_joint(tmp_path):
     tolstat.run(tolstat.load(source, n=3), out, workers=1)
     done = call("fatigue", out)
     assert done.exit_code == 0, done.output
-    assert len(done.stdout.splitlines()) == 1 + 64 + 3 + 8
+    assert len(done.stdout.splitlines()) == 1 + 64 + 3 + 9
     page = rendering.figure(load_cycles([out]))
     assert all("no joint" in ax.texts[0].get_text() for ax in page.axes)
 

@@ -9,6 +9,9 @@ from __future__ import annotations
 
 import math
 
+DELIVERY = 1000
+"""Joints of the next delivery, unless another number is given."""
+
 
 def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.95) -> tuple[float, float]:
     """Prediction interval from counts.

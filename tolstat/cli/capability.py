@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import AsJson, Delivery, ResultFile, Wide, as_text, print_table
 from tolstat.cli._talk import progress, say, warn, wrapped
 from tolstat.common.errors import Fault, InputError, StoreError
 
@@ -17,13 +18,15 @@ def capability(
         list[float] | None,
         typer.Option("--one-in", metavar="N", min=1, help="Print the load that one in N joints exceeds; repeatable."),
     ] = None,
+    delivery: Delivery = DELIVERY,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
     """Print yield and Cpk against each limit of the study.
 
     Prints for each limit, and for all limits together, the share of joints below it (yield) and the process capability
-    index Cpk, each with its 95 % interval.
+    index Cpk, each with its 95 % interval; with --wide or --json also a prediction interval for the number of joints
+    above the limit in the next delivery.
 
     With --one-in N, prints also the load that one in N joints exceeds, and the median of the largest load of N joints,
     from a generalised Pareto distribution fitted to the tail. N may exceed the number of simulated joints: the
@@ -41,7 +44,7 @@ def capability(
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
             raise StoreError(str(Fault(str(file), "has no limits, or its joints are no random sample", remedy)))
         view.check_sample(allow_weights=False)
-        table = query.limits(view)
+        table = query.limits(view, delivery=delivery)
         try:
             rare = query.returns(view, list(view.limits), one_in) if one_in else None
         except ValueError as error:

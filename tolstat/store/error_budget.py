@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,7 +75,12 @@ def unknown(view: View) -> str:
     """Words on the numerical error near the limits of the study if it is not known; empty if it is."""
     if not view.limits or near(view, together(view)) is not None:
         return ""
-    return f'numerical error at the limits: not known; tolstat verify {view.path} --near "{ANY_LIMIT}"'
+    return command(view.path)
+
+
+def command(path: Path, limit: str = ANY_LIMIT) -> str:
+    """Words on a numerical error that is not known near a limit, with the command that tells it."""
+    return f'numerical error at the limit: not known, not in the intervals; tolstat verify {path} --near "{limit}"'
 
 
 def relative(view: View, name: str) -> float:
@@ -112,13 +118,13 @@ def delivery(
     level: float,
     number: int,
     confidence: float,
-) -> tuple[float, float]:
-    """Prediction interval for the number above a level among further joints; parameters as in `total_interval`.
+) -> dict[str, float]:
+    """Prediction interval for the number above a level among `number` further joints; parameters as `total_interval`.
 
     Returns
     -------
-    lower, upper : float
-        Whole numbers, ends included; NaN for dependent samples.
+    dict
+        ``next_lower``, ``next_upper``: whole numbers, ends included; NaN for dependent samples.
     """
     found = [part.delivery(level, number, confidence) for part in (load, *(ends or ()))]
-    return min(low for low, _ in found), max(high for _, high in found)
+    return {"next_lower": min(low for low, _ in found), "next_upper": max(high for _, high in found)}

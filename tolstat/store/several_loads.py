@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def load_of(view: View, limit: Limit) -> SampleLoad:
-    """Load of a limit; of a limit on several loads the largest or, if levels differ, the largest ratio of load to level.
+    """Load of a limit; of a limit on several the largest or, if levels differ, the largest ratio of load to level.
 
     Its limit is the level. Raises as `View.load`.
     """

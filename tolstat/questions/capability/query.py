@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from tolstat.analysis import capability, exceedance, extreme
+from tolstat.analysis.prediction import DELIVERY
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.several_loads import together
@@ -18,7 +19,7 @@ NOT_NORMAL = 0.01
 """p-value of the test of normality below which no index of a normal load is given."""
 
 
-def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
+def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
     """Capability against each limit, and against all limits together.
 
     Parameters
@@ -27,6 +28,8 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         A campaign of a study with limits.
     confidence : float
         Confidence level of the intervals.
+    delivery : int
+        Number of joints of the next delivery.
 
     Returns
     -------
@@ -34,9 +37,10 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above);
         ``good`` and ``ppm`` with ``_lower`` and ``_upper``, total intervals: they cover sampling, unresolved joints
         and, if known, the numerical error; ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``,
-        ``needed``. The last row, `ALL_LIMITS`, is for the largest ratio of load to limit of each joint. ``cpk_normal``
-        is NaN where the load is not normal (``normal_p`` below `NOT_NORMAL`), both indices where unresolved joints
-        matter (`analysis.exceedance.unresolved_matter`).
+        ``needed``; ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the
+        delivery. The last row, `ALL_LIMITS`, is for the largest ratio of load to limit of each joint. ``cpk_normal`` is
+        NaN where the load is not normal (``normal_p`` below `NOT_NORMAL`), both indices where unresolved joints matter
+        (`analysis.exceedance.unresolved_matter`).
     """
     rows = []
     for load in [*view.loads(list(view.limits)), together(view)]:
@@ -48,6 +52,7 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         low, high = error_budget.total_interval(load, pair, load.limit, confidence)
         row |= {"good": 1.0 - c.above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
         row |= {"ppm": 1e6 * c.above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
+        row |= error_budget.delivery(load, pair, load.limit, delivery, confidence)
         names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
         row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
         if exceedance.unresolved_matter(c.above.count, c.above.n, c.above.n_failed + c.above.n_unsettled):

@@ -26,6 +26,7 @@ LIMITS = (
     Column("total interval", lambda row: text.span(row["good_lower"], row["good_upper"])),
     Column("ppm", lambda row: text.number(row["ppm"]), rank=1),
     Column("interval of ppm", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1"), rank=2),
+    Column("above in delivery", text.delivery, rank=3),
     Column("Cpk", lambda row: text.formed(row["cpk"], ".2f")),
     Column("interval of Cpk", lambda row: _with_ends(row, "cpk", ".2f")),
     Column("Cpk if normal", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),

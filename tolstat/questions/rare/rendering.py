@@ -55,4 +55,5 @@ def sentence(estimate: Estimate, limit: Limit) -> str:
     head = f"P({limit})"
     if math.isnan(estimate.probability):
         return f"{head} < {estimate.upper:.2g}: the limit was not reached"
-    return f"{head} = {estimate.probability:.3g}, 95 % interval {estimate.lower:.3g} .. {estimate.upper:.3g}"
+    ppm = f"{text.ppm(estimate.probability)} ppm"
+    return f"{head} = {estimate.probability:.3g} ({ppm}), 95 % interval {estimate.lower:.3g} .. {estimate.upper:.3g}"

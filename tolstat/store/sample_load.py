@@ -52,6 +52,8 @@ class SampleLoad:
         Whether the joints are independent samples.
     heaviest : float
         Largest weight that a joint can have; inf without a bound.
+    drawn : ndarray of bool, shape (n,), optional
+        Which joints of importance sampling were drawn from the tolerances themselves.
     replicates : int
         Number of independent replicates, consecutive blocks of the joints; 1 without them.
     scale : float
@@ -71,6 +73,7 @@ class SampleLoad:
     iid: bool
     heaviest: float = np.inf
     replicates: int = 1
+    drawn: Mask | None = None
     scale: float = 1.0
     parts: tuple[SampleLoad, ...] = ()
 
@@ -154,6 +157,16 @@ class SampleLoad:
         """Whether the weights of the joints support a share above a level; equal weights always do."""
         return self.weights is None or self.trust(level).usable
 
+    def unsearched(self, level: float, confidence: float = CONFIDENCE) -> float:
+        """Upper end of the share above a level whatever the proposals of importance sampling miss.
+
+        That of the joints drawn from the tolerances themselves; Clopper and Pearson's, with all joints without a valid
+        load above the level. NaN for joints of equal weight.
+        """
+        if self.drawn is None:
+            return np.nan
+        return replace(self.only(self.drawn), weights=None, drawn=None).above(level, confidence).outer_upper
+
     def delivery(self, level: float, number: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
         """Prediction interval for the number above a level among further joints; see `analysis.prediction`.
 
@@ -190,5 +203,6 @@ class SampleLoad:
             status=self.status[samples],
             replicates=1,
             weights=None if self.weights is None else self.weights[samples],
+            drawn=None if self.drawn is None else self.drawn[samples],
             parts=tuple(part.only(samples) for part in self.parts),
         )

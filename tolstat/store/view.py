@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.exceedance import FloatArray, Mask
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
@@ -140,6 +140,12 @@ class View:
             return None
         return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
 
+    @cached_property
+    def drawn(self) -> Mask | None:
+        """Which joints were drawn from the tolerances, (n,), if not all were."""
+        component = None if self.weights is None else self.store.origin()["component"][self.store.first_sample :]
+        return None if component is None else frozen(component == 0)
+
     @property
     def results(self) -> NDArray[np.void]:
         """Fields `LOAD_FIELDS` of the results, (n,)."""
@@ -218,7 +224,7 @@ class View:
             values, ends = frozen(load.of(results)), load.ends(results)
             self._loads[name] = SampleLoad(
                 name, load.unit, self.limits.get(name), nominal, values, (frozen(ends[0]), frozen(ends[1])),
-                self.status, self.weights, self.iid, self.store.heaviest, self.replicates,
+                self.status, self.weights, self.iid, self.store.heaviest, self.replicates, self.drawn,
             )  # fmt: skip
         return self._loads[name]
 

@@ -18,6 +18,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tolstat import sampling
+from tolstat.analysis import prediction
 from tolstat.analysis.exceedance import FloatArray, split
 from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
 from tolstat.campaign import run as campaign
@@ -28,6 +29,7 @@ from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import Limit
 from tolstat.common.shown import shown
+from tolstat.questions.rare import numerical
 from tolstat.store import Reader, ResultStore
 from tolstat.store.recall import differing_keys
 from tolstat.study import Study, rule, subset_of
@@ -35,6 +37,7 @@ from tolstat.study.model import Subset
 
 MIN_PARALLEL = 2000
 """Minimum number of joints of a stage for which worker processes are started: some seconds of work."""
+CONFIDENCE = 0.95
 EXAMPLE = 'write --limit "cross1.F > 900 N"'
 
 
@@ -58,6 +61,12 @@ class RareEvent(NamedTuple):
         Number of these without a valid load.
     unresolved_first : int
         Number of joints of level 0 (drawn at random) without a valid load.
+    ancestors : int
+        Number of joints of level 0 that the joints above the limit descend from.
+    wide : Estimate
+        As `estimate`, with the confidence `analysis.prediction.half` for prediction intervals.
+    numerical : tuple of float, optional
+        Factors on the ends of the interval by the numerical error near the limit; None if it is not known.
     """
 
     sampling: Subset
@@ -67,12 +76,21 @@ class RareEvent(NamedTuple):
     joints: int
     unresolved: int
     unresolved_first: int
+    ancestors: int
+    wide: Estimate
+    numerical: tuple[float, float] | None
 
     @property
     def as_sure_as(self) -> float:
         """Number of joints drawn at random that would give the same coefficient of variation; NaN if unknown."""
         p, deviation = self.estimate.probability, self.estimate.deviation
         return (1.0 - p) / (p * deviation**2) if deviation > 0 else math.nan
+
+    def delivery(self, number: int) -> tuple[float, float]:
+        """Prediction interval for the joints above the limit among `number` further ones, with the numerical error."""
+        low, high = self.numerical or (1.0, 1.0)
+        upper = min(1.0, self.wide.upper * high)
+        return prediction.of_share(self.wide.lower * low, upper, number, CONFIDENCE)
 
     @property
     def upper_if_above(self) -> float:
@@ -239,7 +257,32 @@ def run(
             tell(f"level {number}: {level.joints} joints, {level.share:.3g} of them above the next threshold")
         told = len(walk.levels)
     joints = first - plan.first_sample
-    return RareEvent(settings, walk.levels, walk.reached, walk.estimate(), joints, sum(unresolved), unresolved[0])
+    wide = walk.estimate(prediction.half(CONFIDENCE))
+    moved = numerical.factors(out, settings.limit, walk.last + plan.first_sample)
+    head = settings, walk.levels, walk.reached, walk.estimate(), joints
+    return RareEvent(*head, sum(unresolved), unresolved[0], walk.ancestors, wide, moved)
+
+
+def repeated(
+    plan: Study,
+    out: Path,
+    repeats: int,
+    workers: int | None = None,
+    tell: Callable[[str], None] = note,
+    progress: Reporter | None = None,
+) -> list[RareEvent]:
+    """Run or resume the simulation with several seeds, the study's and the following ones.
+
+    Each has its file: `out`, then ``STEM_2.h5`` and so on beside it. Other parameters and errors raised are those of
+    `run`.
+    """
+    found = []
+    for k in range(repeats):
+        own = replace(plan, sampling=plan.sampling.model_copy(update={"seed": plan.sampling.seed + k}))
+        path = out.with_name(f"{out.stem}_{k + 1}{out.suffix}") if k else out
+        tell(f"seed {own.sampling.seed}: {path}")
+        found.append(run(own, path, workers, tell, progress))
+    return found
 
 
 def _noise(plan: Study, level: int, first: int, count: int) -> FloatArray:

@@ -12,8 +12,11 @@ SHARES = 80
 
 def main() -> None:
     """Print the worst values over all shares up to one half that the campaign suffices for."""
-    print("| width | joints | a look | coverage | too high | too low | cost, 20 above | cost, 10 above | bias of count / n |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    head = (
+        "width, joints, a look, coverage, too high, too low, cost with 20 above, cost with 10 above, bias of count / n"
+    )
+    columns = head.split(", ")
+    print("| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|")
     for width, n in PLANS:
         scheme = sequential.scheme(width, sequential.looks(width, n))
         of_ends = [scheme.performance(float(p)) for p in scheme.critical_shares()]

@@ -36,7 +36,7 @@ def capability(
     """
     from tolstat.display import text
     from tolstat.questions.capability import query, rendering
-    from tolstat.store import Reader
+    from tolstat.store import Reader, error_budget
 
     with progress("capability"), Reader.open(file) as store:
         view = store.view()
@@ -44,7 +44,7 @@ def capability(
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
             raise StoreError(str(Fault(str(file), "has no limits, or its joints are no random sample", remedy)))
         view.check_sample(allow_weights=False)
-        table = query.limits(view, delivery=delivery)
+        table, unknown = query.limits(view, delivery=delivery), error_budget.unknown(view)
         try:
             rare = query.returns(view, list(view.limits), one_in) if one_in else None
         except ValueError as error:
@@ -58,5 +58,7 @@ def capability(
         typer.echo("\nload that one in N joints exceeds; median of the largest load of N joints")
         print_table(rendering.RETURNS, rare, wide)
     say(rendering.note(table))
+    if unknown:
+        say(unknown)
     if rare is not None and (no_tail := rendering.no_tail(rare)):
         warn(wrapped(f"warning: {no_tail}; tolstat rare, a subset simulation, needs no tail"))

@@ -80,7 +80,7 @@ def unknown(view: View) -> str:
 
 def command(path: Path, limit: str = ANY_LIMIT) -> str:
     """Words on a numerical error that is not known near a limit, with the command that tells it."""
-    return f'numerical error at the limit: not known, not in the intervals; tolstat verify {path} --near "{limit}"'
+    return f'numerical error at the limit: not known; tolstat verify {path} --near "{limit}"'
 
 
 def relative(view: View, name: str) -> float:

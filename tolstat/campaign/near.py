@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.accuracy import LEAST_NEAR
 from tolstat.campaign import verify
-from tolstat.campaign.verify import ALL_CHECKS, Progress, no_progress
+from tolstat.campaign.verify import QUICK_CHECKS, Progress, no_progress
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS, Limit
@@ -40,7 +40,7 @@ def check_near(
     path: Path,
     text: str,
     joints: int | str = LEAST_NEAR,
-    names: Iterable[str] = ALL_CHECKS,
+    names: Iterable[str] = QUICK_CHECKS,
     on_start: Callable[[], None] = lambda: None,
     workers: int = 1,
     progress: Progress = no_progress,

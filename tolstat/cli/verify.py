@@ -48,7 +48,7 @@ def verify(
     the largest loads, relative to the largest load of the kind in the joint.
 
     Of a result file, checks settled joints and stores the checks in the file for the report. With --near, checks the
-    joints nearest to a limit, 50 for each load of it: how far their loads change, and to which side, tells how far the
+    joints nearest to a limit, 50 for each load of it, without reference and other method: how far their loads change, and to which side, tells how far the
     share above the limit moves. Intervals of all commands use it from then on.
 
     Example: tolstat verify iso2768_f.h5 --joints 2 --out errors.csv
@@ -57,7 +57,7 @@ def verify(
     from tolstat.campaign import verify as verification
     from tolstat.campaign.executors import available_workers
     from tolstat.campaign.near import check_near
-    from tolstat.campaign.verify import ALL_CHECKS
+    from tolstat.campaign.verify import QUICK_CHECKS
     from tolstat.common.files import check_target
     from tolstat.questions.accuracy import query, rendering
 
@@ -68,7 +68,7 @@ def verify(
         if near is None:
             found = verification.check(what, joints or 24, seed, announce_compilation, count, progress=shown)
         else:
-            found = check_near(what, near, joints or LEAST_NEAR, ALL_CHECKS, announce_compilation, count, shown)
+            found = check_near(what, near, joints or LEAST_NEAR, QUICK_CHECKS, announce_compilation, count, shown)
     if as_json:
         typer.echo(as_text(_summary(found)))
     else:

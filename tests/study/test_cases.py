@@ -225,7 +225,8 @@ def test_each_row_runs_with_its_own_joint(tmp_path: Path) -> None:
     # statics: each of four pins carries T / (2 (R + z/2)) at its outer end; centrifugal load adds little
     np.testing.assert_allclose(ideal[:, :, 0], np.outer(100 / (2 * (radius + 0.01)), np.ones(4)), rtol=2e-3)
     for row in range(s.rows):
-        own = joint.perturb(s.joints[design["variant"][row]], errors[[row]])
+        variant = design["variant"][row]
+        own = joint.perturb(s.joints[variant], s.operations[variant], errors[[row]])
         again = simulation.simulate_rows(own, s.solver.options())
         np.testing.assert_array_equal(again.results["T_max"][0], results["T_max"][row])
 
@@ -234,8 +235,8 @@ def test_each_row_runs_with_its_own_joint(tmp_path: Path) -> None:
 def test_workers_blocks_and_interruptions_change_no_byte(tmp_path: Path) -> None:
     s = load(tmp_path)
 
-    def perturb(of: joint.Joint, errors: np.ndarray) -> np.ndarray:
-        params = fakes.perturb(of, errors)
+    def perturb(of: joint.Joint, operation: joint.Operation, errors: np.ndarray) -> np.ndarray:
+        params = fakes.perturb(of, operation, errors)
         params["alpha"] = of.contact.D_P * 100 + (of.contact.law == "point") * of.cross.R
         return params
 
@@ -356,7 +357,7 @@ def test_the_paper_as_printed() -> None:
     c_d = 2 * 0.05 * 0.32 * (np.pi / 0.03641) ** 2 * np.sqrt(210e9 * 1.02e-7 / (7.70e-6 * 11.34e-4))
     assert c_d == pytest.approx(3.71e8, rel=0.01)
     assert printed.contact.c_d == 3.71e8
-    assert joint.perturb(printed, sampling.draw(s)[:1])["arm_mass"][0] == 0.3516
+    assert joint.perturb(printed, s.operations[0], sampling.draw(s)[:1])["arm_mass"][0] == 0.3516
 
 
 @pytest.mark.slow

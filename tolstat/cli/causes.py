@@ -10,6 +10,7 @@ import typer
 
 from tolstat.cli._app import (
     AsJson,
+    AtPoints,
     ByOne,
     StudyOption,
     Wide,
@@ -66,6 +67,7 @@ def causes(
     joints: Annotated[
         int, typer.Option("--joints", metavar="N", min=100, help="With --against-angle: number of joints used.")
     ] = 1000,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -88,7 +90,7 @@ def causes(
     if against_angle:
         if points is not None:
             raise InputError([Fault("--against-angle", "cannot be combined with --pick-freeze", "remove one of them")])
-        _against_angle(file, by, top, logarithm, out, joints, study_file, wide)
+        _against_angle(file, by, top, logarithm, out, joints, point, study_file, wide)
         return
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
@@ -101,7 +103,7 @@ def causes(
         remedy = "add --pick-freeze 1024, or --against-angle"
         raise InputError([Fault("--out", "is used with --pick-freeze or --against-angle only", remedy)])
     with progress("causes"), Reader.open(file) as store:
-        view = store.view(study_file)
+        view = store.view(study_file).at(point or "")
         found = causes_of(view, by or most_exceeded(view), log=logarithm)
     if as_json:
         typer.echo(as_text(rendering.values(found)))
@@ -131,6 +133,7 @@ def _against_angle(
     logarithm: bool,
     out: Path | None,
     joints: int,
+    point: str | None,
     study_file: Path | None,
     wide: bool,
 ) -> None:
@@ -144,8 +147,8 @@ def _against_angle(
         for path in (out, out.with_suffix(".png")):
             check_target(path, file)
     with progress("causes over the input angle"), Reader.open(file) as store:
-        view = store.view(study_file)
-        load = by or most_exceeded(view)
+        view = store.view(study_file).at(point or "")
+        view, load = view.narrowed(by or most_exceeded(view))
         if not revolutions.held(store):
             announce_compilation()
         found = against_angle(view, [load], joints, (load,) if logarithm else ())[0]

@@ -15,7 +15,7 @@ from tolstat.cli._talk import progress, say
 def fatigue(
     files: Annotated[
         list[Path],
-        typer.Argument(metavar="FILE", help="Result file (HDF5); for a duty cycle, one per operating point."),
+        typer.Argument(metavar="FILE", help="Result file (HDF5) of all operating points, or several of one each."),
     ],
     share: Annotated[
         list[float] | None,
@@ -37,6 +37,12 @@ def fatigue(
         Path | None,
         typer.Option("--out", metavar="CSV", help="Write the damage-equivalent loads of all components as CSV."),
     ] = None,
+    point: Annotated[
+        str | None,
+        typer.Option(
+            "--point", metavar="POINT", help="Operating point of FILE, such as cruise; default: all, by their shares."
+        ),
+    ] = None,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
@@ -46,7 +52,8 @@ def fatigue(
     damage sum exceeds 1, with 95 % intervals. Without --by, prints the most loaded component of each bushing force
     and torque. Exponents, service life and S-N lines are those of [fatigue] in the study of the first FILE.
 
-    Several files form a duty cycle: the same joints at several operating points.
+    The operating points of FILE form a duty cycle, by the share of the time that [[operation]] gives each; so do
+    several files, with the same joints at one operating point each.
 
     Example: tolstat fatigue iso2768_f.h5 --by "cross*.F_t"
     """
@@ -60,8 +67,8 @@ def fatigue(
         check_target(out, *files)
     names = channels(by) if by else None
     with progress("counting cycles"), ExitStack() as stack:
-        views = [stack.enter_context(Reader.open(file)).view() for file in files]
-        loading = query.load_cycles(views, share or [1.0], names)
+        views = [stack.enter_context(Reader.open(file)).view().at(point or "") for file in files]
+        loading = query.load_cycles(views, share or None, names)
         loads, damages = query.equivalent_loads(loading), query.damages(loading)
     if out is not None:
         with output_file(out) as temporary:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, StudyOption, Wide, as_text, print_table
+from tolstat.cli._app import AsJson, AtPoints, ResultFile, StudyOption, Wide, as_text, print_table
 from tolstat.cli._talk import progress, say
 
 
@@ -18,6 +18,7 @@ def reweight(
             "--set", metavar="KEY=VALUE", help='Tolerance to change: "pin*.offset_t.plus_minus=0.05 mm"; repeatable.'
         ),
     ],
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -38,7 +39,7 @@ def reweight(
     from tolstat.store import Reader
 
     with progress("reweighting"), Reader.open(file) as store:
-        found = reweighted(store.view(study_file), settings)
+        found = reweighted(store.view(study_file).at(point or ""), settings)
     if as_json:
         w = found.weights
         head = {"usable": w.usable, "ess": w.ess, "pareto_k": w.k if abs(w.k) < 1e300 else None, "allowed_k": w.allowed}

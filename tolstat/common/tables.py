@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tolstat.common.fields import Field, Kind, dtype_of
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
 PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
@@ -232,9 +232,9 @@ def _error_fields() -> tuple[Field, ...]:
             fields.append(Field(f"{feature}.tilt_{axis}", "rad", f"angular error of the {kind} axis about {axis}"))
         fields.append(Field(f"{feature}.diameter", "m", f"deviation of the {kind}'s diameter from nominal"))
     fields += [
-        Field("operation.alpha", "rad", "misalignment of the shafts"),
-        Field("operation.speed", "rad/s", "angular velocity of the input shaft"),
-        Field("operation.torque", "N*m", "resisting torque on the output shaft"),
+        Field("operation.alpha", "rad", "deviation of the shafts' misalignment from that of the operating point"),
+        Field("operation.speed", "rad/s", "deviation of the input shaft's angular velocity"),
+        Field("operation.torque", "N*m", "deviation of the resisting torque on the output shaft"),
         Field(
             "material.E_factor",
             "1",
@@ -246,7 +246,7 @@ def _error_fields() -> tuple[Field, ...]:
 
 
 ERROR_FIELDS = _error_fields()
-"""Manufacturing errors (deviations from nominal, zero for the nominal joint) and the operating point."""
+"""Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
 
 OVER = "over the revolutions that count"
 LOAD_KINDS = (

@@ -61,6 +61,7 @@ def build(
     width: int | None = WIDTH,
     stage: Callable[[str], None] = silent,
     accepted: float = math.nan,
+    point: str = "",
 ) -> Report:
     """Write the report of a result file; the campaign may be unfinished.
 
@@ -82,6 +83,9 @@ def build(
         Called with the name of each stage when it begins.
     accepted : float
         Accepted share: share of the joints that may be above each limit; NaN if none is given.
+    point : str
+        Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; names of files end in it. The worst of
+        all by default.
 
     Returns
     -------
@@ -103,7 +107,8 @@ def build(
             stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
                 return _noted(_cases(store, stem, width), stands_on)
-            view = store.view()
+            view = store.view().at(point)
+            stem = stem.with_name(f"{stem.name}_{point}") if point else stem
             report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width, accepted)
             for note in (view.missing(), _stopped(store.stop) if store.stop else "", stands_on):
                 report = _noted(report, note)

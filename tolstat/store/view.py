@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,16 +16,17 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS, limits_in_words
+from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS, limits_in_words, load_of, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, FAILED, RESULT, UNSETTLED, VALID, Status
-from tolstat.store import verification
+from tolstat.store import verification, worst
 from tolstat.store.counts import Counts
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
 from tolstat.store.sample_load import SampleLoad, frozen
 from tolstat.store.verification import Verification
+from tolstat.study.points import limits_at, names_of
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -68,6 +70,9 @@ class _FirstPass(NamedTuple):
 class View:
     """A result file as questions read it. Element i of every array is sample i; the nominal joint is not among them.
 
+    Of several operating points a load is the largest over them, and a joint is valid only if it is at all of them.
+    What cannot be told of several points raises the error of a `store` that is at no point.
+
     Each part is read and checked when it is first used, and kept; arrays that are kept cannot be written to. Tables of
     errors are kept for the first `BLOCK` samples; those of larger campaigns are read in blocks.
 
@@ -78,19 +83,24 @@ class View:
     name, method : str
         Name of the study, and its sampling method.
     limits : dict of str to float
-        Allowed load in SI units by name (``"cross1.F"``).
+        Allowed load in SI units by name (``"cross1.F"``, ``"cross1.F at cruise"``).
+    points : tuple of str
+        Names of the operating points.
     columns : tuple of Column
         Columns of the results that the study keeps; the others are NaN.
     n : int
         Number of samples.
     """
 
-    def __init__(self, store: Reader, study_path: Path | None = None) -> None:
-        self.store = store
+    def __init__(self, store: Reader, study_path: Path | None = None, points: Sequence[str] | None = None) -> None:
+        here = store.points if store.point is None else (store.point,)
+        self.points = tuple(here if points is None else points)
+        self.store = store.at(self.points[0]) if len(self.points) == 1 else store
+        self.parts = [View(store, study_path, [name]) for name in self.points] if len(self.points) > 1 else [self]
         self.path = store.path
         self.name = store.study_name
         self.method = str(store.sampling["method"])
-        self.limits = store.limits
+        self.limits = limits_at(store.limits, self.points, list(store.points))
         self.columns = store.columns
         self.n = store.n - store.first_sample
         self._study_path = study_path
@@ -98,11 +108,27 @@ class View:
 
     def __repr__(self) -> str:
         loads = f"{len(self.kept_loads)} loads, {len(self.limits)} with a limit"
+        loads += f", at {' and '.join(self.points)}" if all(self.points) else ""
         return f"<view of {self.path.name!r}: {self.n} joints ({METHODS.get(self.method, self.method)}), {loads}>"
 
     def _repr_html_(self) -> str:
         loads = [("loads", ", ".join(self.kept_loads)), ("limits", limits_in_words(self.limits))]
         return table(repr(self)[1:-1], [("study", self.name), *loads])
+
+    def at(self, selection: str) -> View:
+        """View of some of the operating points: ``"cruise"``, or the worst of ``"cruise+start"``; of all with ``""``.
+
+        Raises
+        ------
+        InputError
+            When there is no such point.
+        """
+        return View(self.store, self._study_path, names_of(selection, self.points, str(self.path)))
+
+    def narrowed(self, name: str) -> tuple[View, str]:
+        """View of the points that a load or column names, and its plain name: ``"cross1.F at cruise"``."""
+        plain, where = split(name)
+        return (self.at(where), plain) if where else (self, plain)
 
     @cached_property
     def study(self) -> Study:
@@ -112,6 +138,8 @@ class View:
     @cached_property
     def verification(self) -> Verification | None:
         """The verification that the file holds, if any."""
+        if len(self.parts) > 1:
+            return worst.checks([part.verification for part in self.parts])
         return verification.read(self.store)
 
     @cached_property
@@ -165,6 +193,8 @@ class View:
 
     @cached_property
     def _tables(self) -> _FirstPass:
+        if len(self.parts) > 1:
+            return self._worst()
         skip, store = self.store.first_sample, self.store
         nominal = np.empty(0, RESULT)
         results = np.empty(self.n, [(name, RESULT[name]) for name in LOAD_FIELDS])
@@ -185,8 +215,18 @@ class View:
         mean = shares / total if total else np.full((4, 4), np.nan)
         return _FirstPass(frozen(results), frozen(nominal), frozen(np.concatenate(kept)[:MAX_LISTED]), frozen(mean))
 
+    def _worst(self) -> _FirstPass:
+        results = frozen(worst.together([part.results for part in self.parts]))
+        nominal = frozen(worst.nominal([part.nominal for part in self.parts]))
+        samples = np.flatnonzero(np.isin(results["status"], (*FAILED, *UNSETTLED)))[:MAX_LISTED]
+        point = worst.deciding([part.status[samples] for part in self.parts])
+        without = [np.empty(0, RESULT)]
+        for slot, number in zip(self.slots(samples).tolist(), point.tolist(), strict=True):
+            without.append(self.parts[number].store.results(slice(slot, slot + 1)))
+        return _FirstPass(results, nominal, frozen(np.concatenate(without)), np.full((4, 4), np.nan))
+
     def load(self, name: str) -> SampleLoad:
-        """Largest load over the revolution of every joint, by its name.
+        """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
 
         Raises
         ------
@@ -197,16 +237,20 @@ class View:
         """
         if name not in self._loads:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
+            view, plain = self.narrowed(name)
+            if view is not self:
+                self._loads[name] = replace(view.load(plain), name=name, limit=self.limits.get(name))
+                return self._loads[name]
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
             if not selected_results.holds(self.columns, name):
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
-            load, results = LOADS[name], self.results
+            load = LOADS[name]
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
-            values, ends = frozen(load.of(results)), load.ends(results)
+            values, _, (lower, upper) = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = SampleLoad(
-                name, load.unit, self.limits.get(name), nominal, values, (frozen(ends[0]), frozen(ends[1])),
+                name, load.unit, self.limits.get(name), nominal, frozen(values), (frozen(lower), frozen(upper)),
                 self.status, self.weights, self.iid,
             )  # fmt: skip
         return self._loads[name]
@@ -244,7 +288,7 @@ class View:
                 limit = 1.0 if load.limit is None else load.limit
                 share = 0.0 if load.limit is None else load.above(limit).estimate
                 rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
-                kind = load.name.rpartition(".")[2]
+                kind = load_of(load.name).kind
                 found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
         return tuple(name for _, name in found.values())
 
@@ -351,7 +395,10 @@ class View:
     def head(self) -> str:
         """Sentence with the number of joints and of those without a valid result."""
         pending = self.counts.total - self.counts.done
-        text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)}), {self.counts.shortfall}"
+        text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)})"
+        if all(self.points):
+            text += f" at {self.points[0]}" if len(self.points) == 1 else f", the worst of {', '.join(self.points)}"
+        text += f", {self.counts.shortfall}"
         return text + (f", {pending} still pending" if pending else "")
 
     def missing(self) -> str:

@@ -52,6 +52,8 @@ def swept_axes(view: View) -> list[Axis]:
     """
     errors, patterns = view.errors(np.arange(view.n)), _patterns(tomllib.loads(view.store.study_text).get("sweep", {}))
     columns = {(field.name, field.unit): errors[field.name] for field in ERROR_FIELDS}
+    own = recorded.operating_points(view.store, slice(view.store.first_sample, None))
+    columns |= {(name, unit): own[name.partition(".")[2]] for name, unit in columns if name.startswith("operation.")}
     if view.store.variants:
         columns |= {(key, KEYS[key]): of[view.store.first_sample :] for key, of in recorded.swept(view.store).items()}
     groups: dict[bytes, list[tuple[str, str]]] = {}

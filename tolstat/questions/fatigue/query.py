@@ -60,18 +60,20 @@ class Loading:
 
 def load_cycles(
     views: Sequence[View],
-    shares: Sequence[float] = (1.0,),
+    shares: Sequence[float] | None = None,
     names: Sequence[str] | None = None,
     samples: int | None = None,
 ) -> Loading:
-    """Rainflow cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
+    """Rainflow cycles of a campaign, or of the same joints at the several operating points of a duty cycle.
 
     Parameters
     ----------
     views : sequence of View
-        The campaign at each operating point; the joints of the campaigns differ in ``operation.*`` only.
-    shares : sequence of float
-        Share of the revolutions at each operating point; the sum is 1.
+        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
+        each operating point.
+    shares : sequence of float, optional
+        Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
+        campaign follow from their shares of the time and their speeds, see `revolutions_at`.
     names : sequence of str, optional
         Channels to keep, keys of `tables.CHANNELS`; by default all 64: some 8 kB per joint.
     samples : int, optional
@@ -80,10 +82,14 @@ def load_cycles(
     Raises
     ------
     InputError
-        When the shares are not shares, or the campaigns have different joints.
+        When the shares are not shares or not known, or the campaigns have different joints.
     StoreError
         When a file holds no histories, or joints that are no sample of a production.
     """
+    name = " + ".join(view.name for view in views)
+    if any(len(view.parts) > 1 for view in views):
+        views, shares = _of_points(views, shares)
+    shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
         found = f"{list(shares)} for {len(views)} files"
         raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
@@ -101,7 +107,7 @@ def load_cycles(
     for view in views[1:]:
         status = np.where(status == Status.OK, view.status[:samples], status)
     return Loading(
-        name=" + ".join(view.name for view in views),
+        name=name,
         cycles=cycles.duty_cycle([own for own, _ in parts], shares),
         status=status,
         nominal=cycles.duty_cycle([_rows(nominal, rows) for _, nominal in parts], shares),
@@ -109,6 +115,35 @@ def load_cycles(
         # the section alone, like limits: it is at hand even where the study refers to files that are not
         settings=of_text(first.store.study_text, str(first.path)),
     )
+
+
+def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[list[View], list[float]]:
+    """Views of a campaign at each of its operating points, and their shares of the revolutions."""
+    view, place = views[0], str(views[0].path)
+    if len(views) > 1:
+        remedy = "give this file alone, or files with one operating point each"
+        raise InputError([Fault(place, "has several operating points", remedy)])
+    if shares is not None:
+        remedy = "leave --share out: the study gives share in [[operation]]"
+        raise InputError([Fault(place, "has several operating points", remedy)])
+    return view.parts, revolutions_at(view)
+
+
+def revolutions_at(view: View) -> list[float]:
+    """Share of the revolutions at each operating point of a view: share of the time times speed, summing to 1.
+
+    Raises
+    ------
+    InputError
+        When the study does not give the shares of the time.
+    """
+    points = [view.store.points[name] for name in view.points]
+    turns = np.array([point.share * abs(point.operation.speed) for point in points])
+    if np.isnan(turns).any():
+        remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
+        remedy += f"; or look at one point: --point {view.points[0]}"
+        raise InputError([Fault(str(view.path), "has operating points without a share of the time", remedy)])
+    return [float(own) for own in turns / turns.sum()]
 
 
 def _cycles_of(view: View, names: Sequence[str] | None, samples: int | None) -> tuple[Cycles, Cycles]:
@@ -125,7 +160,7 @@ def _rows(whole: Cycles, rows: slice) -> Cycles:
 
 
 def _check_same_joints(view: View, first: View) -> None:
-    names = [f.name for f in ERROR_FIELDS if not f.name.startswith("operation.")]
+    names = [f.name for f in ERROR_FIELDS]
     if view.n == first.n and all(
         np.array_equal(own[name], other[name])
         for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)

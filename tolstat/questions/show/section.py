@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import split
 from tolstat.common.tables import SIMULATED
 from tolstat.display import text
 from tolstat.display.asked import Asked
@@ -24,8 +24,8 @@ LEGEND = (
 def legend(view: View, asked: Asked) -> list[Panel]:
     """Drawings of the joint in which bushings and pins of the leading loads stand out; empty if it cannot be read."""
     with asked.noting("the joint is not drawn"):
-        alpha = float(view.store.identity["operation.alpha"])
-        marked = sorted({name.rpartition(".")[0] for name in view.leading} - {""})
+        alpha = view.parts[0].store.operation.alpha
+        marked = sorted({split(name)[0].rpartition(".")[0] for name in view.leading} - {""})
         return list(sheets.joint(query.dimensions(joint_of(view.store, 0), alpha), marked))
     return []
 
@@ -49,13 +49,14 @@ def _worst(view: View) -> list[Panel]:
     """One drawing for each joint that has the largest of a leading load."""
     loads: dict[int, list[str]] = {}
     for name in view.leading:
-        values = np.where(np.isin(view.status, SIMULATED), LOADS[name].of(view.results), np.nan)
+        load = view.load(name)
+        values = np.where(np.isin(load.status, SIMULATED), load.values, np.nan)
         sample = int(np.nanargmax(values))
-        loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), LOADS[name].unit)}")
+        loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), load.unit)}")
     panels = []
     for sample, said in loads.items():
         joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
         errors = view.errors(np.array([sample]))
-        d = query.dimensions(joint, float(errors["operation.alpha"][0]))
+        d = query.dimensions(joint, 0.0)
         panels.append(sheets.one(query.pairs(joint, errors), d, f"Row {row}: {', '.join(said)}", f"drawn-{row}"))
     return panels

@@ -84,6 +84,8 @@ class View:
         Name of the study, and its sampling method.
     limits : dict of str to float
         Allowed load in SI units by name (``"cross1.F"``, ``"cross1.F at cruise"``).
+    parts : list of View
+        Views of each operating point; the view itself if there is one.
     points : tuple of str
         Names of the operating points.
     columns : tuple of Column
@@ -92,11 +94,12 @@ class View:
         Number of samples.
     """
 
-    def __init__(self, store: Reader, study_path: Path | None = None, points: Sequence[str] | None = None) -> None:
-        here = store.points if store.point is None else (store.point,)
-        self.points = tuple(here if points is None else points)
-        self.store = store.at(self.points[0]) if len(self.points) == 1 else store
-        self.parts = [View(store, study_path, [name]) for name in self.points] if len(self.points) > 1 else [self]
+    def __init__(self, store: Reader, study_path: Path | None = None, parts: Sequence[View] = ()) -> None:
+        self.store = store
+        if not parts and store.point is None:
+            parts = [View(store.at(name), study_path) for name in store.points]
+        self.parts = list(parts) or [self]
+        self.points = tuple(part.store.point or "" for part in self.parts)
         self.path = store.path
         self.name = store.study_name
         self.method = str(store.sampling["method"])
@@ -105,6 +108,7 @@ class View:
         self.n = store.n - store.first_sample
         self._study_path = study_path
         self._loads: dict[str, SampleLoad] = {}
+        self._at: dict[tuple[str, ...], View] = {self.points: self}
 
     def __repr__(self) -> str:
         loads = f"{len(self.kept_loads)} loads, {len(self.limits)} with a limit"
@@ -123,7 +127,11 @@ class View:
         InputError
             When there is no such point.
         """
-        return View(self.store, self._study_path, names_of(selection, self.points, str(self.path)))
+        chosen = names_of(selection, self.points, str(self.path))
+        if chosen not in self._at:
+            parts = [self.parts[self.points.index(name)] for name in chosen]
+            self._at[chosen] = parts[0] if len(parts) == 1 else View(self.store, self._study_path, parts)
+        return self._at[chosen]
 
     def narrowed(self, name: str) -> tuple[View, str]:
         """View of the points that a load or column names, and its plain name: ``"cross1.F at cruise"``."""

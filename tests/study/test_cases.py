@@ -84,12 +84,13 @@ def test_errors_of_a_row_are_its_case_at_its_point_of_the_grid(tmp_path: Path) -
     s = load(tmp_path)
     errors = sampling.draw(s)
     assert len(errors) == s.rows
-    np.testing.assert_allclose(np.degrees(errors["operation.alpha"][:18]), 9 * [0.0] + 9 * [15.0])
+    alpha = joint.operating(s.operation, errors)["alpha"]
+    np.testing.assert_allclose(np.degrees(alpha[:18]), 9 * [0.0] + 9 * [15.0])
     np.testing.assert_allclose(errors["pin3.diameter"][:9], 3 * [0.0] + 3 * [-2e-5] + 3 * [-4e-5])
     np.testing.assert_allclose(errors["hole4.offset_t"][:3], [0, 1e-4, 0])
     np.testing.assert_allclose(np.degrees(errors["pin2.tilt_z"][18:22]), [0, -0.5, 0, -0.5])
     np.testing.assert_allclose(errors["pin1.offset_z"][18:20], [0, 2e-5])
-    assert (errors["operation.torque"] == 100.0).all()
+    assert (errors["operation.torque"] == 0.0).all()
     assert (errors["pin3.tilt_z"] == 0.0).all()
 
 
@@ -134,7 +135,8 @@ def test_without_grid_and_variants_the_joint_as_it_is(tmp_path: Path) -> None:
     assert s.joints == (s.joint,)
     assert s.variants == (("joint", {}, ""),)
     assert s.design.tolist() == [(0, 0, 0), (0, 1, 0)]
-    assert sampling.draw(s)["operation.alpha"].tolist() == 2 * [np.radians(5)]
+    assert sampling.draw(s)["operation.alpha"].tolist() == [0.0, 0.0]
+    assert s.operations[0].alpha == np.radians(5)
 
 
 def test_other_methods_have_one_joint(tmp_path: Path) -> None:

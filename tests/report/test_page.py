@@ -22,8 +22,8 @@ from tolstat.report import headline as verdict
 from tolstat.report import html as writer
 from tolstat.report import page
 from tolstat.store import Reader, revolutions
+from tolstat.store.first_pass import MAX_LISTED
 from tolstat.store.recall import recall
-from tolstat.store.view import MAX_LISTED
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
 TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(

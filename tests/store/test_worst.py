@@ -6,7 +6,7 @@ import pytest
 from tests.support import synthetic, views
 from tolstat.common.tables import Status
 from tolstat.questions.causes.tail import worst_joints
-from tolstat.questions.exceedance.query import limits
+from tolstat.questions.exceedance.query import at_points, limits
 from tolstat.questions.fatigue.query import revolutions_at
 from tolstat.store import worst
 
@@ -73,6 +73,15 @@ def test_limits_hold_at_the_points_that_they_name(view, tables):
         assert table.loc[name, ["n_failed", "n_unsettled"]].sum() == lost, name
     assert view.at("two").limits == {"cross1.F": 700.0}
     assert views.at_points(tables, {"cross1.F at two": 900.0}).at("one").limits == {}
+
+
+def test_shares_at_each_point(view, tables):
+    found = at_points(view).set_index("load")
+    assert found.index.tolist() == ["cross1.F"]  # the other limits hold at one point
+    for name, table in tables.items():
+        own = table[1:][np.isin(table["status"][1:], (Status.OK, Status.STATIONARY))]
+        assert found.loc["cross1.F", name] == np.mean(own["F_max"][:, 0] > 700)
+    assert not len(at_points(view.at("one")))
 
 
 def test_the_worst_joints_name_their_point(view, monkeypatch):

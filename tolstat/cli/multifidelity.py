@@ -73,7 +73,7 @@ def multifidelity(
     with gather(faults):
         seconds = parse_time(budget, "--budget")
     with gather(faults):
-        plan = study.load(study_file).at_one(point)
+        plan = study.load(study_file).at(point or "")
     if faults:
         raise InputError(faults)
     make_folder(out)

@@ -113,7 +113,7 @@ def _read_study(source: Path, limit: str | None, point: str | None, given: dict[
         with gather(faults):
             parse_limit(limit)
     with gather(faults):
-        plan = study.load(source).at_one(point)
+        plan = study.load(source).at(point or "")
     if faults or limit is None:
         raise InputError(faults)
     return subset_study(plan, limit, **given)

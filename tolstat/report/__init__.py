@@ -142,6 +142,9 @@ def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> R
         limits = query.limits(view)
         files.append(text.csv(limits, stem, "limits"))
         shown, more = _fitted(rendering.LIMITS, limits, width)
+        points = query.at_points(view)
+        if len(points):
+            shown += f"\n\n{rendering.AT_POINTS}\n{_fitted(rendering.at_points(view), points, width)[0]}"
     if verdict is not None:
         sentence = text.sentence(verdict.sentence)
         shown = f"{sentence if width is None else textwrap.fill(sentence, width)}\n\n{shown}"

@@ -108,6 +108,8 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
     rows = f"{store.n}" if store.whole else f"{store.rows[0]} to {store.rows[-1]} of {store.campaign_rows}"
     yield "Rows of the campaign", rows
     yield "Sampling", f"{store.sampling['method']}, seed {store.sampling['seed']}"
+    for point in store.points.values():
+        yield f"Operating point {point.name}".strip(), point.in_words
     yield "Begun", store.created
     yield "Versions", ", ".join(f"{name} {value}" for name, value in store.versions.items() if name != "sources")
     yield "Code", f"{store.git_commit or 'no commit known'}; sources {store.versions.get('sources', 'unknown')}"

@@ -110,7 +110,7 @@ def _limits(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str], 
         "; ".join(said),
         partial(_forest, table=table, accepted=asked.accepted),
         (4.9, drawing.rows_height(len(table))),
-        1.4,
+        max(1.4, drawing.rows_left(_above(table))),
     )
     blocks: list[Block] = [Panels([panel, *joint])]
     blocks += [Text(show.LEGEND, small=True)] if joint else []
@@ -135,13 +135,17 @@ def _how(view: View, asked: Asked) -> str:
     return said
 
 
+def _above(table: pd.DataFrame) -> list[str]:
+    """Each limit as a label: ``cross1.F > 1500 N``."""
+    return [f"{row['load']} > {text.value(row['level'], row['unit'])}" for row in table.to_dict("records")]
+
+
 def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
     """Estimate, interval and outer interval of each limit on an axis of shares."""
     known = table["estimate"][table["estimate"] > 0]
     n = max(int(table["n"].max()), 1)
     floor = 0.5 * min(1.0 / n, known.min() if len(known) else 1.0)
-    units = [f"{row['load']} > {text.value(row['level'], row['unit'])}" for row in table.to_dict("records")]
-    drawing.rows(ax, units)
+    drawing.rows(ax, _above(table))
     style.share_axis(ax, min(floor, 0.5 * accepted) if accepted > 0 else floor, "x")
     for i, row in enumerate(table.to_dict("records")):
         low, high = ends(row)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import StoreError
 from tolstat.common.loads import limits_in_words
 from tolstat.common.shown import table
 from tolstat.common.tables import Status, Variant
@@ -35,7 +35,7 @@ from tolstat.store.result_file import (
     text,
 )
 from tolstat.store.view import View
-from tolstat.study.points import names_of
+from tolstat.study.points import only_one
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,10 +181,7 @@ class Reader(CheckedTables):
         InputError
             When there is no such point.
         """
-        if point not in self.points:
-            names_of(point, list(self.points), str(self.path))
-            remedy = f"give one of them: --point {next(iter(self.points))}"
-            raise InputError([Fault(str(self.path), f"{point or 'no name'!r} is no single operating point", remedy)])
+        only_one(point, list(self.points), str(self.path))
         found = copy(self)
         for kept in ("_parts", "loads"):
             found.__dict__.pop(kept, None)

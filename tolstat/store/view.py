@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,12 +16,13 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS, limits_in_words, load_of, split
+from tolstat.common.loads import BUSHING_LOADS, LOADS, limits_in_words, load_of, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import ERROR, FAILED, RESULT, UNSETTLED, VALID, Status
-from tolstat.store import verification, worst
+from tolstat.common.tables import ERROR, Status
+from tolstat.store import first_pass, verification, worst
 from tolstat.store.counts import Counts
+from tolstat.store.first_pass import FirstPass
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
 from tolstat.store.sample_load import SampleLoad, frozen
@@ -42,29 +43,6 @@ METHODS = {
 }
 DRAWN = ("random", "sobol", "lhs")
 """Sampling methods that draw every joint from the tolerances, all with the same weight."""
-MAX_LISTED = 12
-"""Number of joints without a valid load whose complete results are kept."""
-
-
-class _FirstPass(NamedTuple):
-    """What is kept of the results after one pass over them.
-
-    Attributes
-    ----------
-    results : ndarray, shape (n,)
-        Fields `LOAD_FIELDS` of the samples.
-    nominal : ndarray of RESULT, shape (1,) or (0,)
-        The nominal joint, if the file has one and its results are valid.
-    without_load : ndarray of RESULT, shape (m,)
-        The first `MAX_LISTED` joints that failed or did not settle.
-    mode_share : ndarray, shape (4, 4)
-        Weighted mean over the valid joints; NaN if none is valid or the study does not keep it.
-    """
-
-    results: NDArray[np.void]
-    nominal: NDArray[np.void]
-    without_load: NDArray[np.void]
-    mode_share: FloatArray
 
 
 class View:
@@ -191,7 +169,7 @@ class View:
 
     @property
     def first_without_load(self) -> NDArray[np.void]:
-        """Complete results of the first `MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
+        """Complete results of the first `first_pass.MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
         return self._tables.without_load
 
     @property
@@ -200,38 +178,10 @@ class View:
         return self._tables.mode_share
 
     @cached_property
-    def _tables(self) -> _FirstPass:
+    def _tables(self) -> FirstPass:
         if len(self.parts) > 1:
-            return self._worst()
-        skip, store = self.store.first_sample, self.store
-        nominal = np.empty(0, RESULT)
-        results = np.empty(self.n, [(name, RESULT[name]) for name in LOAD_FIELDS])
-        kept, total, shares = [np.empty(0, RESULT)], 0.0, np.zeros((4, 4))
-        for first in range(0, store.n, BLOCK):
-            block = store.results(slice(first, first + BLOCK))
-            if first == 0 and skip:
-                nominal, block = block[:1][np.isin(block["status"][:1], VALID)].copy(), block[1:]
-            begin = max(0, first - skip)
-            for name in LOAD_FIELDS:
-                results[name][begin : begin + len(block)] = block[name]
-            if sum(map(len, kept)) < MAX_LISTED:
-                kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:MAX_LISTED])
-            valid = np.isin(block["status"], VALID)
-            weight = np.ones(len(block)) if self.weights is None else self.weights[begin : begin + len(block)]
-            shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
-            total += float(weight[valid].sum())
-        mean = shares / total if total else np.full((4, 4), np.nan)
-        return _FirstPass(frozen(results), frozen(nominal), frozen(np.concatenate(kept)[:MAX_LISTED]), frozen(mean))
-
-    def _worst(self) -> _FirstPass:
-        results = frozen(worst.together([part.results for part in self.parts]))
-        nominal = frozen(worst.nominal([part.nominal for part in self.parts]))
-        samples = np.flatnonzero(np.isin(results["status"], (*FAILED, *UNSETTLED)))[:MAX_LISTED]
-        point = worst.deciding([part.status[samples] for part in self.parts])
-        without = [np.empty(0, RESULT)]
-        for slot, number in zip(self.slots(samples).tolist(), point.tolist(), strict=True):
-            without.append(self.parts[number].store.results(slice(slot, slot + 1)))
-        return _FirstPass(results, nominal, frozen(np.concatenate(without)), np.full((4, 4), np.nan))
+            return first_pass.of_points([part._tables for part in self.parts], [part.store for part in self.parts])
+        return first_pass.read(self.store, self.weights)
 
     def load(self, name: str) -> SampleLoad:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.

@@ -34,6 +34,13 @@ class Point(NamedTuple):
     operation: Operation
     share: float = math.nan
 
+    @property
+    def in_words(self) -> str:
+        """``"10 deg, 500 rpm, 100 N m"``, and the share of the time if it is given of several points."""
+        own = self.operation
+        said = f"{math.degrees(own.alpha):.4g} deg, {own.speed * 30 / math.pi:.4g} rpm, {own.torque:.4g} N m"
+        return f"{said}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else said
+
     def values(self) -> dict[str, Any]:
         """JSON values: ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``share`` or null."""
         return self.operation.model_dump() | {"share": None if math.isnan(self.share) else self.share}
@@ -133,6 +140,20 @@ def names_of(selection: str, names: Sequence[str], place: str) -> tuple[str, ...
     if unknown:
         raise InputError([Fault(place, f"no operating point {n!r}", did_you_mean(n, list(names))) for n in unknown])
     return tuple(name for name in names if name in wanted)
+
+
+def only_one(name: str, names: Sequence[str], place: str) -> None:
+    """Refuse what is not the name of one point.
+
+    Raises
+    ------
+    InputError
+        When there is no such point, or `name` selects several.
+    """
+    if name not in names:
+        names_of(name, names, place)
+        found = f"{name!r} is no single operating point" if name else "has several operating points"
+        raise InputError([Fault(place, found, f"give one of them: --point {names[0]}")])
 
 
 def joined(chosen: Iterable[str], names: Sequence[str]) -> str:

@@ -24,7 +24,7 @@ from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
-from tolstat.study.points import Point, limits_at, names_of
+from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.proposal import Proposal
 from tolstat.study.swept import Swept
 from tolstat.study.tolerances.correlation import Copula
@@ -79,7 +79,7 @@ class Case:
 
     def _entries(self) -> list[tuple[str, object]]:
         """Named values that a notebook shows."""
-        solver, turned = self.solver, _in_words(self.operation)
+        solver, turned = self.solver, Point("", self.operation).in_words
         words = f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution"
         errors = ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none"
         return [("file", str(self.path)), ("operation", turned), ("solver", words), ("fixed errors, SI", errors)]
@@ -156,20 +156,6 @@ class Study(Case):
         """Numerical settings of each of `joints`."""
         return self.listed.solvers if self.listed else (self.solver,) * len(self.joints)
 
-    def at_one(self, name: str | None) -> Study:
-        """Return the study at the operating point asked for, or at its only one.
-
-        Raises
-        ------
-        InputError
-            When there is no such point, or several and none is asked for.
-        """
-        if name is None and len(self.points) > 1:
-            names = ", ".join(point.name for point in self.points)
-            found, remedy = f"has several operating points: {names}", f"give one: --point {self.points[0].name}"
-            raise InputError([Fault(f"{self.path}: operation", found, remedy)])
-        return self.at(name or "")
-
     @property
     def operations(self) -> tuple[Operation, ...]:
         """Operating point of each of `joints`."""
@@ -181,11 +167,10 @@ class Study(Case):
         Raises
         ------
         InputError
-            When there is no such point.
+            When there is no such point, or several and no name.
         """
         names = [point.name for point in self.points]
-        if name not in names:
-            names_of(name or "+", names, f"{self.path}: operation")
+        only_one(name, names, f"{self.path}: operation")
         own = self.points[names.index(name)]
         limits = limits_at(self.limits, [own.name], names)
         return replace(self, operation=own.operation, points=(Point("", own.operation, 1.0),), limits=limits)
@@ -249,7 +234,7 @@ class Study(Case):
     def _entries(self) -> list[tuple[str, object]]:
         sampling = f"{self.sampling.method}, {self.samples} joints, seed {self.sampling.seed}"
         toleranced = ("toleranced", ", ".join(self.tolerances) or "none")
-        named = [(f"operation {point.name}", _in_words(point.operation)) for point in self.points if point.name]
+        named = [(f"operation {point.name}", point.in_words) for point in self.points if point.name]
         entries = [entry for entry in super()._entries() if not named or entry[0] != "operation"]
         return [*entries, *named, ("sampling", sampling), toleranced, ("limits", limits_in_words(self.limits))]
 
@@ -283,10 +268,6 @@ class Study(Case):
     def _operation_identity(self) -> dict[str, Any]:
         named = {point.name: point.operation.model_dump() for point in self.points}
         return named.get("", named)
-
-
-def _in_words(point: Operation) -> str:
-    return f"{math.degrees(point.alpha):.4g} deg, {point.speed * 30 / math.pi:.4g} rpm, {point.torque:.4g} N m"
 
 
 def load_case(path: str | Path) -> Case:

@@ -47,6 +47,9 @@ def sections(view: View, asked: Asked) -> list[Section]:
     ]
     blocks += [Panels(panels)] if panels else []
     blocks += [Text(_note(view), small=True), _quantiles(view)]
+    points = query.at_points(view)
+    if len(points):
+        blocks.append(as_block(rendering.AT_POINTS.capitalize(), rendering.at_points(view), points))
     if view.limits and view.sampled and view.numerical_error:
         title = "What makes the shares above limits uncertain, in per cent of the joints"
         blocks.append(as_block(title, rendering.BUDGET, query.limits(view)))

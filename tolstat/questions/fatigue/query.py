@@ -15,6 +15,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.shown import shown
 from tolstat.common.tables import CHANNELS, ERROR_FIELDS, Status
 from tolstat.questions.fatigue.counting import cycles_of
+from tolstat.store import worst
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
@@ -36,7 +37,7 @@ class Loading:
     cycles : Cycles
         Cycles of the n samples.
     status : ndarray, shape (n,)
-        `tables.Status`; with several operating points the first that is not ``OK``.
+        `tables.Status`; with several operating points the worst, see `store.worst.deciding`.
     nominal : Cycles
         Cycles of the nominal joint; no rows if there is none that settled.
     iid : bool
@@ -103,13 +104,11 @@ def load_cycles(
     parts = [_cycles_of(view, names, samples) for view in views]
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
-    status = first.status[:samples]
-    for view in views[1:]:
-        status = np.where(status == Status.OK, view.status[:samples], status)
+    status = [view.status[:samples] for view in views]
     return Loading(
         name=name,
         cycles=cycles.duty_cycle([own for own, _ in parts], shares),
-        status=status,
+        status=np.choose(worst.deciding(status), status),
         nominal=cycles.duty_cycle([_rows(nominal, rows) for _, nominal in parts], shares),
         iid=first.iid,
         # the section alone, like limits: it is at hand even where the study refers to files that are not

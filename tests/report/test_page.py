@@ -255,7 +255,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
     assert "wrote" in done.stderr
-    _, out, accepted, again, _ = calls[0]
+    _, out, accepted, again, _, _ = calls[0]
     assert (str(out), again) == (asked[0], asked[2])
     assert accepted == pytest.approx(asked[1])
 

@@ -229,12 +229,12 @@ class StudyFile:
             with gather(self._faults):
                 pattern, where = split(entry.pattern)
                 found = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LOAD, self.place)
-                if not every:
-                    continue  # the points have faults of their own
-                chosen = points.names_of(where, every, f"{self.place}: {strict.dotted(entry.path)}")
-                names = [points.at(name, chosen, every) for name in found]
-                claims.claim(entry, names)
                 value = selection.quantity(entry, UNIT_OF_LOAD[found[0]], self.place)
+                names = found
+                if every:  # if not, the points have faults of their own
+                    chosen = points.names_of(where, every, f"{self.place}: {strict.dotted(entry.path)}")
+                    names = [points.at(name, chosen, every) for name in found]
+                claims.claim(entry, names)
                 if value <= 0:
                     self._fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")
                 limits |= dict.fromkeys(names, value)

@@ -376,7 +376,7 @@ def test_real_joints_give_the_same_bytes(tmp_path: Path, kind: str) -> None:
     with Reader.open(tmp_path / "a.h5") as store:
         # A row can be run again from the file alone, in any company.
         again = simulation.simulate_rows(
-            joint.perturb(plan.joint, store.errors()[[4, 2]]),
+            joint.perturb(plan.joint, plan.operation, store.errors()[[4, 2]]),
             plan.solver.options(),
             kind,
             plan.output.harmonics,

@@ -29,6 +29,7 @@ from tolstat.campaign.blocks import MAX_BLOCK, Execution, Pace, without_simulati
 from tolstat.campaign.retry import Retry, parse
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status
+from tolstat.joint import Operation
 from tolstat.store import Counts, Reader
 from tolstat.study.model import Solver
 
@@ -85,8 +86,8 @@ def test_parameters_that_are_no_numbers_are_not_simulated(
     assert_same_but(path, expected, bad.tolist())
 
 
-def perturb_badly(joint: object, errors: np.ndarray) -> np.ndarray:
-    params = fakes.perturb(joint, errors)
+def perturb_badly(joint: object, operation: Operation, errors: np.ndarray) -> np.ndarray:
+    params = fakes.perturb(joint, operation, errors)
     params["pin_axis"][errors["operation.alpha"] > 1.5, 2, 1] = np.inf
     return params
 

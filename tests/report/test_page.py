@@ -26,8 +26,8 @@ from tolstat.report import headline as verdict
 from tolstat.report import html as writer
 from tolstat.report import page
 from tolstat.store import Reader, revolutions
+from tolstat.store.first_pass import MAX_LISTED
 from tolstat.store.recall import recall
-from tolstat.store.view import MAX_LISTED
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
 TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
@@ -327,7 +327,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
     assert "wrote" in done.stderr
-    _, out, accepted, again, _ = calls[0]
+    _, out, accepted, again, _, _ = calls[0]
     assert (str(out), again) == (asked[0], asked[2])
     assert accepted == pytest.approx(asked[1])
 

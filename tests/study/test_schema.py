@@ -148,6 +148,15 @@ def test_every_vector_of_a_zone_can_be_shifted() -> None:
         assert not VALIDATORS["study"].is_valid({**tomllib.loads(GOOD), "proposal": [wrong]})
 
 
+def test_several_operating_points_are_accepted_in_a_study_only() -> None:
+    points = GOOD.replace("[operation]", '[[operation]]\nname = "cruise"\nshare = "60 %"')
+    points = points.replace('"cross*.F" =', '"cross*.F at cruise" =')
+    VALIDATORS["study"].validate(tomllib.loads(points))
+    assert not VALIDATORS["study"].is_valid(tomllib.loads(points.replace("name =", "nmae =")))
+    assert not VALIDATORS["study"].is_valid(tomllib.loads(points.replace("F at cruise", "G at cruise")))
+    assert not VALIDATORS["case"].is_valid(tomllib.loads(points.partition("[tolerances]")[0]))
+
+
 @pytest.mark.parametrize(("old", "new"), BROKEN)
 def test_broken_studies_are_refused(old: str, new: str) -> None:
     assert old in GOOD

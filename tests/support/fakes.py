@@ -10,7 +10,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,8 +34,10 @@ from tolstat.common.tables import (
     Simulation,
     Status,
 )
+from tolstat.joint import Operation
 from tolstat.solver import stationary
 from tolstat.study.model import Sampling
+from tolstat.study.points import Point
 
 SPECS = {
     "loads": HistorySpec((30, 8, 6), "f4", "N, N*m", "bushing loads"),
@@ -99,6 +101,22 @@ class Study:
     variants: tuple[()] = ()
     case_names: tuple[()] = ()
     joint: Dump = field(default_factory=lambda: Dump(material=Dump(E="2.1e11 Pa")))
+    points: tuple[Point, ...] = (Point("", Operation.model_construct(alpha=0.0, speed=1.0, torque=1.0), 1.0),)
+
+    @property
+    def operation(self) -> Operation:
+        """The first operating point."""
+        return self.points[0].operation
+
+    @property
+    def operations(self) -> tuple[Operation, ...]:
+        """Operating point of the only joint."""
+        return (self.operation,)
+
+    def at(self, name: str) -> Study:
+        """Return the study at one of its points."""
+        own = next(point for point in self.points if point.name == name)
+        return replace(self, points=(own._replace(name=""),))
 
     @property
     def sampling(self) -> Sampling:
@@ -153,9 +171,9 @@ def draw_blocks(study: Study, rows: range) -> Iterator[np.ndarray]:
     yield draw(study)[rows.start : rows.stop]
 
 
-def perturb(joint: Any, errors: np.ndarray) -> np.ndarray:
+def perturb(joint: Any, operation: Operation, errors: np.ndarray) -> np.ndarray:
     params = np.zeros(len(errors), PARAM)
-    params["alpha"] = errors["operation.alpha"]
+    params["alpha"] = operation.alpha + errors["operation.alpha"]
     params["R"] = errors["pin1.offset_t"]
     return params
 

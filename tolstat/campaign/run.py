@@ -139,16 +139,18 @@ def run(
             finished = simulate_pending(study, store, last, stages, execution, stop)
             with stop.deferred(), closing(finished):
                 for done in finished:
-                    store.write(done.slots, done.simulation)
+                    store.at(done.point).write(done.slots, done.simulation)
                     counts = counts.after(done.simulation.results["status"])
                     if done.trouble:
                         status = Status(done.simulation.results["status"][0])
-                        tell(f"row {store.rows[done.slots[0]]}: {status.label}: {done.trouble}")
+                        place = f"row {store.rows[done.slots[0]]}" + (f" at {done.point}" if done.point else "")
+                        tell(f"{place}: {status.label}: {done.trouble}")
                     if progress:
                         progress(counts)
             if check:
                 stage("check of the numerical error")
-                verify.check_few(store, partial(_rows_of, study, store, stages), stages.simulate)
+                for one in store.each():
+                    verify.check_few(one, partial(_rows_of, study.at(one.point or ""), one, stages), stages.simulate)
             store.finish()
             store.end_session()
         except KeyboardInterrupt:
@@ -226,7 +228,8 @@ def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any
     stages.warm_up()
     rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
     errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
-    params = perturbed(study, rows, errors, stages.perturb)
+    each = [perturbed(study.at(point.name), rows, errors, stages.perturb) for point in study.points]
+    params = np.concatenate(each)  # one choice for all points
     simulate = partial(stages.simulate, histories="none", n_harmonics=0)
     budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
     return fidelity.choose(params, study.solver.options(), budget, study.asked, simulate, min_steps).record

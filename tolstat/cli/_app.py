@@ -104,6 +104,24 @@ ByMany = Annotated[
     list[str] | None,
     typer.Option("--by", metavar="LOAD", help="Load, such as cross1.F; repeatable; default: loads with limits."),
 ]
+AtPoints = Annotated[
+    str | None,
+    typer.Option(
+        "--point",
+        metavar="POINT",
+        help="Operating point, such as cruise, or the worst of some: cruise+start; default: the worst of all.",
+    ),
+]
+AtPoint = Annotated[
+    str | None,
+    typer.Option("--point", metavar="POINT", help="Operating point, such as cruise; needed if FILE has several."),
+]
+AtOne = Annotated[
+    str | None,
+    typer.Option(
+        "--point", metavar="POINT", help="Operating point of STUDY, such as cruise; needed if it has several."
+    ),
+]
 Accept = Annotated[
     str | None,
     typer.Option(

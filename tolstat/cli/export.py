@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import Accept, ResultFile, as_text, output_file, parse_share
+from tolstat.cli._app import Accept, AtPoints, ResultFile, as_text, output_file, parse_share
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from tolstat.store import Reader
     from tolstat.store.view import View
 
 
@@ -58,6 +57,7 @@ def export(
         bool,
         typer.Option("--nominal", help="Include the joint without errors, marked by a column."),
     ] = False,
+    point: AtPoints = None,
 ) -> None:
     """Export joints, load cycles or statistics to files.
 
@@ -69,6 +69,8 @@ def export(
     --parquet writes the same columns; pandas has their units in frame.attrs["units"].
 
     --xlsx writes three sheets: the same columns, the share above each limit, the unit and meaning of each column.
+
+    If the study has several operating points, --statistics is of the worst of them, and the other files need --point.
 
     --statistics writes the verdict, the share above each limit, quantiles, capability, the numerical error and the
     versions.
@@ -102,13 +104,15 @@ def export(
     for target in targets:
         if target != "-":
             check_target(Path(target), file)
-    with progress("reading the file"), Reader.open(file) as store:
+    with progress("reading the file"), Reader.open(file) as opened:
+        view = opened.view().at(point or "")
+        store = view.store
         if workbook is not None:
             excel.check(store, "--xlsx")
         if cycles is not None:
-            _write(cycles, *_collectives(store.view(), nominal))
+            _write(cycles, *_collectives(view, nominal))
         if statistics is not None:
-            _write(statistics, *_statistics(store, by or (), accepted))
+            _write(statistics, *_statistics(view, by or (), accepted))
         if out is None and parquet is None and workbook is None:
             return
         frame = store.to_pandas(nominal)
@@ -142,12 +146,11 @@ def _collectives(view: View, nominal: bool) -> tuple[Callable[[TextIO], None], s
     return lambda stream: table.to_csv(stream, index=False, lineterminator="\n"), what
 
 
-def _statistics(store: Reader, by: Sequence[str], accepted: float) -> tuple[Callable[[TextIO], object], str]:
+def _statistics(view: View, by: Sequence[str], accepted: float) -> tuple[Callable[[TextIO], object], str]:
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
     from tolstat.report import summary
 
-    view = store.view()
     found = summary.statistics(view, accepted=accepted)
     found["causes"] = {load: rendering.values(causes_of(view, load)) for load in by}
     return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"

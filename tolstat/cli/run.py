@@ -182,7 +182,10 @@ def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) 
     except WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
-    say(f"{path}: {counts.done} joints, {counts.shortfall}")
+    done = f"{counts.done} joints"
+    if len(plan.points) > 1:
+        done = f"{counts.done} simulations of joints at {len(plan.points)} operating points"
+    say(f"{path}: {done}, {counts.shortfall}")
 
 
 def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None:
@@ -200,12 +203,11 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
             made = build(path, None, width_of(wide), shown.stage)
         tell(made)
     with Reader.open(path) as store:
-        found = reasons(store, store.status())
+        found = reasons(store, {one.point or "": one.status() for one in store.each()})
         for reason in found:
             say(reason.text)
-        for reason in found:
-            if reason.retry:
-                say(f"again: tolstat run {study} --out {path} {reason.retry}")
+        for retry in dict.fromkeys(reason.retry for reason in found if reason.retry):
+            say(f"again: tolstat run {study} --out {path} {retry}")
         say(f"next: {_next(store, path)}")
 
 

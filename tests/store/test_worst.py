@@ -7,7 +7,7 @@ from tests.support import synthetic, views
 from tolstat.common.tables import Status
 from tolstat.questions.causes.tail import worst_joints
 from tolstat.questions.exceedance.query import at_points, limits
-from tolstat.questions.fatigue.query import revolutions_at
+from tolstat.questions.fatigue.duty import revolutions_at
 from tolstat.store import worst
 
 

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -44,15 +45,17 @@ STAGES = campaign.Stages(
 )
 
 
+def small(folder: Path, n: int, method: str = "random", kind: str = "none", seed: int = 2021) -> Study:
+    """Write ``small.toml``, a study of n joints, and load it."""
+    path = folder / "small.toml"
+    body = BODY.replace("n = 60", f'n = {n}\nmethod = "{method}"').replace("KIND", kind)
+    path.write_text(body.replace("seed = 2021", f"seed = {seed}"), encoding="utf-8")
+    return studies.load(path)
+
+
 @pytest.fixture
 def make(tmp_path: Path) -> Make:
-    def made(n: int, method: str = "random", kind: str = "none", seed: int = 2021) -> Study:
-        path = tmp_path / "small.toml"
-        body = BODY.replace("n = 60", f'n = {n}\nmethod = "{method}"').replace("KIND", kind)
-        path.write_text(body.replace("seed = 2021", f"seed = {seed}"), encoding="utf-8")
-        return studies.load(path)
-
-    return made
+    return partial(small, tmp_path)
 
 
 def run(study: Study, path: Path, check: bool = False, **choices: object) -> Path:

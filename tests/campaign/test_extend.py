@@ -59,8 +59,8 @@ def make(tmp_path: Path) -> Make:
 
 
 def run(study: Study, path: Path, check: bool = False, **choices: object) -> Path:
-    """Without checks of the numerical error, which slices and what is put together of them do not have."""
-    campaign.run(study, path, 1, stages=STAGES, check=check, **choices)
+    """Run in one block without checks of the numerical error, which merged slices do not have."""
+    campaign.run(study, path, 1, 1000, stages=STAGES, check=check, **choices)
     return path
 
 

@@ -100,7 +100,7 @@ def load(folder, text=PLAN, name="plan"):
 
 def asked(plan, beta=2.5, **more):
     above = 700.0 + 100.0 * beta
-    question = {"load": "cross1.F", "above": above, "per_level": 100, "p0": 0.5}
+    question = {"load": "cross1.F", "above": above, "per_level": 100, "p0": 0.2}
     return study.subset_of(plan, question | more)
 
 

@@ -215,8 +215,8 @@ def stages(simulate: Any = simulate) -> Stages:
     return Stages(draw_blocks, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up)
 
 
-def run(study: Study, path: Path, workers: int = 1, block: int | None = None, **choices: Any) -> Counts:
-    """Run a campaign with these stages, without the check of the numerical error."""
+def run(study: Study, path: Path, workers: int = 1, block: int | None = 1000, **choices: Any) -> Counts:
+    """Run a campaign with these stages, in one block, without the check of the numerical error."""
     return campaign.run(study, path, workers, block, **({"stages": stages(), "check": False} | choices))
 
 

@@ -69,7 +69,7 @@ def slices(study: Study, folder: Path, *edges: int) -> list[Path]:
     return [run(study, folder / f"{a}-{b}.h5", rows=range(a, b)) for a, b in pairwise(edges)]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [pytest.param("none", marks=pytest.mark.slow), "full"])
 @pytest.mark.parametrize("method", ["random", pytest.param("sobol", marks=pytest.mark.slow)])
 def test_an_extended_campaign_is_one_of_that_size(tmp_path: Path, make: Make, method: str, kind: str) -> None:
     whole = run(make(101, method, kind), tmp_path / "whole.h5")

@@ -260,6 +260,7 @@ def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, 
     assert CliRunner().invoke(app, ["rare", str(path), "--n", "300"]).exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
     plan, found, path = whole
     monkeypatch.setattr(campaign, "versions", lambda: dict.fromkeys(("tolstat", "sources"), "other"))

@@ -86,7 +86,6 @@ def test_kinetic_energy_is_that_of_particles(params, random_errors):
     assert measured(par, t, q, 1.001 * v)["kinetic"] != pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("law", FROM_COEFFICIENTS)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_powers_are_the_rate_of_the_stored_energy(params, random_errors, law, seed):

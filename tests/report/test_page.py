@@ -117,7 +117,7 @@ def test_every_picture_has_a_title_and_a_description(html):
             assert re.search(rf'id="{name}">[^<]{{10,}}<', html), name
 
 
-@pytest.mark.parametrize("replay", [0, 100])
+@pytest.mark.parametrize("replay", [pytest.param(0, marks=pytest.mark.slow), 100])
 def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypatch, replay):
     """Reads of each dataset, in rows; joints that the page draws over the revolution are simulated again."""
     read, plain = Counter(), Reader.column

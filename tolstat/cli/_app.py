@@ -186,8 +186,10 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
         for name, annotation, default in added
     ]
-    run.__signature__ = own.replace(parameters=[*own.parameters.values(), *parameters])  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
+    signature = own.replace(parameters=[*own.parameters.values(), *parameters])
+    decorated: Any = run
+    decorated.__signature__ = signature
+    decorated.__annotations__ = {p.name: p.annotation for p in signature.parameters.values()}
     return run
 
 

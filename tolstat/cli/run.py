@@ -106,20 +106,14 @@ def run(
     from tolstat.campaign.blocks import Execution
     from tolstat.campaign.retry import parse
 
-    faults: list[Fault] = []
     limit, part, again = 0.0, None, None
+    faults = _cannot_be_combined(rows, until, retry, settings)
+    if scheduler is not None and executor is not Executor.DASK:
+        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     with gather(faults):
         limit = parse_time(joint_timeout)
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
-    if rows is not None and until is not None:
-        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
-    if until is not None and retry is not None:
-        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
-    if scheduler is not None and executor is not Executor.DASK:
-        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
-    if settings and retry is None:
-        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
     with gather(faults):
         plan = study.load(study_file, n=n)
         again = None if retry is None else parse(retry, settings or (), plan)
@@ -134,6 +128,19 @@ def run(
     else:
         simulate(plan, path, until, execution=execution, check=verify)
     conclude(path, report, wide, str(study_file))
+
+
+def _cannot_be_combined(
+    rows: str | None, until: str | None, retry: str | None, settings: list[str] | None
+) -> list[Fault]:
+    faults = []
+    if rows is not None and until is not None:
+        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
+    if until is not None and retry is not None:
+        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
+    if settings and retry is None:
+        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
+    return faults
 
 
 def parse_time(text: str, option: str = "--joint-timeout") -> float:

@@ -316,7 +316,7 @@ from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.revolution import simulate
 from tolstat.common.tables import KERNEL_RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
-par = joint.perturb(joint.load("cirelli2021", {}, "test", None), joint.nominal_errors(1))
+par = joint.perturb(joint.load("cirelli2021", {}, "test", None), operation, joint.nominal_errors(1))
 par = par.view(np.recarray)
 """
 

@@ -56,7 +56,7 @@ def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=Non
     limits = {"cross1.F": 700.0} if limits is None else limits
     errors = synthetic.errors(n)
     if alpha is not None:
-        errors["operation.alpha"] = alpha
+        errors["operation.alpha"] = alpha - OPERATION.alpha
     made = View(FakeStore(method, limits, errors, results, columns=columns, joint=joint))
     made.verification, made.altered = None, {}
     return made

@@ -236,7 +236,7 @@ def test_any_clearance_starts(params, clearance):
         {"pin2__diameter": 3e-4},
         {"operation__alpha": np.pi / 2},
         {"operation__alpha": 2.0},
-        {"operation__speed": 0.0},
+        {"speed": 0.0},
         {"operation__torque": np.nan},
         {"material__E_factor": 0.0},
         {"material__E_factor": -0.5},

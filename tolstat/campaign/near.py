@@ -14,9 +14,9 @@ from tolstat.campaign import verify
 from tolstat.campaign.verify import QUICK_CHECKS, Progress, no_progress
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import LOADS, Limit
+from tolstat.common.loads import LOADS, Limit, load_of, split
 from tolstat.common.tables import Status
-from tolstat.store import Reader, ResultStore, recorded, verification
+from tolstat.store import Reader, ResultStore, recorded, verification, worst
 from tolstat.store.verification import Check, Verification
 from tolstat.study import rule
 
@@ -30,7 +30,10 @@ def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
     settled = results["status"] == Status.OK
     found: set[int] = set()
     for name, level in zip(limit.loads, limit.levels, strict=True):
-        distance = np.where(settled, np.abs(LOADS[name].of(results) - level), np.inf)
+        plain, points = split(name)
+        if points and store.point not in points.split("+"):
+            continue
+        distance = np.where(settled, np.abs(LOADS[plain].of(results) - level), np.inf)
         order = np.argsort(distance, kind="stable")[:joints]
         found |= set(slots[order[np.isfinite(distance[order])]].tolist())
     return np.array(sorted(found), dtype=np.intp)
@@ -78,25 +81,28 @@ def check_near(
         raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
     with ResultStore.open_to_write(path) as store:
         limit = rule.limit_of(text, store.limits, "--near", EXAMPLE)
-        lacking = [name for name in limit.loads if not selected_results.holds(store.columns, name)]
+        lacking = [name for name in limit.loads if not selected_results.holds(store.columns, load_of(name).name)]
         if lacking:
             remedy = "give loads that it keeps, see tolstat status"
             raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
         verify.check_version(store)
-        slots = nearest(store, limit, number)
-        if slots.size < LEAST_NEAR:
-            found = f"has {slots.size} settled joints; {LEAST_NEAR} are needed"
+        chosen = [nearest(one, limit, number) for one in store.each()]
+        fewest = min(slots.size for slots in chosen if slots.size) if any(slots.size for slots in chosen) else 0
+        if fewest < LEAST_NEAR:
+            found = f"has {fewest} settled joints; {LEAST_NEAR} are needed"
             raise StoreError(str(Fault(str(path), found, f"add joints: tolstat extend {path}")))
-        before = verification.read(store, verification.NEAR)
-        new = slots if before is None else slots[~np.isin(store.row(slots), before.rows)]
-        if new.size:
-            on_start()
-            params = partial(recorded.parameters, store)
-            made = verify.check_slots(store, params, new, names, workers=workers, progress=progress)
-            before = made if before is None else _merged(before, made)
-            verification.write(store, before, verification.NEAR)
-    assert before is not None
-    return before
+        on_start()
+        for one, slots in zip(store.each(), chosen, strict=True):
+            before = verification.read(one, verification.NEAR)
+            new = slots if before is None else slots[~np.isin(one.row(slots), before.rows)]
+            if new.size:
+                params = partial(recorded.parameters, one)
+                made = verify.check_slots(one, params, new, names, workers=workers, progress=progress)
+                verification.write(one, made if before is None else _merged(before, made), verification.NEAR)
+        held = [verification.read(one, verification.NEAR) for one in store.each()]
+        checked = worst.checks([one for one in held if one is not None])
+    assert checked is not None
+    return checked
 
 
 def _merged(one: Verification, other: Verification) -> Verification:

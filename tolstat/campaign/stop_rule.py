@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tolstat.analysis import exceedance, sequential
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import LOADS, Limit
-from tolstat.store import Reader, ResultStore
+from tolstat.common.loads import Limit, load_of
+from tolstat.store import Reader, ResultStore, worst
 from tolstat.store.result_file import BLOCK
 from tolstat.study import rule as rules
 
@@ -117,7 +117,7 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
         own = study.sampling.method
         found = f"sampling.method is {own!r}: its interval needs independent samples of equal weight"
         raise InputError([Fault("--until", found, 'write sampling.method = "random" in the study')])
-    for load in (LOADS[name] for name in rule.limit.loads):
+    for load in map(load_of, rule.limit.loads):
         if not selected_results.holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"
             raise InputError([study.fault("output.results", f"leaves out {load.name}, which --until needs", remedy)])
@@ -153,8 +153,8 @@ def _look(store: Reader, limit: Limit, rows: range, scheme: sequential.Scheme, n
     count = unresolved = 0
     for begin in range(0, len(rows), BLOCK):
         block = rows[begin : begin + BLOCK]
-        results = store.results(slice(block.start, block.stop))
-        part = exceedance.exceedance(limit.of(results), results["status"], limit.level, iid=False)
+        parts = {one.point or "": one.results(slice(block.start, block.stop)) for one in store.each()}
+        part = exceedance.exceedance(*worst.limit_of(parts, limit), limit.level, iid=False)
         count += part.count
         unresolved += part.n_failed + part.n_unsettled
     ends = scheme.interval(number, count, unresolved)

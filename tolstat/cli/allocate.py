@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.cli._app import AsJson, Delivery, ResultFile, StudyOption, Wide, as_text, output_file, print_table
+from tolstat.cli._app import (
+    AsJson,
+    AtPoints,
+    Delivery,
+    ResultFile,
+    StudyOption,
+    Wide,
+    as_text,
+    output_file,
+    print_table,
+)
 from tolstat.cli._talk import progress, say
 
 
@@ -44,6 +54,7 @@ def allocate(
         typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the proposed tolerances."),
     ] = None,
     delivery: Delivery = DELIVERY,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -69,7 +80,7 @@ def allocate(
     if out is not None:
         check_target(out, file)
     with progress("search for the cheapest tolerances"), Reader.open(file) as store:
-        found = allocated(store.view(study_file), target, costs, keep or (), delivery=delivery)
+        found = allocated(store.view(study_file).at(point or ""), target, costs, keep or (), delivery=delivery)
         unknown = "" if found.limits["numerical"].all() else error_budget.command(file)
     if out is not None:
         content = found.text

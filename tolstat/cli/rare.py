@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.cli._app import AsJson, Delivery, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
+from tolstat.cli._app import (
+    AsJson,
+    AtOne,
+    Delivery,
+    StudyOption,
+    Wide,
+    Workers,
+    announce_compilation,
+    as_text,
+    print_table,
+)
 from tolstat.cli._talk import fail, progress, say, wrapped
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import ANY_LIMIT
@@ -72,6 +82,7 @@ def rare(
         ),
     ] = None,
     delivery: Delivery = DELIVERY,
+    point: AtOne = None,
     study_file: StudyOption = None,
     workers: Workers = None,
     wide: Wide = False,
@@ -98,9 +109,9 @@ def rare(
     given = {"n": n, "p0": p0, "seed": seed, "unresolved": None if unresolved is None else unresolved.value}
     given = {name: value for name, value in given.items() if value is not None}
     if source.suffix == ".toml":
-        plan, path = _read_study(source, limit, given), out or Path(f"{source.stem}_rare.h5")
+        plan, path = _read_study(source, limit, point, given), out or Path(f"{source.stem}_rare.h5")
     else:
-        plan, path, repeats = _recall(source, study_file, [limit, out, repeats, *given.values()]), source, 1
+        plan, path, repeats = _recall(source, study_file, [limit, out, point, repeats, *given.values()]), source, 1
     announce_compilation()
     try:
         with progress("levels of the subset simulation") as shown:
@@ -124,7 +135,7 @@ def rare(
         _print_messages(one, path.with_name(f"{path.stem}_{k + 1}{path.suffix}") if k else path)
 
 
-def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
+def _read_study(source: Path, limit: str | None, point: str | None, given: dict[str, Any]) -> Study:
     from tolstat import study
     from tolstat.questions.rare.query import parse_limit, subset_study
 
@@ -136,7 +147,7 @@ def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study
             with gather(faults):
                 parse_limit(limit, {})
     with gather(faults):
-        plan = study.load(source)
+        plan = study.load(source).at(point or "")
     if faults or limit is None:
         raise InputError(faults)
     return subset_study(plan, limit, **given)

@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.cli._app import AsJson, Delivery, ResultFile, StudyOption, Wide, as_text, output_file, print_table
+from tolstat.cli._app import (
+    AsJson,
+    AtPoints,
+    Delivery,
+    ResultFile,
+    StudyOption,
+    Wide,
+    as_text,
+    output_file,
+    print_table,
+)
 from tolstat.cli._talk import progress, say
 
 
@@ -25,6 +35,7 @@ def reweight(
         typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the changed tolerances."),
     ] = None,
     delivery: Delivery = DELIVERY,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -49,8 +60,8 @@ def reweight(
     if out is not None:
         check_target(out, file)
     with progress("reweighting"), Reader.open(file) as store:
-        found = reweighted(store.view(study_file), settings, delivery=delivery)
-        unknown = error_budget.unknown(store.view(study_file))
+        view = store.view(study_file).at(point or "")
+        found, unknown = reweighted(view, settings, delivery=delivery), error_budget.unknown(view)
     if out is not None:
         with output_file(out) as temporary:
             temporary.write_text(found.text, encoding="utf-8")

@@ -48,8 +48,8 @@ def verify(
     the largest loads, relative to the largest load of the kind in the joint.
 
     Of a result file, checks settled joints and stores the checks in the file for the report. With --near, checks the
-    joints nearest to a limit, 50 for each load of it, without reference and other method: how far their loads change, and to which side, tells how far the
-    share above the limit moves. Intervals of all commands use it from then on.
+    joints nearest to a limit, 50 for each load of it, without another method and reference: how far their loads change,
+    and to which side, tells how far the share above the limit moves. Intervals of all commands use it from then on.
 
     Example: tolstat verify iso2768_f.h5 --joints 2 --out errors.csv
     """

@@ -16,6 +16,9 @@ from tolstat.common.tables import LOAD_KINDS, SPAN
 
 FloatArray = NDArray[np.float64]
 
+AT = " at "
+"""What stands between a load and the operating points that it is taken at: ``"cross1.F at cruise+start"``."""
+
 
 class Load(NamedTuple):
     """One load: its largest value over the revolution. Higher is worse for every load.
@@ -50,6 +53,17 @@ class Load(NamedTuple):
         return values * results[f"{self.kind}_lower"], values * results[f"{self.kind}_upper"]
 
 
+def split(name: str) -> tuple[str, str]:
+    """Load and operating points of a name: of ``"cross1.F at cruise"`` ``("cross1.F", "cruise")``; ``""`` are all."""
+    load, _, points = name.partition(AT)
+    return load, points
+
+
+def load_of(name: str) -> Load:
+    """Load that a name is about, whatever operating points it names."""
+    return LOADS[split(name)[0]]
+
+
 class Limit(NamedTuple):
     """Levels that loads may not exceed: of one load, of the largest of several, or all limits of a study together.
 
@@ -80,7 +94,7 @@ class Limit(NamedTuple):
     @property
     def unit(self) -> str:
         """SI unit of `level`."""
-        return UNIT_OF_LOAD[self.loads[0]] if self.has_one_level else "1"
+        return load_of(self.loads[0]).unit if self.has_one_level else "1"
 
     def __str__(self) -> str:
         """``cross*.F > 700 N``, or `ANY_LIMIT`."""
@@ -88,7 +102,7 @@ class Limit(NamedTuple):
 
     def of(self, results: NDArray[np.void]) -> FloatArray:
         """Largest of the loads in each joint, (n,), to be compared with `level`; NaN if any of them is."""
-        parts = [LOADS[name].of(results) for name in self.loads]
+        parts = [load_of(name).of(results) for name in self.loads]
         if not self.has_one_level:
             parts = [part / level for part, level in zip(parts, self.levels, strict=True)]
         return np.asarray(np.maximum.reduce(parts))
@@ -137,7 +151,7 @@ def limits_in_words(limits: Mapping[str, float]) -> str:
     """Limits by name, SI, as one text: loads of the same limit together."""
     loads: dict[str, list[str]] = {}
     for name, limit in limits.items():
-        loads.setdefault(f"{limit:g} {unit_text(UNIT_OF_LOAD[name])}".rstrip(), []).append(name)
+        loads.setdefault(f"{limit:g} {unit_text(load_of(name).unit)}".rstrip(), []).append(name)
     return "; ".join(f"{', '.join(names)}: {limit}" for limit, names in loads.items()) or "none"
 
 

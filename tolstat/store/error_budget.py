@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,8 @@ def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | Non
     error = relative(view, load.name)
     if np.isnan(error):
         return None
-    by = error * size(view.results, load.name) / load.scale
+    narrowed, name = view.narrowed(load.name)
+    by = error * size(narrowed.results, name) / load.scale
     return load.shifted(-by), load.shifted(by)
 
 
@@ -46,18 +48,30 @@ def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
     """
     if load.parts:
         return _together(load, [near(view, part) for part in load.parts])
-    if view.near is None or load.limit is None:
+    if load.limit is None:
+        return None
+    view, name = view.narrowed(load.name)
+    if len(view.parts) > 1:
+        return _together(load, [near(part, _at(part, name, load)) for part in view.parts])
+    if view.near is None:
         return None
     checks = {name: check.results for name, check in view.near.checks.items()}
     distance = np.abs(load.valid_or_nan - load.limit)
     nearest = view.rows(np.argsort(distance, kind="stable")[: 2 * LEAST_NEAR])
-    found = corrections(view.near.base, checks)[np.isin(view.near.rows, nearest), OBSERVABLES.index(load.name)]
+    found = corrections(view.near.base, checks)[np.isin(view.near.rows, nearest), OBSERVABLES.index(name)]
     found = found[np.isfinite(found)]
     if found.size < LEAST_NEAR:
         return None
-    sizes = np.nan_to_num(size(view.results, load.name) / load.scale)
+    sizes = np.nan_to_num(size(view.results, name) / load.scale)
     low, high = corrected(np.zeros(load.values.size), sizes, found)
     return load.shifted(low), load.shifted(high)
+
+
+def _at(part: View, name: str, load: SampleLoad) -> SampleLoad:
+    """A load at one operating point, with the limit, and as the ratio, of the load over several."""
+    assert load.limit is not None
+    own = replace(part.load(name), limit=load.limit * load.scale)
+    return own if load.scale == 1.0 else own.of_limit()
 
 
 def _together(
@@ -85,7 +99,8 @@ def command(path: Path, limit: str = ANY_LIMIT) -> str:
 
 def relative(view: View, name: str) -> float:
     """Numerical error of a load, relative to the largest load of its kind in the joint; NaN if unknown."""
-    return view.numerical_error.get(LOADS[name].kind, np.nan)
+    narrowed, plain = view.narrowed(name)
+    return narrowed.numerical_error.get(LOADS[plain].kind, np.nan)
 
 
 def total_interval(

@@ -66,10 +66,10 @@ class Verification(NamedTuple):
 
 def read(store: Reader, name: str = VERIFY) -> Verification | None:
     """Read the verification of a group from a result file; None if it holds none."""
-    file = store._file
-    if name not in file:
+    held = store._held()
+    if name not in held:
         return None
-    group = file[name]
+    group = held[name]
     rows = np.asarray(group["rows"][:], np.intp)
     checks = {}
     for check in text(group.attrs, "checks").split():
@@ -91,13 +91,14 @@ def write(store: ResultStore, verification: Verification, name: str = VERIFY) ->
     StoreError
         When there is no room for a second copy of the file.
     """
-    store._replace(lambda file: _write(file, name, verification, store.columns))
+    where = store._held().name
+    store._replace(lambda file: _write(file[where], name, verification, store.columns))
 
 
-def _write(file: h5py.File, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:
-    if place in file:
-        del file[place]
-    group = file.create_group(place)
+def _write(holder: h5py.Group, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:
+    if place in holder:
+        del holder[place]
+    group = holder.create_group(place)
     about = "joints of the campaign simulated again in other ways, to know its numerical error"
     names = " ".join(verification.checks)
     put_attributes(group, {"description": about, "seed": verification.seed, "checks": names})

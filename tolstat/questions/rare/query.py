@@ -144,6 +144,7 @@ def subset_study(
     InputError
         With every fault of limit and settings.
     """
+    study = study.at("")
     found = parse_limit(limit, study.limits)
     own = {} if seed is None else {"seed": seed}
     levels = dict(zip(found.loads, found.levels, strict=True))

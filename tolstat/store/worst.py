@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import KINDS, LOAD_FIELDS, FloatArray, Load
+from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
 from tolstat.store.verification import Verification
 
@@ -78,6 +78,26 @@ def load_of(
     values = np.maximum.reduce([load.of(part) for part in parts])
     lower, upper = (np.maximum.reduce(ends) for ends in zip(*(load.ends(part) for part in parts), strict=True))
     return values, np.choose(deciding(status), status), (lower, upper)
+
+
+def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
+    """Load of a limit, whose names may have operating points, over these: values, (n,), and the status of each joint.
+
+    Parameters
+    ----------
+    parts : mapping of str to (n,) tables
+        Results by operating point, with `LOAD_FIELDS` at least.
+    limit : Limit
+        The limit; its level is compared with the values.
+    """
+    found, states = [], []
+    for name, level in zip(limit.loads, limit.levels, strict=True):
+        where = split(name)[1]
+        chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
+        values, status, _ = load_of(chosen, LOADS[split(name)[0]])
+        found.append(values if limit.has_one_level else values / level)
+        states.append(status)
+    return np.maximum.reduce(found), np.choose(deciding(states), states)
 
 
 def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:

@@ -192,6 +192,8 @@ class View:
     def load(self, name: str) -> SampleLoad:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
 
+        Its limit is the one of that name or, without it, the one that holds at these points.
+
         Raises
         ------
         InputError
@@ -203,7 +205,8 @@ class View:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
             view, plain = self.narrowed(name)
             if view is not self:
-                self._loads[name] = replace(view.load(plain), name=name, limit=self.limits.get(name))
+                own = view.load(plain)
+                self._loads[name] = replace(own, name=name, limit=self.limits.get(name, own.limit))
                 return self._loads[name]
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])

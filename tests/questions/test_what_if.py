@@ -303,14 +303,17 @@ def test_command_and_page(path, monkeypatch):
     assert run("--each", "error").exit_code == 2
 
 
-TWO = TEXT.replace("[operation]", '[[operation]]\nname = "cruise"').replace("[tolerances]", """
+TWO = TEXT.replace("[operation]", '[[operation]]\nname = "cruise"').replace(
+    "[tolerances]",
+    """
 [[operation]]
 name = "start"
 alpha = "15 deg"
 speed = "100 rpm"
 torque = "105 N*m"
 
-[tolerances]""")
+[tolerances]""",
+)
 OWN = TWO.replace('"cross1.F" = "700 N"', '"cross1.F at start" = "700 N"')
 
 

@@ -203,7 +203,7 @@ class _Table:
             loads = np.column_stack([LOADS[name].of(result) for name in self.asked.loads])
             self.loads[own] = np.where(np.isin(result["status"], VALID)[:, None], loads, np.nan)
             self.status[own] = result["status"]
-        return self.status[own]
+        return np.asarray(self.status[own])
 
     def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
         """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
@@ -214,7 +214,7 @@ class _Table:
             waiting = np.flatnonzero((self.status[here] == Status.PENDING).any(axis=1))
             own = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
             if own.stop > own.start:
-                name, states = what_if.key(change.about), self.status[own].T
+                name, states = what_if.key(change.about), list(self.status[own].T)
                 status = np.choose(worst.deciding(states), states)
                 loads = self.loads[own].reshape(-1, len(self.names))
                 found[name] = _joined(held.get(name), Altered(change.about, numbers.start, self.names, loads, status))

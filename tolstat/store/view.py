@@ -387,7 +387,8 @@ class View:
         pending = self.counts.total - self.counts.done
         text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)})"
         if all(self.points):
-            text += f" at {self.points[0]}" if len(self.points) == 1 else f", the worst of {', '.join(self.points)}"
+            *others, last = self.points
+            text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"
         text += f", {self.counts.shortfall}"
         return text + (f", {pending} still pending" if pending else "")
 

@@ -99,7 +99,7 @@ def _history_panel(found: _Histories) -> Panel:
     tail = found.tail
     rows = ", ".join(f"row {joint.row} up to {text.value(joint.value, tail.unit)}" for joint in tail.joints[:DRAWN])
     return Panel(
-        f"worst-{tail.by.replace('.', '-')}",
+        f"worst-{tail.by}",
         f"{tail.by} of the worst joints over the revolution",
         f"Histories of the worst joints: {rows}",
         partial(_draw, found=found),

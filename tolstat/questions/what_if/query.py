@@ -49,7 +49,8 @@ class WhatIf(NamedTuple):
     table : DataFrame
         One row per line and step, lines in the order of their share if half as wide: ``line``, ``size``, ``step``,
         ``words``, ``factor`` (NaN if it differs within the line), ``n``, ``share`` with ``_lower`` and ``_upper``, and
-        ``change``, the paired difference to the joints as drawn, with ends.
+        ``change``, the paired difference to the joints as drawn, with ends. Where `n` is larger than that of the line,
+        its share is the share of all joints as drawn plus the change.
     indices : DataFrame
         One row per line: ``line``, ``pairs``; ``alone`` and ``in_all`` with ends, the closed and total Sobol' index of
         the load, or of its logarithm; ``above_alone`` and ``above_in_all``, those of the event that it is above the
@@ -219,6 +220,8 @@ def best(found: WhatIf) -> Mapping[Any, Any] | None:
     return min(rows, key=lambda row: float(row["share"]), default=None)
 
 
+Ends = tuple[float, float, float]
+"""An estimate, and the ends of its interval."""
 _STEPS = {step: number for number, step in enumerate(widths.STEPS)}
 
 
@@ -240,10 +243,15 @@ def _row(
     values = one.valid(names)[:n]
     if not np.isfinite(values).any() or not np.isfinite(values + base[:n]).any():
         return None
+    drawn = exceedance.exceedance(base, _states(base), level, confidence)
     own = exceedance.exceedance(values, _states(values), level, confidence)
     pair = difference.shares(base[:n], values, [level], paired=True, confidence=confidence)
     factors = {own["factor"] for own in one.about["tolerances"].values()}
     factor = factors.pop() if len(factors) == 1 else np.nan
+    change = float(pair.estimate[0]), float(pair.outer_lower[0]), float(pair.outer_upper[0])
+    share = own.estimate, own.outer_lower, own.outer_upper
+    if n < len(base):
+        share = _moved((drawn.estimate, drawn.outer_lower, drawn.outer_upper), change)
     line = Line(one.about["label"], tuple(one.about["tolerances"]))
     return {
         "line": line.label,
@@ -253,13 +261,24 @@ def _row(
         "words": one.about["words"],
         "factor": factor,
         "n": n,
-        "share": own.estimate,
-        "share_lower": own.outer_lower,
-        "share_upper": own.outer_upper,
-        "change": float(pair.estimate[0]),
-        "change_lower": float(pair.outer_lower[0]),
-        "change_upper": float(pair.outer_upper[0]),
+        "share": share[0],
+        "share_lower": share[1],
+        "share_upper": share[2],
+        "change": change[0],
+        "change_lower": change[1],
+        "change_upper": change[2],
     }
+
+
+def _moved(drawn: Ends, change: Ends) -> Ends:
+    """Share as drawn plus a change that fewer joints tell, with the interval of both (Zou and Donner 2008).
+
+    The share and its change have a negative covariance, so the interval is wide rather than narrow.
+    """
+    share = drawn[0] + change[0]
+    low, high = (np.hypot(drawn[0] - drawn[k], change[0] - change[k]) for k in (1, 2))
+    found = (share, share - low, share + high)
+    return tuple(float(np.clip(value, 0.0, 1.0)) for value in found)  # type: ignore[return-value]
 
 
 def _states(values: FloatArray) -> NDArray[np.uint8]:

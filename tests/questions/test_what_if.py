@@ -179,6 +179,27 @@ def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
 
 
 @pytest.mark.usefixtures("quick")
+def test_fewer_changed_joints_move_the_share_of_all(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        whole = query.what_if(view, "cross1.F")
+        view.altered = {
+            name: one._replace(loads=one.loads[:100], status=one.status[:100]) if one.about["kind"] == "width" else one
+            for name, one in view.altered.items()
+        }
+        part = query.what_if(view, "cross1.F")
+    assert (part.n, part.share) == (whole.n, whole.share)
+    np.testing.assert_allclose(part.table["share"], (part.share + part.table["change"]).clip(0.0, 1.0))
+    still = part.table[part.table["line"] == "hole*.diameter"]
+    assert (still["share"] == part.share).all()
+    assert (
+        (part.table["share_lower"] <= part.table["share"]) & (part.table["share"] <= part.table["share_upper"])
+    ).all()
+    assert (part.table["share_upper"] - part.table["share_lower"]).mean() > 0.01
+
+
+@pytest.mark.usefixtures("quick")
 def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, tmp_path, monkeypatch):
     whole, blocks = tmp_path / "whole.h5", []
     whole.write_bytes(path.read_bytes())

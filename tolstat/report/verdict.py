@@ -87,7 +87,7 @@ POINTS = (
     Column("point", lambda row: str(row["point"])),
     Column("misalignment, speed, torque", lambda row: str(row["operation"])),
     Column("of the time", lambda row: text.percent(row["share"]), shown=_has("share")),
-    Column("joints that keep all limits there", lambda row: str(row["kept"]), shown=_has("kept")),
+    Column("keep all limits there", lambda row: str(row["kept"]), shown=_has("kept")),
 )
 """Columns of the table of operating points."""
 

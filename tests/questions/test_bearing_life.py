@@ -40,13 +40,13 @@ def answer(made):
 
 
 def test_lives_in_hours():
-    made = view(alpha=np.radians(15))
+    made = view()
     lives, loads = lives_of(made), made.read_results(("equivalent_load",))["equivalent_load"]
-    rpm = 52.36 * 30 / np.pi
-    pins = 1.5e6 / (15 * rpm) * (22e3 / loads) ** (10 / 3)  # the formula of catalogues
+    rpm, angle = 52.36 * 30 / np.pi, np.degrees(views.OPERATION.alpha)
+    pins = 1.5e6 / (angle * rpm) * (22e3 / loads) ** (10 / 3)  # the formula of catalogues
     np.testing.assert_allclose(lives.hours[:, :4], pins, rtol=1e-12)
     np.testing.assert_allclose(lives.hours[:, 4], (pins**-1.125).sum(axis=1) ** (-1 / 1.125), rtol=1e-12)
-    assert lives.nominal_hours[0] == pytest.approx(1.5e6 / (15 * rpm) * (22e3 / 600.0) ** (10 / 3))
+    assert lives.nominal_hours[0] == pytest.approx(1.5e6 / (angle * rpm) * (22e3 / 600.0) ** (10 / 3))
     assert lives.required == pytest.approx(8e6)
 
 

@@ -284,14 +284,24 @@ def _uniforms(names: Sequence[str], numbers: range, study: Study, stream: str = 
     Random probabilities of different `stream` are independent too; `sobol` and `lhs` ignore `stream`.
     """
     seed, n, first = study.sampling.seed, len(numbers), numbers.start
-    if study.sampling.method == "sobol":
-        points = sobol(n, len(ERROR_FIELDS), seed, first)
-        return {name: points[:, dimensions()[name]] for name in names}
-    if study.sampling.method == "lhs":
-        here = slice(first, numbers.stop)
-        return {name: _stratified(study.samples, _stream(seed, f"lhs {name}"))[here] for name in names}
+    if study.sampling.method in ("sobol", "lhs"):
+        size = study.samples // study.sampling.replicates
+        ends = range(first // size * size, numbers.stop, size)
+        parts = [_design(names, study, i // size, range(max(first, i) - i, min(numbers.stop - i, size))) for i in ends]
+        return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in names}
     # a stream may give 0 itself, once in 2^53 draws
     return {name: np.maximum(_stream(seed, name + stream, first).random(n), 2.0**-54) for name in names}
+
+
+def _design(names: Sequence[str], study: Study, replicate: int, numbers: range) -> dict[str, Array]:
+    """Sobol' points, or points of a Latin hypercube, of one replicate; the first is that of a study without others."""
+    seed, n = study.sampling.seed, study.samples // study.sampling.replicates
+    if study.sampling.method == "sobol":
+        points = sobol(len(numbers), len(ERROR_FIELDS), [seed, replicate] if replicate else seed, numbers.start)
+        return {name: points[:, dimensions()[name]] for name in names}
+    own = f" {replicate}" if replicate else ""
+    here = slice(numbers.start, numbers.stop)
+    return {name: _stratified(n, _stream(seed, f"lhs {name}{own}"))[here] for name in names}
 
 
 def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[str, Array], NDArray[np.intp]]:

@@ -224,3 +224,23 @@ def test_a_slice_of_a_thousand_million_joints(make: Make) -> None:
     assert s.design[10**9]["variant"] == 0
     with pytest.raises(InputError, match="a Latin hypercube of 1000000000 joints"):
         make(OFFSET, DIAMETER, method="lhs", n=10**9)
+
+
+@pytest.mark.parametrize("method", ["sobol", "lhs"])
+def test_replicates_are_blocks_the_first_of_which_is_the_study_without_others(make: Make, method: str) -> None:
+    whole = sampling.draw(make(OFFSET, method=method, n=64, more="replicates = 4\n"))[1:]["pin1.offset_t"]
+    alone = sampling.draw(make(OFFSET, method=method, n=16))[1:]["pin1.offset_t"]
+    blocks = whole.reshape(4, 16)
+    np.testing.assert_array_equal(blocks[0], alone)
+    assert len({block.tobytes() for block in blocks}) == 4
+    strata = np.sort(np.floor(16 * stats.norm.cdf(blocks, scale=1e-4 / 3)), axis=1)
+    np.testing.assert_array_equal(strata, np.tile(np.arange(16), (4, 1)))
+    rows = sampling.draw(make(OFFSET, method=method, n=64, more="replicates = 4\n"), range(11, 45))
+    np.testing.assert_array_equal(rows["pin1.offset_t"], whole[10:44])
+
+
+def test_replicates_need_a_design_and_equal_blocks(make: Make) -> None:
+    with pytest.raises(InputError, match="replicates is given with 'random'"):
+        make(OFFSET, more="replicates = 4\n")
+    with pytest.raises(InputError, match="n = 64 is no multiple of replicates = 7"):
+        make(OFFSET, method="sobol", more="replicates = 7\n")

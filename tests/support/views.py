@@ -15,7 +15,7 @@ class FakeStore(Numbering):
     def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS):
         self.path, self.study_name, self.study_text = "made_up.h5", "made up", study_text
         self.sampling, self.limits, self.columns = {"method": method, "nominal_first": True}, limits, columns
-        self.variants = ()
+        self.variants, self.heaviest = (), 1.0
         self.options = Options()._asdict()
         self.n, self.rows = len(results), range(len(results))
         self._errors, self._results = errors, results

@@ -168,6 +168,8 @@ def _check_extendable(store: Reader, n: int) -> None:
     place, held = str(store.path), store.sampling["n"]
     faults = []
     reason = NOT_EXTENDABLE.get(store.sampling["method"])
+    if "replicates" in store.sampling:
+        reason = "its replicates are consecutive blocks, so that more joints would change the existing ones"
     if reason:
         remedy = "change the study, and run it as another campaign: tolstat run STUDY --out OTHER.h5"
         faults.append(Fault(place, f"cannot be extended: {reason}", remedy))

@@ -148,6 +148,8 @@ class Plan:
         What the fit of the study means, as lines of text; empty without one.
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
+    correlations : list of dict
+        What correlations mean for the errors themselves: rows of `study.tolerances.meaning.correlations`.
     wilks : dict of float to int
         Minimum number of joints for a one-sided bound, by quantile.
     """
@@ -170,6 +172,7 @@ class Plan:
     assembly: Assembly
     fit: list[str]
     tolerances: list[dict[str, Any]]
+    correlations: list[dict[str, Any]]
 
     @property
     def seconds(self) -> float:
@@ -232,6 +235,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         assembly=_assembly(study, iid),
         fit=[] if study.fit is None else study.fit.meaning,
         tolerances=text.records(meaning.table(study.entries)),
+        correlations=text.records(meaning.correlations(study.copula, study.tolerances)),
     )
 
 

@@ -31,11 +31,12 @@ WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
 """Sampling methods of a production whose joints are not independent."""
 
 
-def without_interval(method: str) -> str:
+def without_interval(method: str, replicates: int = 1) -> str:
     """Return why shares of a sampling method have no interval, and the remedy; empty if they have one."""
-    if method not in WITHOUT_INTERVAL:
+    if method not in WITHOUT_INTERVAL or replicates > 1:
         return ""
-    return f'shares of {WITHOUT_INTERVAL[method]} have no interval: set sampling.method = "random" for a verdict'
+    remedy = 'set sampling.replicates = 8, or sampling.method = "random"'
+    return f"shares of {WITHOUT_INTERVAL[method]} have no interval: {remedy} for a verdict"
 
 
 class Reason(NamedTuple):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from tolstat.display.table import Column
     from tolstat.joint import Joint
     from tolstat.report import Report
+    from tolstat.study.model import Sampling
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load."
 EPILOG = (
@@ -171,11 +172,11 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
-def warn_without_interval(method: str) -> None:
-    """Print a warning if shares of a sampling method have no interval."""
+def warn_without_interval(sampling: Sampling) -> None:
+    """Print a warning if shares of a study's sampling have no interval."""
     from tolstat.campaign.remedy import without_interval
 
-    if said := without_interval(method):
+    if said := without_interval(sampling.method, sampling.replicates):
         warn(f"warning: {said}")
 
 

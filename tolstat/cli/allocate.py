@@ -73,8 +73,8 @@ def allocate(
         with output_file(out) as temporary:
             temporary.write_text(content, encoding="utf-8")
     if as_json:
-        w = found.weights
-        head = {"holds": found.holds, "verdict": found.verdict, "aim": found.aim, "ess": w.ess}
+        own = found.ratios
+        head = {"holds": found.holds, "verdict": found.verdict, "aim": found.aim, "effective": own.effective}
         tables = {key: text.records(getattr(found, key)) for key in ("tolerances", "limits")}
         typer.echo(as_text({**head, "entries": found.entries, **tables}))
         return

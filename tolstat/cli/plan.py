@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -42,7 +41,7 @@ def plan(
 
     loaded = study.load(study_file, n=n)
     print_warnings(study_file, loaded.joints, loaded.variants)
-    warn_without_interval(loaded.sampling.method)
+    warn_without_interval(loaded.sampling)
     announce_compilation()
     with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)
@@ -81,22 +80,12 @@ def _lines(made: Plan) -> str:
 
 
 def _meanings(made: Plan) -> list[str]:
-    """Table of what each entry of [tolerances] means."""
-    if not made.tolerances:
-        return []
+    """Tables of what each entry of [tolerances] and [[correlation]] means."""
     import pandas as pd
 
-    from tolstat.common import units
-    from tolstat.display import table, text
+    from tolstat.questions.joints import tolerances
 
-    columns = [
-        table.Column("tolerance", lambda row: str(row["entry"])),
-        table.Column("its number", lambda row: str(row["number"])),
-        table.Column("error", lambda row: str(row["errors"])),
-        table.Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
-        table.Column("outside", lambda row: text.percent(math.nan if row["outside"] is None else row["outside"])),
-    ]
-    return ["", table.as_text(columns, pd.DataFrame(made.tolerances))]
+    return tolerances.as_text(pd.DataFrame(made.tolerances), pd.DataFrame(made.correlations))
 
 
 def _rattle_warning(made: Plan) -> list[str]:

@@ -126,7 +126,7 @@ def run(
     if faults:
         raise InputError(faults)
     print_warnings(study_file, plan.joints, plan.variants)
-    warn_without_interval(plan.sampling.method)
+    warn_without_interval(plan.sampling)
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:

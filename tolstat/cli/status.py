@@ -127,7 +127,9 @@ def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDA
     limit, unit = store.limits[name], UNIT_OF_LOAD[name]
     own, lower, upper = values[:, samples]
     iid = method in ("random", "importance")
-    load = SampleLoad(name, unit, limit, float("nan"), own, (lower, upper), states[samples], weights, iid)
+    load = SampleLoad(
+        name, unit, limit, float("nan"), own, (lower, upper), states[samples], weights, iid, store.heaviest
+    )
     share = load.above(limit)
     numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
     rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}

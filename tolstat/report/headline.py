@@ -171,7 +171,7 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
 
 def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, of the worst limit."""
-    notes = () if view.iid else (without_interval(view.method),)
+    notes = () if view.has_intervals else (without_interval(view.method),)
     if view.weighted:
         known = [row for row in records if not np.isnan(row["estimate"])]
         if not known or _undecided(known):
@@ -200,11 +200,11 @@ def _reason(view: View, records: list[dict[Any, Any]]) -> str:
     if poor:
         trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
         limit = text.limit(poor[0]) + (f" (and {len(poor) - 1} more)" if len(poor) > 1 else "")
-        return f"too few effective joints are above {limit}: {trust.effective:.0f}"
+        return f"few joints have most of the weight above {limit} (Pareto k {trust.k:.2f}, 0.7 allowed)"
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
-    if not view.iid:
+    if not view.has_intervals:
         return without_interval(view.method)
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 

@@ -120,13 +120,13 @@ def _limits(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str], 
 
 
 def _how(view: View, asked: Asked) -> str:
-    if not view.iid:
+    if not view.has_intervals:
         return (
-            "No intervals: Clopper–Pearson holds for independent samples only; replicates with other seeds show the "
-            "scatter. Failed and unsettled joints are counted below and above every limit."
+            "No intervals: Clopper–Pearson holds for independent samples only; sampling.replicates gives intervals. "
+            "Failed and unsettled joints are counted below and above every limit."
         )
     said = "Joints are counted by their weights. " if view.weighted else ""
-    said += "Intervals are Clopper–Pearson's, 95 % for each limit by itself; failed and unsettled joints are counted "
+    said += f"Intervals are {view.interval_of}, 95 % for each limit by itself; failed and unsettled joints are counted "
     said += "below the limit at the lower end and above it at the upper end of the total interval, which covers the "
     said += "numerical error, too, where it is known."
     if asked.judges:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -192,6 +193,11 @@ class Reader(CheckedTables):
         They are read when first used, and kept: open the file anew to see more of a campaign under way.
         """
         return NamedLoads(self.view())
+
+    @property
+    def heaviest(self) -> float:
+        """Largest weight that a joint of importance sampling can have: one over the share of the tolerances, else 1."""
+        return 1.0 / (1.0 - math.fsum(share for share, _ in self.identity.get("proposal", ())))
 
     @property
     def nominal(self) -> pd.Series[float]:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import exceedance, quantile, weighted
+from tolstat.analysis import exceedance, quantile, replicates, weighted
 from tolstat.analysis.exceedance import Exceedance, FloatArray, Mask
 from tolstat.analysis.quantile import Quantile
 from tolstat.common.shown import table
@@ -50,6 +50,10 @@ class SampleLoad:
         Weight of each joint; without it all joints count equally.
     iid : bool
         Whether the joints are independent samples.
+    heaviest : float
+        Largest weight that a joint can have; inf without a bound.
+    replicates : int
+        Number of independent replicates, consecutive blocks of the joints; 1 without them.
     """
 
     name: str
@@ -61,6 +65,8 @@ class SampleLoad:
     status: NDArray[np.uint8]
     weights: FloatArray | None
     iid: bool
+    heaviest: float = np.inf
+    replicates: int = 1
 
     def __repr__(self) -> str:
         valid = self.valid
@@ -84,7 +90,14 @@ class SampleLoad:
     @cached_property
     def _weighted(self) -> weighted.Sample:
         assert self.weights is not None
-        return weighted.sort_out(self.values, self.status, self.weights, self.ends)
+        return weighted.sort_out(self.values, self.status, self.weights, self.ends, self.heaviest)
+
+    @cached_property
+    def _parts(self) -> list[exceedance.Sample]:
+        """Loads of each replicate."""
+        blocks = np.split(np.arange(self.values.size), self.replicates)
+        ends = self.ends
+        return [exceedance.sort_out(self.values[b], self.status[b], (ends[0][b], ends[1][b])) for b in blocks]
 
     @property
     def valid(self) -> FloatArray:
@@ -109,6 +122,8 @@ class SampleLoad:
 
     def curve(self, levels: ArrayLike | None = None, confidence: float = CONFIDENCE) -> NDArray[np.void]:
         """Share of the joints above each level, (m,) table `exceedance.CURVE`; see `exceedance.curve`."""
+        if self.replicates > 1:
+            return replicates.curve_of(self.sample, self._parts, levels, confidence)
         if self.weights is None:
             return exceedance.curve_of(self.sample, levels, confidence, self.iid)
         return weighted.curve_of(self._weighted, levels, confidence)
@@ -119,6 +134,8 @@ class SampleLoad:
 
     def quantile(self, share: float, confidence: float = CONFIDENCE) -> Quantile:
         """Load that a share of the joints stays at or below; see `quantile.quantile`."""
+        if self.replicates > 1:
+            return replicates.quantile_of(self.sample, self._parts, share, confidence)
         if self.weights is None:
             return quantile.of_sample(self.sample, share, confidence, self.iid)
         return weighted.quantile_of(self._weighted, share, confidence)
@@ -149,5 +166,6 @@ class SampleLoad:
             values=self.values[samples],
             ends=(self.ends[0][samples], self.ends[1][samples]),
             status=self.status[samples],
+            replicates=1,
             weights=None if self.weights is None else self.weights[samples],
         )

@@ -213,7 +213,7 @@ class View:
             values, ends = frozen(load.of(results)), load.ends(results)
             self._loads[name] = SampleLoad(
                 name, load.unit, self.limits.get(name), nominal, values, (frozen(ends[0]), frozen(ends[1])),
-                self.status, self.weights, self.iid,
+                self.status, self.weights, self.iid, self.store.heaviest, self.replicates,
             )  # fmt: skip
         return self._loads[name]
 
@@ -265,6 +265,22 @@ class View:
     def iid(self) -> bool:
         """Whether the joints are independent samples."""
         return self.method in ("random", "importance")
+
+    @cached_property
+    def replicates(self) -> int:
+        """Number of independent replicates with all joints simulated; 1 without them, and in a slice."""
+        number, whole = int(self.store.sampling.get("replicates", 1)), self.n == self.store.sampling.get("n")
+        return number if whole and not (self.status == Status.PENDING).any() else 1
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether shares and quantiles have intervals: of independent joints, or over replicates."""
+        return self.iid or self.replicates > 1
+
+    @property
+    def interval_of(self) -> str:
+        """Name of the intervals of shares, in words."""
+        return f"Student's t over {self.replicates} replicates" if self.replicates > 1 else "Clopper–Pearson's"
 
     @property
     def sampled(self) -> bool:

@@ -205,12 +205,29 @@ class Sampling(Strict):
         ),
     ] = "tolerance"
 
+    replicates: Annotated[
+        int,
+        Field(
+            strict=True,
+            ge=1,
+            le=1000,
+            description="number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares "
+            "and quantiles then have intervals",
+            examples=[8],
+        ),
+    ] = 1
+
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out `groups` unless the method is ``pick_freeze``: identities of other methods do not have it."""
+        """Leave out `groups` unless the method is ``pick_freeze``, and `replicates` unless there are several.
+
+        Identities of other methods do not have them.
+        """
         data: dict[str, Any] = write(self)
         if self.method != "pick_freeze":
             data.pop("groups", None)
+        if self.replicates == 1:
+            data.pop("replicates", None)
         return data
 
     @model_validator(mode="before")
@@ -228,6 +245,11 @@ class Sampling(Strict):
             raise refuse("missing key n", "add n, the number of joints, for example n = 1024")
         if self.method == "lhs" and self.n is not None and self.n > MAX_ROWS:
             raise refuse(f"a Latin hypercube of {self.n} joints", f"give at most n = {MAX_ROWS}, or another method")
+        if self.replicates > 1 and self.method not in ("sobol", "lhs"):
+            raise refuse(f"replicates is given with {self.method!r}", 'remove it, or write method = "sobol" or "lhs"')
+        if self.n is not None and self.n % self.replicates:
+            least = self.replicates * -(-self.n // self.replicates)
+            raise refuse(f"n = {self.n} is no multiple of replicates = {self.replicates}", f"give n = {least}")
         if self.method != "pick_freeze" and "groups" in self.model_fields_set:
             raise refuse(f"groups is given with {self.method!r}", 'remove it, or write method = "pick_freeze"')
         if self.method == "cases" and self.nominal_first:

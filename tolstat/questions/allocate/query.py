@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import allocation, reweight
-from tolstat.analysis.reweight import Weights
+from tolstat.analysis.reweight import Ratios
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.shown import shown
@@ -22,6 +22,7 @@ from tolstat.study import Study, axes, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
+from tolstat.study.tolerances.density_ratio import Exact
 
 EXAMPLE = 'write --target "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3
@@ -47,11 +48,11 @@ class Allocation(NamedTuple):
         ``proposed`` (half band, SI), ``factor``, ``cost_before``, ``cost``.
     limits : DataFrame
         One row per limit, from joints that the search did not use: ``limit``, ``target``, ``before`` (share of all
-        joints as drawn), ``estimate``, ``lower``, ``upper`` (NaN if the weights are not usable), ``ess``.
+        joints as drawn), ``estimate``, ``lower``, ``upper`` (NaN if not ``usable``), ``ess``, ``usable``.
     entries : dict
         Keys of the changed entries of ``[tolerances]`` by pattern.
-    weights : Weights
-        Weights of the joints of the final check.
+    ratios : Ratios
+        Density ratios of the joints of the final check.
     aim : str
         See `analysis.allocation.Choice`.
     joints_needed : float
@@ -62,25 +63,22 @@ class Allocation(NamedTuple):
     tolerances: pd.DataFrame
     limits: pd.DataFrame
     entries: Entries
-    weights: Weights
+    ratios: Ratios
     aim: str
     joints_needed: float
 
     @property
     def holds(self) -> bool:
-        """Whether the final check confirms the proposal: reliable weights, and all upper ends below the targets."""
-        return self.weights.usable and bool((self.limits["upper"] < self.limits["target"]).all())
+        """Whether the final check confirms the proposal: usable shares, and all upper ends below the targets."""
+        return bool((self.limits["usable"] & (self.limits["upper"] < self.limits["target"])).all())
 
     @property
     def verdict(self) -> str:
         """Sentence on whether the proposal holds, or why it needs new runs."""
-        w = self.weights
-        figures = (
-            f"{len(w.values)} joints in the check count as {w.ess:.0f}; Pareto k {w.k:.2f}, {w.allowed:.2f} allowed"
-        )
+        figures = f"{len(self.ratios.values)} joints in the check count as {self.ratios.effective:.0f}"
         if self.holds:
             return f"holds: the upper ends of the intervals are below the targets ({figures})"
-        if not w.usable:
+        if not self.limits["usable"].all():
             return f"needs new runs: the weights of the joints are unreliable ({figures})"
         if (self.limits["estimate"] < self.limits["target"]).all():
             joints = f"about {self.joints_needed:.0f} joints of the proposed study would show it"
@@ -170,20 +168,28 @@ def allocated(
         for t, f in zip(request.tolerances, choice.factors, strict=True)
         if abs(f - 1) > MIN_CHANGE
     }
-    blocks = view.error_blocks(request.columns)
-    logs = np.concatenate(
-        [DensityRatios(view.study, request.tolerances, errors).of_entries(entries) for errors in blocks]
-    )
-    weights = reweight.smooth(logs[done[checked]])
-    table = _limits(request.statements, above, above[checked], weights, view.iid, confidence)
+    ratios = _check_ratios(view, request, entries, done[checked])
+    table = _limits(request.statements, above, above[checked], ratios, view.iid, confidence)
     growth = [
         allocation.joints_needed(share, ess, target, confidence)
         for share, ess, target in table[["estimate", "ess", "target"]].to_numpy(float)
     ]
-    needed = max(growth) * weights.ess
-    if not weights.usable:
-        table[["estimate", "lower", "upper"]] = np.nan
-    return Allocation(view.study, _tolerances(request, entries), table, entries, weights, choice.aim, needed)
+    needed = max(growth) * ratios.effective
+    table.loc[~table["usable"], ["estimate", "lower", "upper"]] = np.nan
+    return Allocation(view.study, _tolerances(request, entries), table, entries, ratios, choice.aim, needed)
+
+
+def _check_ratios(view: View, request: _Request, entries: Entries, samples: NDArray[np.intp]) -> Ratios:
+    """Density ratios of the joints of the check, for changed entries."""
+    logs = []
+    for errors in view.error_blocks(request.columns):
+        block = DensityRatios(view.study, request.tolerances, errors)
+        logs.append(block.of_entries(entries))
+    return _ratios(np.concatenate(logs)[samples], block.exact_of_entries(entries))
+
+
+def _ratios(logs: NDArray[np.float64], exact: Exact) -> Ratios:
+    return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
 
 
 def _check_joints(view: View) -> None:
@@ -245,6 +251,7 @@ def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: ND
     problem = allocation.Problem(
         log_ratios=ratios.log_ratios,
         log_spread=ratios.log_mean_square,
+        usable=lambda factors: _ratios(ratios.log_ratios(factors), ratios.exact(factors)).usable,
         above=above,
         targets=request.targets,
         cost=request.cost,
@@ -260,16 +267,19 @@ def _limits(
     statements: Sequence[Statement],
     above: NDArray[np.bool_],
     above_checked: NDArray[np.bool_],
-    weights: Weights,
+    ratios: Ratios,
     iid: bool,
     confidence: float,
 ) -> pd.DataFrame:
     """Table `Allocation.limits`, from which joints are above each limit: all, and those of the check."""
     rows = []
     for i, statement in enumerate(statements):
-        found = reweight.share_above(above_checked[:, i], weights, 0.5, confidence, iid)
-        before = float(above[:, i].mean())
-        rows.append({"limit": statement.text, "target": statement.bound, "before": before, **found._asdict()})
+        own = above_checked[:, i]
+        sample = reweight.sort_out(own, np.full(own.size, Status.OK), ratios)
+        found = reweight.share_above(sample, ratios, 0.5, confidence, iid)
+        numbers = {key: getattr(found, key) for key in ("estimate", "lower", "upper", "ess")}
+        head = {"limit": statement.text, "target": statement.bound, "before": float(above[:, i].mean())}
+        rows.append({**head, **numbers, "usable": found.support.usable})
     return pd.DataFrame(rows)
 
 

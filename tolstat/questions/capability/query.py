@@ -18,8 +18,6 @@ from tolstat.store.view import View
 TOGETHER = "all limits"
 NOT_NORMAL = 0.01
 """p-value of the test of normality below which no index of a normal load is given."""
-NO_TAIL = 0.05
-"""p-value of the test of the fit below which a tail is not extrapolated."""
 
 
 def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
@@ -94,8 +92,8 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
     DataFrame
         One row per load and N: ``load``, ``unit``, ``one_in``, ``estimate``, ``lower``, ``upper``, ``bound_lower`` and
         ``bound_upper`` (unresolved joints counted below, above), ``fleet``, ``fleet_lower``, ``fleet_upper``,
-        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``. SI units. Loads and shape
-        are NaN where the tail is not generalised Pareto (``p`` below `NO_TAIL`).
+        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``, ``refusal`` (why the
+        tail is not extrapolated, see `extreme.Tail`; else empty). SI units. Loads and shape are NaN where it is not.
 
     Raises
     ------
@@ -112,9 +110,9 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
             row["bound_lower"], row["bound_upper"] = tail.bounds(1.0 / number)
             row |= dict(zip(("fleet", "fleet_lower", "fleet_upper"), tail.largest(int(number)), strict=True))
             row |= dict(zip(("shape", "shape_lower", "shape_upper"), tail.shape, strict=True))
-            if tail.p < NO_TAIL:
+            if tail.refusal:
                 row |= dict.fromkeys(list(row)[3:], np.nan)
-            rows.append({**row, "p": tail.p, "n_above": tail.n_above})
+            rows.append({**row, "p": tail.p, "n_above": tail.n_above, "refusal": tail.refusal})
     return pd.DataFrame(rows)
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 from tolstat.analysis import exceedance
 from tolstat.display import text
 from tolstat.display.table import Column, Row
-from tolstat.questions.capability.query import NO_TAIL, NOT_NORMAL, TOGETHER
+from tolstat.questions.capability.query import NOT_NORMAL, TOGETHER
 
 
 def _with_ends(row: Row, key: str, form: str) -> str:
@@ -103,7 +103,6 @@ def note(table: pd.DataFrame) -> str:
 
 def no_tail(table: pd.DataFrame) -> str:
     """Sentence on the loads of `query.returns` whose tail cannot be extrapolated; empty if there are none."""
-    names = list(dict.fromkeys(table["load"][table["p"] < NO_TAIL]))
-    if not names:
-        return ""
-    return f"{', '.join(names)}: the tail is not generalised Pareto (p < {NO_TAIL:g}) and is not extrapolated"
+    refused = table[table["refusal"] != ""].drop_duplicates("load")
+    parts = [f"{', '.join(rows['load'])}: {reason}" for reason, rows in refused.groupby("refusal", sort=False)]
+    return f"{'; '.join(parts)}: not extrapolated" if parts else ""

@@ -146,7 +146,7 @@ def readings(view: View) -> dict[str, Any]:
         ``bound_upper``.
     """
     found = {}
-    ends = ("lower", "upper", "outer_lower", "outer_upper") if view.iid else ("bound_lower", "bound_upper")
+    ends = ("lower", "upper", "outer_lower", "outer_upper") if view.has_intervals else ("bound_lower", "bound_upper")
     for load in view.loads(view.shown_loads):
         if not load.valid.size:
             continue

@@ -117,6 +117,8 @@ def note(view: View) -> str:
             "joints counted by their weights; bands: pointwise 95 % Clopper–Pearson intervals of as many equal joints "
             f"as would be as sure{_distrust(view)}"
         )
+    elif view.replicates > 1:
+        text = f"bands: pointwise 95 % intervals of the settled joints, {view.interval_of}"
     elif view.iid:
         text = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
     else:
@@ -127,7 +129,7 @@ def note(view: View) -> str:
 
 
 def _distrust(view: View) -> str:
-    """Words on limits without a share, because too few effective joints are above them."""
+    """Words on limits without a share, because few joints have most of the weight above them."""
     poor = []
     for name, level in view.limits.items():
         load = view.load(name)
@@ -193,7 +195,7 @@ def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.9
             nominal = view.load(names[i]).nominal
             if low <= nominal <= high:
                 style.mark(ax, nominal, 1.0, style.COLOURS[i])
-    if view.iid:
+    if view.has_intervals:
         ends = [table["outer_upper"][-1] for table in tables if table.size]
         ax.axhline(max(ends), color=style.FAINT, lw=1.1, ls=ZERO_DASH, zorder=1.5)
     limit_lines(ax, marked, unit)
@@ -290,7 +292,7 @@ def _legend(page: Figure, view: View) -> None:
         Line2D([], [], color=c, ls=dash) for c, dash in zip(style.COLOURS, style.DASHES, strict=True)
     ]
     labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
-    if view.iid:
+    if view.has_intervals:
         handles += [Patch(color=style.FAINT, alpha=0.4, lw=0)]
         handles += [Line2D([], [], color=style.FAINT, lw=1.1, ls=ZERO_DASH)]
         labels += ["95 % band", "upper end where none exceeds x"]

@@ -63,7 +63,7 @@ def _kept(view: View, group: str, letter: str) -> list[str]:
 
 def _note(view: View) -> str:
     said = text.sentence(rendering.note(view))
-    if view.iid:
+    if view.has_intervals:
         said += " Triangles: the joint without errors. Dotted: upper end where no joint exceeds x."
     missing = view.missing()
     return f"{said} {text.sentence(missing)}" if missing else said
@@ -119,9 +119,9 @@ def _bands(ax: Axes, view: View, load: SampleLoad) -> None:
             ax.step(x, np.clip(end, 1e-3 * floor, 1.0), where="post", color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))
         handles.append(Line2D([], [], color=style.INK, lw=0.9, ls="--"))
         labels.append("95 % for all x at once (DKW)")
-    if view.iid:
+    if view.has_intervals:
         handles.insert(1, Patch(color=style.COLOURS[0], alpha=0.25, lw=0))
-        labels.insert(1, "95 % at each x (Clopper–Pearson)")
+        labels.insert(1, f"95 % at each x ({view.interval_of})")
     if valid < n:
         handles.append(Patch(color=style.COLOURS[0], alpha=0.12, lw=0))
         labels.append("with failed and unsettled joints")
@@ -139,9 +139,10 @@ def _bands(ax: Axes, view: View, load: SampleLoad) -> None:
 def _quantiles(view: View) -> Table:
     """Quantiles of every load with their intervals, and its tolerance limit."""
     table = rendering.by_load(query.quantiles(view))
-    title = "Quantiles with 95 % intervals of order statistics, and one-sided tolerance limits (Wilks)"
+    kind = "over replicates" if view.replicates > 1 else "of order statistics"
+    title = f"Quantiles with 95 % intervals {kind}, and one-sided tolerance limits (Wilks)"
     columns = rendering.quantile_columns(query.tolerance_limits(view))
-    return as_block(title if view.iid else "Quantiles", columns, table)
+    return as_block(title if view.has_intervals else "Quantiles", columns, table)
 
 
 def _of_sweep(view: View) -> Section:

@@ -102,4 +102,8 @@ def example_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     narrow.write_text(text.replace('upper = "0.030 mm", distribution = "normal", cpk = 1.0', UNIFORM), encoding="utf-8")
     tolstat.run(tolstat.load(study), folder / "iso2768_f.h5", workers=1)
     tolstat.run(tolstat.load(narrow), folder / "narrow.h5", workers=1)
+    bearings = folder / "studies" / "needle_bearings.toml"
+    text = bearings.read_text(encoding="utf-8").replace("[sampling]", f"[output]\n{CHEAP}")
+    bearings.write_text(text, encoding="utf-8")
+    tolstat.run(tolstat.load(bearings, n=60), folder / "needle_bearings.h5", workers=1)
     return folder

@@ -18,6 +18,7 @@ from tolstat.study.model import SweepEntry
 from tolstat.study.schema import files
 from tolstat.study.schema.parts import of_model
 from tolstat.study.selection import TOLERANCED
+from tolstat.study.stress_point import PointEntry
 from tolstat.study.tolerances.entry import Banded
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
@@ -184,7 +185,14 @@ def tables() -> dict[str, str]:
         if "patternProperties" not in section.schema()
     }
     found = {name: key_table(made["properties"], made.get("required", ())) for name, made in with_keys.items()}
-    entries = {"sweep": SweepEntry, "range": Range, "line": LineEntry, "cost": CostEntry, "fit": FitEntry}
+    entries = {
+        "sweep": SweepEntry,
+        "range": Range,
+        "line": LineEntry,
+        "point": PointEntry,
+        "cost": CostEntry,
+        "fit": FitEntry,
+    }
     return (
         found
         | {name: model_table(model) for name, model in entries.items()}

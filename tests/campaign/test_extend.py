@@ -24,7 +24,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common import files, tables
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import Reader, ResultStore
+from tolstat.store import Reader, ResultStore, provenance
 from tolstat.study import Study
 
 KINDS = ("none", "full")
@@ -115,6 +115,19 @@ def test_what_cannot_grow_is_refused(tmp_path: Path, make: Make, method: str, n:
     with pytest.raises(InputError, match=message):
         extend.extend(path, n)
     assert path.read_bytes() == before
+
+
+def test_a_file_of_other_code_does_not_grow(tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = run(make(40), tmp_path / "a.h5")
+    before = path.read_bytes()
+    monkeypatch.setattr(provenance, "source_hash", lambda: "0")
+    says = (
+        r"another version of the code\n    sources: hash \w+ in the file, 0 now\n  hint: .*STUDY --n 80 --out OTHER.h5"
+    )
+    with pytest.raises(InputError, match=says):
+        extend.extend(path, 80)
+    assert path.read_bytes() == before
+    assert list(tmp_path.glob("*.h5*")) == [path]
 
 
 def test_slices_and_changed_studies_do_not_grow(tmp_path: Path, make: Make) -> None:

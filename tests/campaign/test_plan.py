@@ -230,7 +230,9 @@ def test_a_plan_counts_joints_that_do_not_go_together(tmp_path: Path, small: stu
     assert found.interval == exceedance.clopper_pearson(found.misfits, found.of)
     (tmp_path / "few.toml").write_text(loaded.text.replace("30000", "12"), encoding="utf-8")
     done = CliRunner().invoke(cli.app, ["plan", str(tmp_path / "few.toml"), "--pilot", "2"])
-    assert "of 12 joints have a pin larger than its hole and cannot be simulated; 95 % interval" in done.stdout
+    assert "of 12 joints have a pin larger than its hole and cannot be simulated; 95 % interval" in done.stdout.replace(
+        "\n    ", " "
+    )
     done = CliRunner().invoke(cli.app, ["plan", str(tmp_path / "few.toml"), "--pilot", "2", "--json"])
     assert json.loads(done.stdout)["assembly"]["of"] == 12
 
@@ -283,6 +285,17 @@ def test_a_plan_chooses_the_fidelity_that_the_campaign_chooses(tmp_path: Path) -
     with Reader.open(tmp_path / "a.h5") as store:
         assert store.fidelity["reason"] == made.fidelity
     assert told[0].startswith(made.fidelity)
+
+
+def test_start_and_report_take_longer_on_a_slower_machine(small: study.Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    for slower in (1.0, 3.0):
+        monkeypatch.setattr(plan, "_loop", lambda slower=slower: slower * plan.LOOP_S)
+        found.append(plan.plan(small, workers=1, pilot=2).stages)
+    for stage in ("start", "report"):
+        assert found[1][stage] == pytest.approx(3.0 * found[0][stage])
+    monkeypatch.undo()
+    assert plan._loop() > 0.0
 
 
 def test_plan_command(small: study.Study) -> None:

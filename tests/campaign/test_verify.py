@@ -21,7 +21,7 @@ from tolstat.common.tables import LOAD_KINDS, Method, Options, Simulation, Start
 from tolstat.questions.accuracy import query as tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.exceedance import query as exceedance
-from tolstat.store import Reader, ResultStore, recorded, verification
+from tolstat.store import Reader, ResultStore, provenance, recorded, verification
 from tolstat.store.verification import Check, Verification
 
 REAL = """
@@ -332,6 +332,7 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
             assert word in done.stderr
     with pytest.raises(InputError, match="less than one"):
         verify.check_study(study.load(written(tmp_path)), joints=-1)
-    monkeypatch.setattr(verify, "versions", lambda: {"tolstat": "9.9", "sources": "0"})
+    other = synthetic.store(tmp_path, name="other")
+    monkeypatch.setattr(provenance, "source_hash", lambda: "0")
     with pytest.raises(StoreError, match="was made by another version of the code"):
-        verify.check_file(synthetic.store(tmp_path, name="other"))
+        verify.check_file(other)

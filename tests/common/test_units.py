@@ -140,6 +140,8 @@ KINDS = {
     "angle": ("rad", ""),
     "speed": ("rad/s", ""),
     "torque": ("N*m", ""),
+    "stress": ("Pa", ""),
+    "factor": ("1/m^3", ""),
     "share": ("1", ""),
 }
 

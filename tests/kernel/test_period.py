@@ -123,7 +123,7 @@ def test_combined_statistics_are_those_of_all_revolutions():
     for r, values in zip(range(15, 20), samples, strict=True):
         row = trail.revolution[r % 10]
         row.largest[:16], row.average[:], row.range[:] = values.max(0), values.mean(0), np.ptp(values, axis=0)
-        row.largest[16:], row.mode_share[:] = r, 0.25
+        row.largest[16:], row.mode_share[:], row.equivalent_load[:] = r, 0.25, r
     out = np.zeros(1, KERNEL_RESULT).view(np.recarray)[0]
     combine(19, 5, trail, out)
     whole = samples.reshape(-1, 16)
@@ -132,3 +132,4 @@ def test_combined_statistics_are_those_of_all_revolutions():
     np.testing.assert_allclose(out.range, np.ptp(whole, axis=0))
     assert (out.largest[16:] == 19).all()
     np.testing.assert_allclose(out.mode_share, 0.25)
+    np.testing.assert_allclose(out.equivalent_load, np.mean(np.arange(15.0, 20.0) ** (10 / 3)) ** 0.3)

@@ -1,7 +1,7 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
-FOLDER holds the result files ``overnight.h5``, ``fuzz.h5`` and ``hard_cases.h5``, of some joints or all, and gets
-``tilted_pin.png``, ``overnight.png``, ``fuzz.png`` and ``hard_cases.png``.
+FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5`` and
+``needle_bearings.h5``, of some joints or all, and gets a picture of each, and ``tilted_pin.png``.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ import tolstat
 from tests.support.environment import ROOT
 from tolstat.analysis.exceedance import clopper_pearson
 from tolstat.common.tables import Status
+from tolstat.display import style
+from tolstat.questions.bearing_life.rendering import curve
+from tolstat.questions.fatigue import parts_rendering
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -49,6 +52,16 @@ def tilted_pin(folder: Path) -> None:
     save(figure, folder / "tilted_pin.png")
 
 
+def welded_fork(folder: Path) -> None:
+    """Draw the share of the joints with a failed part against revolutions, as the page does."""
+    with tolstat.open(folder / "welded_fork.h5") as store:
+        stressed = tolstat.load_stresses([store.view()])
+    with style.settings():
+        figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
+        parts_rendering.panel(ax, stressed, tolstat.part_failures(stressed))
+        save(figure, folder / "welded_fork.png")
+
+
 def overnight(folder: Path) -> None:
     """Draw the share of joints above a limit, with 95 % intervals, against their mean clearance."""
     with tolstat.open(folder / "overnight.h5") as store:
@@ -79,6 +92,17 @@ def overnight(folder: Path) -> None:
     ax.grid(alpha=0.3)
     ax.legend()
     save(figure, folder / "overnight.png")
+
+
+def needle_bearings(folder: Path) -> None:
+    """Draw the share of joints whose bearings have a shorter life."""
+    with tolstat.open(folder / "needle_bearings.h5") as store:
+        draw = curve(tolstat.lives_of(store.view()))
+    assert draw is not None
+    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
+    draw(ax)
+    ax.grid(alpha=0.3)
+    save(figure, folder / "needle_bearings.png")
 
 
 def kind(status: np.ndarray) -> np.ndarray:
@@ -139,7 +163,7 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    for draw in (overnight, fuzz, hard_cases):
+    for draw in (welded_fork, overnight, fuzz, hard_cases, needle_bearings):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)
 

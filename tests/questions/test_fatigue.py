@@ -49,7 +49,7 @@ def of_signals(*signals):
         ranges, means = rainflow.periodic(signal)
         table[i, 0, : len(ranges), 0], table[i, 0, : len(ranges), 1] = ranges, means
         number[i] = len(ranges)
-    return Cycles(("cross1.F_e",), table[..., 0], table[..., 1], number, np.ones(300))
+    return Cycles.of_revolution(("cross1.F_e",), table[..., 0], table[..., 1], number)
 
 
 def test_the_standards_example():
@@ -191,14 +191,28 @@ def test_spectrum_reads_the_ordered_ranges():
     np.testing.assert_allclose(cycles.spectrum(both, numbers)[:, 0], expected)
 
 
-def test_shortfall_bounds_what_has_no_place():
-    ranges = rainflow.periodic(noise())[0]
-    kept = Cycles(
-        ("cross1.F_e",), ranges[None, None, :16], ranges[None, None, :16], np.array([[len(ranges)]]), np.ones(16)
-    )
-    lost = np.sum(ranges[16:] ** 3) / np.sum(ranges[:16] ** 3)
+def largest(signal, k):
+    """Cycles of one joint of which `k` are stored, and the ranges of the others."""
+    ranges = rainflow.periodic(signal)[0]
+    stored = ranges[None, None, :k]
+    return Cycles.of_revolution(("cross1.F_e",), stored, stored, np.array([[len(ranges)]])), ranges[k:]
+
+
+def test_what_is_not_stored_is_bounded():
+    kept, others = largest(noise(), 16)
+    lost = np.sum(others**3) / damage.moment(kept, 3.0)[0, 0]
     assert lost <= damage.truncation_bound(kept, 3.0)[0, 0] < 100 * lost
     assert damage.truncation_bound(of_signals(noise()), 3.0)[0, 0] == 0.0
+
+
+def test_what_is_not_stored_of_a_duty_cycle_is_bounded():
+    # the point with small cycles stores them all: its smallest does not bound what the other one leaves out
+    large, others = largest(noise(), 16)
+    small, _ = largest(1e-3 * noise(2, 20), 16)
+    both = cycles.duty_cycle([large, small], [0.4, 0.6])
+    lost = 0.4 * np.sum(others**3) / damage.moment(both, 3.0)[0, 0]
+    assert lost <= damage.truncation_bound(both, 3.0)[0, 0] < 100 * lost
+    assert damage.truncation_bound(both, 3.0)[0, 0] == pytest.approx(damage.truncation_bound(large, 3.0)[0, 0])
 
 
 def test_joints_without_results_have_no_values():

@@ -132,6 +132,8 @@ def stages(simulate=simulate):
 
 
 RUN = campaign.run
+SEEN = []
+"""Counts that `once` reports."""
 
 
 @pytest.fixture(autouse=True)
@@ -146,7 +148,7 @@ def once(tmp_path_factory):
     plan, path = asked(load(folder)), folder / "whole.h5"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(campaign, "run", partial(RUN, stages=stages()))
-        return plan, rare.run(plan, path, tell=lambda _: None), path
+        return plan, rare.run(plan, path, tell=lambda _: None, progress=SEEN.append), path
 
 
 @pytest.fixture
@@ -170,6 +172,16 @@ def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
     assert (loads[origin["parent"][last]] > found.levels[-1].threshold).all()
     moved = np.corrcoef(errors["pin3.offset_t"][last], errors["pin3.offset_t"][origin["parent"][last]])[0, 1]
     assert 0.3 < moved < 0.95
+
+
+@pytest.mark.slow
+def test_progress_counts_joints_of_all_levels(whole):
+    _, found, _ = whole
+    seen = [(counts.done, counts.total) for counts in SEEN]
+    assert seen[0] == (0, 101)
+    assert seen[-1] == (found.joints + 1, found.joints + 1)
+    assert sorted(seen) == seen
+    assert len({total for _, total in seen}) > 2
 
 
 @pytest.mark.slow

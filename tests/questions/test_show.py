@@ -274,14 +274,16 @@ def test_what_cannot_be_drawn_is_exit_code_2_and_writes_nothing(here, args, said
 def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
     with Reader.open(synthetic.store(tmp_path)) as store:
         view, asked = store.view(), Asked(store.path)
-        panels = section.legend(view, asked)
-        (part,) = section.sections(view, asked)
+        marked = section.worst(view, "fork2.T", asked)
+        part, joint = section.sections(view, asked)
         worst = {int(view.rows(int(np.argmax(LOADS[name].of(view.results))))) for name in view.leading}
     places = {name.partition(".")[0] for name in view.leading} - {"psi"}
+    assert (marked.key, marked.title) == ("joint-worst", "fork2: nearest to its limit")
+    assert "Marked: fork2." in marked.description
+    panels = joint.blocks[0].panels
+    assert [panel.key for panel in panels] == ["joint-front", "joint-side", "joint-pin", "error-kinds"]
     assert f"Marked: {', '.join(sorted(places))}." in panels[0].description
-    keys = [panel.key for panel in part.blocks[0].panels]
-    assert keys[-1] == "error-kinds"
-    assert set(keys[:-1]) == {f"drawn-{row}" for row in worst}
+    assert {panel.key for panel in part.blocks[0].panels} == {f"drawn-{row}" for row in worst}
     assert asked.notes == []
 
 

@@ -72,7 +72,9 @@ def everywhere(path, accepted):
         made = store.view()
         json_ = summary.statistics(made, accepted=accepted)["verdict"]
         first = page.compose(made, Asked(path, accepted)).sections[0]
-    card = next(block for block in first.blocks if block.kind == "cards").cards[0]
+    decision = next(block for block in first.blocks if block.kind == "decision")
+    card, place = decision.verdict, decision.picture.title.partition(":")[0]
+    assert place == "The joint" if card.value == "no verdict" else f" on {place}." in card.label or "keep" in card.label
     separator = ":" if card.verdict else ""
     assert text.table.splitlines()[0].lower() == f"{json_['sentence']}.".lower()
     assert f"{card.value}{separator} {card.label}" == json_["sentence"]
@@ -131,6 +133,19 @@ def test_a_limit_that_is_not_kept_leads_with_its_share(tmp_path):
     )
     assert said["notes"][0] == "of 7 limits: 1 not kept, 6 open"
     assert card.verdict == "no"
+
+
+def test_of_limits_that_are_exceeded_equally_often_the_leading_load_is_named_and_marked():
+    def alike(results):
+        results["F_max"][:, 2] = 1.2 * results["F_max"][:, 1]
+
+    made = view(limits={"cross2.F": 700.0, "cross3.F": 840.0, "fork1.F": 5000.0}, change=alike)
+    above = [made.load(name).above(made.limits[name]).count for name in made.limits]
+    assert above[0] == above[1] > 0
+    assert made.leading == ("cross2.F",) or made.leading == ("cross3.F",)
+    found = headline.headline(made, 0.01)
+    assert found.load == made.leading[0]
+    assert f"on {found.load} " in found.words
 
 
 @pytest.mark.parametrize(("failed", "shown"), [(0, "100 %"), (9, r"\d.* \.\. 100 %")])

@@ -126,6 +126,28 @@ def test_a_study_with_all_kinds_of_tables_is_accepted() -> None:
     VALIDATORS["study"].validate(tomllib.loads(GOOD))
 
 
+def test_every_vector_of_a_zone_can_be_shifted() -> None:
+    """Names of what is drawn, from studies with each kind of zone."""
+    zone, over = '{ zone = "⌀0.02 mm", distribution = "normal"', ', over = "22 mm"'
+    plane = f'{zone.replace("⌀", "")}{over}, about = "t" }}'
+    tables = {
+        "ends": f'"*.position" = {zone}{over} }}',
+        "middle": f'"*.position" = {zone.replace("0.02", "0.1")}{over} }}\n"pin*.perpendicularity" = {zone}{over} }}',
+        "components": f'"hole*.angularity" = {plane}\n"*_pins.coaxiality" = {zone}{over} }}',
+        "offsets": '"*.offset_radial" = { plus_minus = "0.1 mm", distribution = "rayleigh" }',
+    }
+    drawn = set()
+    for entries in tables.values():
+        text = f"{GOOD.partition('[errors]')[0]}[tolerances]\n{entries}\n[sampling]\nn = 8\n"
+        drawn |= study.load("x.toml", text=text).tolerances.keys()
+    assert {"pin1.position", "pin1.position_outer", "input_pins.coaxiality_pin3", "hole1.angularity_t"} <= drawn
+    for key in ("shift", "widen"):
+        proposal = {"share": 0.3, key: dict.fromkeys(sorted(drawn), 2.0)}
+        VALIDATORS["study"].validate({**tomllib.loads(GOOD), "proposal": [proposal]})
+        wrong = {"share": 0.3, key: {"pin1.position_pin3": 2.0}}
+        assert not VALIDATORS["study"].is_valid({**tomllib.loads(GOOD), "proposal": [wrong]})
+
+
 @pytest.mark.parametrize(("old", "new"), BROKEN)
 def test_broken_studies_are_refused(old: str, new: str) -> None:
     assert old in GOOD

@@ -12,10 +12,10 @@ from tolstat.store.view import View
 class FakeStore(Numbering):
     """What a view reads of a result file, in memory; slot 0 is the nominal joint."""
 
-    def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS):
+    def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS, joint=None):
         self.path, self.study_name, self.study_text = "made_up.h5", "made up", study_text
         self.sampling, self.limits, self.columns = {"method": method, "nominal_first": True}, limits, columns
-        self.variants, self.heaviest = (), 1.0
+        self.variants, self.joint, self.heaviest = (), joint, 1.0
         self.options = Options()._asdict()
         self.n, self.rows = len(results), range(len(results))
         self._errors, self._results = errors, results
@@ -23,17 +23,23 @@ class FakeStore(Numbering):
     def errors(self, rows=slice(None), fields=None):
         return self._errors[rows]
 
-    def results(self, rows=slice(None)):
+    def results(self, rows=slice(None), fields=None):
         return self._results[rows]
 
 
-def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=None, **kwargs):
-    """View of n - 1 joints and the nominal one; `change` alters the table of results before it is read."""
+def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=None, joint=None, alpha=None, **kwargs):
+    """View of n - 1 joints and the nominal one; `change` alters the table of results before it is read.
+
+    `joint` holds the sections of a joint file, `alpha` the misalignment of each joint, rad.
+    """
     results = synthetic.results(n, **kwargs)
     if change is not None:
         change(results[1:])
     limits = {"cross1.F": 700.0} if limits is None else limits
-    made = View(FakeStore(method, limits, synthetic.errors(n), results, columns=columns))
+    errors = synthetic.errors(n)
+    if alpha is not None:
+        errors["operation.alpha"] = alpha
+    made = View(FakeStore(method, limits, errors, results, columns=columns, joint=joint))
     made.verification, made.altered = None, {}
     return made
 

@@ -32,6 +32,10 @@ class Cycles(NamedTuple):
         Cycles per revolution, including those not stored among the k; NaN for joints without results.
     weights : ndarray, shape (k,)
         Occurrences per revolution of the cycle in each place: 1, or the share of its operating point.
+    omitted : ndarray, shape (n, channels, points)
+        Cycles per revolution at each operating point that are not stored.
+    ceiling : ndarray, shape (n, channels, points)
+        Range that none of these exceeds, N or N m.
     """
 
     channels: tuple[str, ...]
@@ -39,12 +43,31 @@ class Cycles(NamedTuple):
     means: NDArray[Any]
     number: FloatArray
     weights: FloatArray
+    omitted: FloatArray
+    ceiling: FloatArray
+
+    @classmethod
+    def of_revolution(
+        cls, channels: tuple[str, ...], ranges: NDArray[Any], means: NDArray[Any], number: FloatArray
+    ) -> Cycles:
+        """Cycles of one revolution, of which the largest k are stored."""
+        stored = ranges > 0
+        omitted = np.maximum(number - stored.sum(axis=2), 0.0)[..., None]
+        ceiling = np.min(ranges, axis=2, initial=np.inf, where=stored)[..., None].astype(float)
+        return cls(channels, ranges, means, number, np.ones(ranges.shape[2]), omitted, ceiling)
 
     def of(self, channel: str) -> Cycles:
         """Select one channel; the axis of channels stays, with length 1."""
         c = self.channels.index(channel)
-        part = slice(c, c + 1)
-        return Cycles((channel,), self.ranges[:, part], self.means[:, part], self.number[:, part], self.weights)
+        return self._picked((slice(None), slice(c, c + 1)))._replace(channels=(channel,))
+
+    def rows(self, joints: slice) -> Cycles:
+        """Select joints."""
+        return self._picked((joints,))
+
+    def _picked(self, part: tuple[slice, ...]) -> Cycles:
+        names = ("ranges", "means", "number", "omitted", "ceiling")
+        return self._replace(**{name: getattr(self, name)[part] for name in names})
 
 
 def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
@@ -77,6 +100,8 @@ def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
         np.concatenate([part.means for part in parts], axis=2),
         np.sum([share * part.number for part, share in zip(parts, shares, strict=True)], axis=0),
         np.concatenate([share * part.weights for part, share in zip(parts, shares, strict=True)]),
+        np.concatenate([share * part.omitted for part, share in zip(parts, shares, strict=True)], axis=2),
+        np.concatenate([part.ceiling for part in parts], axis=2),
     )
 
 

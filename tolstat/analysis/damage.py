@@ -69,11 +69,10 @@ def damage(cycles: Cycles, line: Line, revolutions: float) -> FloatArray:
 def truncation_bound(cycles: Cycles, m: float) -> FloatArray:
     """Upper bound of the relative increase of `moment` by cycles that were not stored, shape (n, channels).
 
-    None of them is larger than the smallest stored cycle.
+    None of them is larger than the smallest stored cycle of its operating point.
     """
-    placed = ((cycles.ranges > 0) * cycles.weights).sum(axis=2)
-    without = np.maximum(cycles.number - placed, 0.0)
-    least = np.min(cycles.ranges, axis=2, initial=np.inf, where=cycles.ranges > 0).astype(float)
+    some = cycles.omitted > 1e-9  # NaN for joints without results
     with np.errstate(invalid="ignore"):
-        bound: FloatArray = np.where(without > 1e-9, without * least**m / moment(cycles, m), 0.0)
+        most = np.sum(cycles.omitted * cycles.ceiling**m, axis=2, where=some)
+        bound: FloatArray = np.where(some.any(axis=2), most / moment(cycles, m), 0.0)
     return bound

@@ -17,6 +17,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Counts, Reader, ResultStore, what_if
 from tolstat.store.assembly import DifferingResults, assemble, check_free
+from tolstat.store.provenance import differing_code
 from tolstat.store.recall import differing_keys, recall
 from tolstat.store.result_file import BLOCK
 
@@ -30,6 +31,8 @@ NOT_EXTENDABLE = {
     "subset": "the levels of a subset simulation determine its number of joints",
 }
 """Sampling methods whose campaigns cannot be extended, and the reason."""
+OTHER_CODE = "was begun by another version of the code"
+"""Fault of a file that gets no further results, because they could differ."""
 
 
 class Merged(NamedTuple):
@@ -180,8 +183,16 @@ def _check_extendable(store: Reader, n: int) -> None:
         faults.append(Fault(place, found, "merge all slices first: tolstat merge SLICE... --out FILE"))
     elif store.history_specs and not store.complete:
         faults.append(_unfinished(store))
+    if other := differing_code(store.versions):
+        remedy = f"extend it with {code_of(store)}, or run its study into another file: tolstat run STUDY --n {n} --out"
+        faults.append(Fault(place, "\n    ".join([OTHER_CODE, *other]), f"{remedy} OTHER.h5"))
     if faults:
         raise InputError(faults)
+
+
+def code_of(store: Reader) -> str:
+    """Name the code that began a file."""
+    return f"commit {store.git_commit}" if store.git_commit else "the version that began it"
 
 
 def _check_one_campaign(stores: Sequence[Reader]) -> None:

@@ -27,6 +27,7 @@ from tolstat.store.axes import attach_scales
 from tolstat.store.histories import create_dataset, create_group
 from tolstat.store.new_file import attributes, fill
 from tolstat.store.recorded import perturbed, settings, variants
+from tolstat.study import swept
 from tolstat.study.tolerances import meaning
 
 if TYPE_CHECKING:
@@ -42,10 +43,14 @@ ORDINARY = 680.0
 CONFIDENCE = 0.95
 DRAWN = 1 << 14
 """Largest number of joints whose clearances are computed."""
+LOOPS = 5
+"""Number of times that `_loop` is timed; the shortest time counts."""
+LOOP_S = 0.0124
+"""Time of `_loop` on the core that the three times below were measured on, s."""
 START_S = 4.0
-"""Time from the command to the first joint: imports, loading the kernels, start of the workers; on one core, s."""
-REPORT_S, REPORT_S_PER_JOINT = 2.0, 2.5e-5
-"""Time of a report with 16 limits: imports and figures, and per joint; on the same core, s."""
+"""Time from the command to the first joint: imports, loading the kernels, start of the workers, s."""
+REPORT_S, REPORT_S_PER_JOINT = 3.0, 2.5e-5
+"""Time of a report with 16 limits: imports and figures, and per joint, s."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +137,7 @@ class Plan:
     stages : dict of str to float
         Time of each stage of the whole command ``tolstat run`` if every process has a core of its own, s: ``start`` (of
         this process and the workers, kernels compiled), ``joints``, ``check`` of the numerical error, ``report``.
+        Joints and check are timed in the pilot; start and report are scaled by the speed of this machine, and rough.
     process_bytes : int
         Peak memory of this process so far; the campaign needs as much for each worker and for its parent process.
     file_bytes : int
@@ -146,6 +152,8 @@ class Plan:
         Joints that do not go together.
     fit : list of str
         What the fit of the study means, as lines of text; empty without one.
+    sweep : list of str
+        Axes of a sweep whose values are deviations where a value of the joint is easily meant, as lines of text.
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
     correlations : list of dict
@@ -171,6 +179,7 @@ class Plan:
     reversals: Reversals
     assembly: Assembly
     fit: list[str]
+    sweep: list[str]
     tolerances: list[dict[str, Any]]
     correlations: list[dict[str, Any]]
 
@@ -211,8 +220,9 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     each = seconds / len(rows)
     stage("check of the numerical error")
     check = _check(study, params, simulation, [own[number] for number in variants(study, rows)])
-    stages = {"start": START_S, "joints": each * study.rows / workers, "check": check}
-    stages["report"] = REPORT_S + REPORT_S_PER_JOINT * study.rows
+    slower = min(_loop() for _ in range(LOOPS)) / LOOP_S
+    stages = {"start": slower * START_S, "joints": each * study.rows / workers, "check": check}
+    stages["report"] = slower * (REPORT_S + REPORT_S_PER_JOINT * study.rows)
     iid = study.sampling.method == "random"
     valid = slice(study.first_sample, None)
     status = simulation.results["status"]
@@ -233,10 +243,27 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(params, simulation.results),
         assembly=_assembly(study, iid),
-        fit=[] if study.fit is None else study.fit.meaning,
+        fit=fit_in_words(study),
+        sweep=swept.meaning(study.sweep, study.joint),
         tolerances=text.records(meaning.table(study.entries)),
         correlations=text.records(meaning.correlations(study.copula, study.tolerances)),
     )
+
+
+def _loop() -> float:
+    """Processor time of a fixed piece of Python, s: start and report are Python, and take as much more or less."""
+    begin, total = time.process_time(), 0
+    for i in range(300_000):
+        total += i % 7
+    return time.process_time() - begin
+
+
+def fit_in_words(study: Study) -> list[str]:
+    """Lines about the fit of a study, also which values of the joint file it replaces; empty without one."""
+    if study.fit is None:
+        return []
+    values = " and ".join(f"{key} = {value}" for key, value in study.joint.replaced_bearing.items())
+    return [*study.fit.meaning, *([f"fit: replaces {values} of the joint file"] if values else [])]
 
 
 def _assembly(study: Study, iid: bool) -> Assembly:

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from tolstat.campaign import signals, verify
 from tolstat.campaign.blocks import Execution, Stages, pending, simulate_pending
 from tolstat.campaign.executors import WorkerDied
-from tolstat.campaign.extend import NOT_EXTENDABLE
+from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
 from tolstat.campaign.retry import Retry, begin
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
 from tolstat.solver import fidelity, rainflow
 from tolstat.store import Counts, Reader, ResultStore
-from tolstat.store.provenance import versions
+from tolstat.store.provenance import differing_code
 from tolstat.store.recall import differing_keys
 from tolstat.store.recorded import perturbed, settings
 
@@ -242,14 +242,8 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     found, remedy = "is the result file of another study", "give another file: --out OTHER.h5"
     if not differing:
-        code = f"commit {store.git_commit}" if store.git_commit else "the version that began it"
-        found = "was begun by another version of the code"
-        remedy = f"run the study into another file (--out OTHER.h5), or resume with {code}"
-    now = versions()
-    for name, noun in (("tolstat", "version"), ("sources", "hash")):
-        held = store.versions.get(name, "unknown")
-        if held != now[name]:
-            differing.append(f"{name}: {noun} {held} in the file, {now[name]} now")
+        found, remedy = OTHER_CODE, f"run the study into another file (--out OTHER.h5), or resume with {code_of(store)}"
+    differing += differing_code(store.versions)
     if held_n := _other_number(store, study, differing):
         raise StoreError(str(_of_number(store, held_n, study.samples)))
     if not differing and store.rows != rows:

@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
 from tolstat.store import Counts, Reader, ResultStore, recorded, verification
-from tolstat.store.provenance import versions
+from tolstat.store.provenance import differing_code
 from tolstat.store.verification import Check, Verification
 
 if TYPE_CHECKING:
@@ -296,7 +296,7 @@ def check_file(
     """
     number = parse_joints(joints)
     with ResultStore.open_to_write(path) as store:
-        if any(store.versions.get(key) != value for key, value in versions().items() if key in ("tolstat", "sources")):
+        if differing_code(store.versions):
             remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
             raise StoreError(str(Fault(str(path), "was made by another version of the code", remedy)))
         seed = int(store.sampling["seed"]) if seed is None else seed

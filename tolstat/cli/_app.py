@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from tolstat import __version__
 from tolstat.cli._talk import LogFile, Quiet, Verbose, fail, say, session, warn
@@ -57,6 +57,22 @@ class _Commands(TyperGroup):
             rows = [(f"{name:{width}}", self.commands[name].get_short_help_str(formatter.width)) for name in names]
             with formatter.section(heading):
                 formatter.write_dl(rows)
+
+
+class OneCommand(TyperCommand):
+    """A command whose help names each argument by its word alone: FILE, without a type of Python behind it."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Parameters of the command, for help and for parsing."""
+        found = super().get_params(ctx)
+        for argument in found:
+            if isinstance(argument, TyperArgument):
+                argument.display_type_rich = _no_type  # type: ignore[method-assign]
+        return found
+
+
+def _no_type(ctx: Any) -> None:
+    return None
 
 
 app = typer.Typer(

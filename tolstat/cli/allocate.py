@@ -26,7 +26,7 @@ def allocate(
         typer.Option(
             "--costs",
             metavar="TABLE",
-            help="Cost of each tolerance, TOML or CSV (see docs/questions/allocate.md); default: cost inversely "
+            help="Cost of each tolerance, TOML or CSV (see tolstat docs allocate); default: cost inversely "
             "proportional to the tolerance.",
         ),
     ] = None,

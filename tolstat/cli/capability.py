@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
-from tolstat.cli._talk import progress, say, warn
+from tolstat.cli._talk import progress, say, warn, wrapped
 from tolstat.common.errors import Fault, InputError, StoreError
 
 
@@ -56,4 +56,4 @@ def capability(
         print_table(rendering.RETURNS, rare, wide)
     say(rendering.note(table))
     if rare is not None and (no_tail := rendering.no_tail(rare)):
-        warn(f"warning: {no_tail}; a subset simulation needs no tail: tolstat rare")
+        warn(wrapped(f"warning: {no_tail}; tolstat rare, a subset simulation, needs no tail"))

@@ -74,7 +74,7 @@ def export(
     versions.
 
     --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
-    keeps cycles or load histories. docs/questions/fatigue.md shows how to read it as a pandas Series.
+    keeps cycles or load histories. To read it as a pandas Series: tolstat docs fatigue
 
     Example: tolstat export iso2768_f.h5 --csv joints.csv
     """

@@ -1,4 +1,4 @@
-"""``tolstat fatigue``: damage-equivalent loads and damage sums over a service life."""
+"""``tolstat fatigue``: failures of the parts, damage-equivalent loads and damage sums over a service life."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Wide, as_text, output_file, print_table
+from tolstat.cli._app import AsJson, Wide, announce_compilation, as_text, output_file, print_table
 from tolstat.cli._talk import progress, say
 
 
@@ -37,14 +37,20 @@ def fatigue(
         Path | None,
         typer.Option("--out", metavar="CSV", help="Write the damage-equivalent loads of all components as CSV."),
     ] = None,
+    joints: Annotated[
+        int | None,
+        typer.Option("--joints", metavar="N", min=1, help="Evaluate the first N joints only; default: all."),
+    ] = None,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print damage-equivalent loads and damage sums.
+    """Print failures of parts, equivalent loads and damage sums.
 
-    Prints the quantiles of the damage-equivalent load over the joints, and for each S-N line the share of joints whose
-    damage sum exceeds 1, with 95 % intervals. Without --by, prints the most loaded component of each bushing force
-    and torque. Exponents, service life and S-N lines are those of [fatigue] in the study of the first FILE.
+    For each [fatigue.point] of the study: the damage sum, the life that 90 % of the parts reach, and the share of the
+    parts that fail in the service life, with 95 % intervals. Without load histories in the file, the joints are
+    simulated again. From cycles in the file: quantiles of the damage-equivalent load over the joints, and for each S-N
+    line of a load the share of joints whose damage sum exceeds 1. Without --by, prints the most loaded component of
+    each bushing force and torque. All settings are those of [fatigue] in the study of the first FILE.
 
     Several files form a duty cycle: the same joints at several operating points.
 
@@ -52,28 +58,50 @@ def fatigue(
     """
     from tolstat.common.files import check_target
     from tolstat.display import text
-    from tolstat.questions.fatigue import query, rendering
+    from tolstat.questions.fatigue import parts, parts_rendering, query, rendering
     from tolstat.questions.fatigue.counting import channels
+    from tolstat.questions.fatigue.stress import load_stresses
     from tolstat.store import Reader
+    from tolstat.store.revolutions import held
+    from tolstat.study.fatigue import of_text
 
     if out is not None:
         check_target(out, *files)
     names = channels(by) if by else None
-    with progress("counting cycles"), ExitStack() as stack:
+    with ExitStack() as stack:
         views = [stack.enter_context(Reader.open(file)).view() for file in files]
-        loading = query.load_cycles(views, share or [1.0], names)
-        loads, damages = query.equivalent_loads(loading), query.damages(loading)
-    if out is not None:
+        points = of_text(views[0].store.study_text, str(files[0])).points
+        stressed = loading = None
+        if points:
+            if not all(held(view.store) for view in views):
+                announce_compilation()
+            with progress("stresses of the parts"):
+                stressed = load_stresses(views, share or [1.0], joints)
+                failures = parts.part_failures(stressed)
+        if all(view.store.history_specs for view in views) or names or out is not None or not points:
+            with progress("counting cycles"):
+                loading = query.load_cycles(views, share or [1.0], names, joints)
+                loads, damages = query.equivalent_loads(loading), query.damages(loading)
+    if loading is not None and out is not None:
         with output_file(out) as temporary:
             loads.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
         say(f"wrote {out}")
     if as_json:
-        typer.echo(as_text({"loads": text.records(loads), "damages": text.records(damages)}))
+        found = {"points": text.records(failures)} if stressed is not None else {}
+        if loading is not None:
+            found |= {"loads": text.records(loads), "damages": text.records(damages)}
+        typer.echo(as_text(found))
         return
-    shown = [] if by else query.most_loaded(loads)
-    table = rendering.by_channel(loads[loads["channel"].isin(shown)] if shown else loads)
-    print_table(rendering.LOADS, table, wide)
-    if len(damages):
-        typer.echo("\nshare of joints whose damage sum exceeds 1")
-        print_table(rendering.DAMAGES, damages, wide)
-    say(rendering.notes(loading, loads))
+    if stressed is not None:
+        print_table(parts_rendering.PARTS, failures, wide)
+        say(parts_rendering.notes(stressed, failures))
+    if loading is not None:
+        if stressed is not None:
+            typer.echo("\ndamage-equivalent loads")
+        shown = [] if by else query.most_loaded(loads)
+        table = rendering.by_channel(loads[loads["channel"].isin(shown)] if shown else loads)
+        print_table(rendering.LOADS, table, wide)
+        if len(damages):
+            typer.echo("\nshare of joints whose damage sum exceeds 1")
+            print_table(rendering.DAMAGES, damages, wide)
+        say(rendering.notes(loading, loads))

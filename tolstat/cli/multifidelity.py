@@ -78,8 +78,8 @@ def multifidelity(
     make_folder(out)
     announce_compilation()
     try:
-        with progress("joints at two fidelities"):
-            found = two_fidelities(plan, low, high, out, seconds, pilot, by, workers, say)
+        with progress("joints at two fidelities") as shown:
+            found = two_fidelities(plan, low, high, out, seconds, pilot, by, workers, shown.note, shown.stage, shown)
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop

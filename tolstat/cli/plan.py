@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_warnings, warn_without_interval
-from tolstat.cli._talk import progress, say
+from tolstat.cli._talk import progress, say, wrapped
 
 if TYPE_CHECKING:
     from tolstat.campaign.plan import Plan
@@ -58,11 +58,12 @@ def _lines(made: Plan) -> str:
         *_rattle_warning(made),
         *_misfit_warning(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
-        f"time: {_duration(made.seconds)} on {made.workers} cores, of which",
+        f"time: about {_duration(made.seconds)} on {made.workers} cores, of which",
         *(f"  {stage}: {_duration(seconds)}" for stage, seconds in made.stages.items()),
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",
         *made.fit,
+        *made.sweep,
     ]
     lines += [
         f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"
@@ -76,7 +77,7 @@ def _lines(made: Plan) -> str:
     lines += [
         f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}" for q, n in made.wilks.items()
     ]
-    return "\n".join(lines + _meanings(made))
+    return wrapped("\n".join(lines)) + "\n".join(["", *_meanings(made)])
 
 
 def _meanings(made: Plan) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tolstat.cli._app import AsJson, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
-from tolstat.cli._talk import fail, progress, say
+from tolstat.cli._talk import fail, progress, say, wrapped
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def rare(
     """Estimate a rare exceedance by subset simulation.
 
     Estimates P(load > level) down to 1e-9. Each level of the simulation starts from the joints of the previous level
-    with the largest loads. docs/questions/rare.md states what the interval does not cover.
+    with the largest loads. What the interval does not cover: tolstat docs rare
 
     Prints threshold and share of each level, and the probability with its 95 % interval. Writes all joints to a result
     file. To resume after an interruption, run the same command again.
@@ -83,8 +83,8 @@ def rare(
         plan, path = _recall(source, study_file, [limit, out, *given.values()]), source
     announce_compilation()
     try:
-        with progress("levels of the subset simulation"):
-            found = simulation.run(plan, path, workers, say)
+        with progress("levels of the subset simulation") as shown:
+            found = simulation.run(plan, path, workers, shown.note, shown)
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
@@ -97,7 +97,7 @@ def rare(
         typer.echo(as_text(_summary(found) | {"levels": text.records(levels)}))
     else:
         print_table(tables.LEVELS, levels, wide)
-        typer.echo(tables.sentence(found.estimate, sampling.load, sampling.above))
+        typer.echo(wrapped(tables.sentence(found.estimate, sampling.load, sampling.above)))
     _print_messages(found, path)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
-from tolstat.cli._talk import progress
+from tolstat.cli._talk import progress, wrapped
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,7 +38,7 @@ def status(file: ResultFile, wide: Wide = False, as_json: AsJson = False) -> Non
         return
     typer.echo(_text(summary))
     for reason in why:
-        typer.echo(reason.text)
+        typer.echo(wrapped(reason.text))
     if summary["exceedance"]:
         _print_shares(summary["exceedance"], wide)
 

@@ -19,6 +19,13 @@ def data_dir() -> Path:
     return inside if inside.is_dir() else package.parent / "data"
 
 
+def docs_dir() -> Path:
+    """Directory of the pages for users, as text: inside the package in an installed wheel, beside it in a checkout."""
+    package = Path(__file__).parent.parent
+    inside = package / "docs"
+    return inside if inside.is_dir() else package.parent / "docs"
+
+
 def check_target(path: Path, *inputs: Path) -> None:
     """Check that a result file can be written, before the work that produces the result.
 

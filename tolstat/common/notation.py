@@ -50,7 +50,7 @@ _ANGLE = re.compile(
 """Degrees, minutes and seconds, of which any may be left out."""
 
 _SPELLINGS = (
-    (re.compile(r"(?<![A-Za-z])([kMmd]?N)(m|cm|mm)(?![A-Za-z])"), r"\1*\2"),
+    (re.compile(r"(?<![A-Za-z])([kMmd]?N)(m|cm|mm)(?![A-Za-z])"), r"(\1*\2)"),
     (re.compile(r"(?<![A-Za-z])(?:U|r|tr)(?![A-Za-z])"), "turn"),
     (re.compile(r"(?<![A-Za-z])(?:RPM|Rpm|UPM|UpM|Upm)(?![A-Za-z])"), "rpm"),
     (re.compile(r"(?<=[A-Za-z])-1(?!\d)"), "^-1"),

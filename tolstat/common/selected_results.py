@@ -20,6 +20,7 @@ KEY = "output.results"
 """Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
 OPTIONAL_FIELDS = (
     "mode_share",
+    "equivalent_load",
     "clearance",
     *(field.name for kind in LOAD_KINDS for field in kind.statistics().values()),
 )

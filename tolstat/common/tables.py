@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tolstat.common.fields import Field, Kind, dtype_of
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
 PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
@@ -33,6 +33,8 @@ CONTACTS = ("outer", "inner", "resultant")
 OUTER, INNER, RESULTANT = range(3)
 STEPS_PER_ITERATION = 5
 """Number of explicit steps that take the time of a Newton iteration."""
+LIFE_EXPONENT = 10 / 3
+"""Power of the load in the rating life of roller bearings (ISO 281)."""
 MAX_ITERATIONS = 40
 """Upper bound on a joint's Newton iterations per step of the longest run allowed, so that no joint blocks a campaign.
 Joints that never settle take some 8 to 10."""
@@ -299,6 +301,14 @@ RESULT_FIELDS = (
         "share of the revolutions that count in each contact mode",
         shape=(len(PINS), len(Mode)),
         columns=tuple(f"{pin}.share_{mode.name.lower()}" for pin in PINS for mode in Mode),
+    ),
+    Field(
+        "equivalent_load",
+        "N",
+        "dynamic equivalent load of the pin's bearing: mean of the resultant contact force with exponent 10/3, "
+        f"weighted by the travel of the pin in its hole, {OVER}",
+        shape=(len(PINS),),
+        columns=tuple(f"{pin}.equivalent_load" for pin in PINS),
     ),
     *(field for kind in LOAD_KINDS if not kind.places for field in kind.statistics().values()),
     *(field for kind in LOAD_KINDS for field in kind.ends()),

@@ -28,6 +28,7 @@ EXAMPLES = {
     "m^4": "1.02e-7 m^4",
     "rad": "0.5 deg",
     "rad/s": "500 rpm",
+    "s": "5000 h",
     "N": "700 N",
     "N*m": "100 N*m",
     "N*m/rad": "5.9e5 N*m/rad",
@@ -35,6 +36,8 @@ EXAMPLES = {
     "N/m^2": "7.5e7 N/mm^2",
     "N*s/m": "200 N*s/m",
     "Pa": "210 GPa",
+    "1/m^2": "2.5 MPa/kN",
+    "1/m^3": "0.2 MPa/(N*m)",
     "kg": "0.32 kg",
     "kg*m^2": "0.01 kg*m^2",
     "kg/m^3": "7700 kg/m^3",
@@ -332,6 +335,7 @@ Angle = Annotated[float, Quantity("rad")]
 Speed = Annotated[float, Quantity("rad/s")]
 Torque = Annotated[float, Quantity("N*m")]
 Stress = Annotated[float, Quantity("Pa")]
+Time = Annotated[float, Quantity("s")]
 Mass = Annotated[float, Quantity("kg")]
 Inertia = Annotated[float, Quantity("kg*m^2")]
 Density = Annotated[float, Quantity("kg/m^3")]

@@ -16,14 +16,17 @@ if TYPE_CHECKING:
     from tolstat.display.asked import Asked
     from tolstat.display.blocks import Section
     from tolstat.questions.allocate.query import allocated as allocated
+    from tolstat.questions.bearing_life.lives import lives_of as lives_of
     from tolstat.questions.causes.angles import against_angle as against_angle
     from tolstat.questions.causes.pairs import pairs_of as pairs_of
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
     from tolstat.questions.compare.query import compared as compared
+    from tolstat.questions.fatigue.parts import part_failures as part_failures
     from tolstat.questions.fatigue.pylife import pylife_series as pylife_series
     from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
     from tolstat.questions.fatigue.query import load_cycles as load_cycles
+    from tolstat.questions.fatigue.stress import load_stresses as load_stresses
     from tolstat.questions.multifidelity.query import two_fidelities as two_fidelities
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
@@ -59,12 +62,21 @@ class Question(NamedTuple):
 QUESTIONS = (
     Question("what_if", ("query.what_if",), has_section=True),
     Question("exceedance", has_section=True, has_summary=True),
+    Question("histograms", has_section=True),
     Question("capability", has_section=True, has_summary=True),
     Question(
         "causes", ("query.causes_of", "angles.against_angle", "pairs.pairs_of", "tail.worst_joints"), has_section=True
     ),
     Question("show", ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"), has_section=True),
-    Question("fatigue", ("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"), has_section=True),
+    Question(
+        "fatigue",
+        (
+            *("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"),
+            *("stress.load_stresses", "parts.part_failures"),
+        ),
+        has_section=True,
+    ),
+    Question("bearing_life", ("lives.lives_of",), has_section=True, has_summary=True),
     Question("accuracy", has_section=True, has_summary=True),
     Question("joints", has_section=True),
     Question("time_above", ("query.time_above",)),

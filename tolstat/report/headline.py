@@ -34,12 +34,15 @@ class Headline(NamedTuple):
         The answer or, without one, a share or its interval; the rest of the sentence.
     notes : tuple of str
         Causes, remedies, and what else restricts the verdict.
+    load : str
+        The load whose limit it is about: of several, that most joints exceed. Empty if there is no verdict.
     """
 
     answer: str
     value: str
     words: str
     notes: tuple[str, ...] = ()
+    load: str = ""
 
     @property
     def sentence(self) -> str:
@@ -73,7 +76,7 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limits(view).to_dict("records")
     found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
-    worst = max(records, key=lambda row: np.nan_to_num(row["estimate"], nan=-1.0))
+    worst = _worst(view, records)
     unresolved = _causes(view) if _matter(records if found.answer == "none" else [worst]) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
 
@@ -151,7 +154,7 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
     concerned = [row for row, own in zip(records, answers, strict=True) if own == answer]
     if answer == "none":
         return Headline(answer, WORDS[answer], _reason(view, concerned), notes)
-    worst = max(concerned, key=lambda row: row["estimate"])
+    worst = _worst(view, concerned)
     limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
     interval = f"total interval {text.span(*ends(worst))}"
     if answer == "no":
@@ -166,7 +169,12 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
     else:
         which = limit if len(concerned) == 1 else f"{len(concerned)} limits, most of all {limit}"
         said = f"the joints that exceed {which} may be more or fewer than {most} ({interval})"
-    return Headline(answer, WORDS[answer], said, notes)
+    return Headline(answer, WORDS[answer], said, notes, worst["load"])
+
+
+def _worst(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
+    """Limit that the largest share of the joints exceeds; of equal shares that of a leading load."""
+    return max(records, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
 
 
 def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
@@ -176,16 +184,15 @@ def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
         known = [row for row in records if not np.isnan(row["estimate"])]
         if not known or _undecided(known):
             return Headline("none", WORDS["none"], _reason(view, records), notes)
-        worst = max(known, key=lambda row: row["estimate"])
+        worst = _worst(view, known)
         limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
         interval = "total interval" if _matter([worst]) else f"total interval {text.span(*ends(worst))}"
-        return Headline(
-            "", share_of(worst), f"of the joints exceed {limit}, the limit exceeded most ({interval})", notes
-        )
+        said = f"of the joints exceed {limit}, the limit exceeded most ({interval})"
+        return Headline("", share_of(worst), said, notes, worst["load"])
     found = capabilities.together(capability.limits(view))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, records), notes)
-    return Headline("", found.value, found.words, notes)
+    return Headline("", found.value, found.words, notes, _worst(view, records)["load"])
 
 
 def _undecided(records: list[dict[Any, Any]]) -> bool:

@@ -13,9 +13,9 @@ from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
 from tolstat.display.asked import Asked, silent
 from tolstat.display.blocks import Facts, Listing, Page, Section
-from tolstat.report import html, verdict
+from tolstat.report import html, joint_values, verdict
 from tolstat.solver import fidelity
-from tolstat.store import Reader
+from tolstat.store import viewed
 from tolstat.store.integrity import DIGEST
 from tolstat.store.result_file import BLOCK
 
@@ -28,7 +28,7 @@ REPLAYED = 1000
 
 
 def write_page(
-    path: str | Path,
+    source: str | Path | Reader | View,
     out: str | Path,
     accepted: float = np.nan,
     replay: int = REPLAYED,
@@ -38,8 +38,8 @@ def write_page(
 
     Parameters
     ----------
-    path : str or Path
-        The result file of a study that draws its joints or sweeps.
+    source : str, Path, Reader or View
+        The result file of a study that draws its joints or sweeps: its path, what `tolstat.open` returns, or a view.
     out : str or Path
         HTML file to write.
     accepted : float
@@ -65,25 +65,31 @@ def write_page(
     >>> tolstat.write_page("iso2768_f.h5", "iso2768_f.html", accepted=0.01)  # doctest: +SKIP
     PosixPath('iso2768_f.html')
     """
-    with Reader.open(path) as store:
-        if store.case_names:
+    with viewed(source) as view:
+        if view.store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
-            raise StoreError(str(Fault(str(path), "lists its joints one by one", remedy)))
-        made = compose(store.view(), Asked(store.path, accepted, replay, stage=stage))
+            raise StoreError(str(Fault(str(view.path), "lists its joints one by one", remedy)))
+        made = compose(view, Asked(view.path, accepted, replay, stage=stage))
         stage("page: pictures")  # drawn from the view
         html.write(made, Path(out))
     return Path(out)
 
 
 def compose(view: View, asked: Asked) -> Page:
-    """Compose the page; what cannot be evaluated is left out, and a note in the first section says why."""
+    """Compose the page: verdict, the sections that stand with it, the others, provenance.
+
+    What cannot be evaluated is left out, and a note in the first section says why.
+    """
     asked.notes.extend(
         note for note in (fidelity.sentence(view.store.options, view.store.fidelity), _stopped(view)) if note
     )
-    sections = questions.sections(view, asked)
+    sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
     facts = Facts(tuple(_facts(view.store)))
-    provenance = Section("provenance", "Provenance", [facts, Listing("The study as it was run", view.store.study_text)])
-    return Page(view.name, f"{view.head()}.", [verdict.section(view, asked), *sections, provenance])
+    text = Listing("The study as it was run", view.store.study_text)
+    provenance = Section("provenance", "Provenance", [facts, joint_values.listing(view.store), text])
+    lead = [section for section in sections if section.lead]
+    rest = [section for section in sections if not section.lead]
+    return Page(view.name, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
 
 
 def _stopped(view: View) -> str:

@@ -47,7 +47,9 @@ SESSION = {
 
 def study_attributes(study: Study) -> dict[str, str]:
     """Return the attributes of a study that do not affect results and may change between runs of a campaign."""
-    return {"study": study.text, "study_name": study.name, "limits": json.dumps(study.limits, allow_nan=False)}
+    structured = {"limits": study.limits, "joint": study.joint.given("json")}
+    plain = {"study": study.text, "study_name": study.name}
+    return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
 
 
 def attributes(
@@ -73,7 +75,6 @@ def attributes(
     sampling = study.sampling.model_dump(mode="json")
     structured = {
         "identity": study.identity(),
-        "joint": study.joint.given("json"),
         "options": to_names(options or study.solver.options()),
         "fidelity": dict(fidelity or {}),
         "design": {"cases": study.case_names, "variants": [variant._asdict() for variant in study.variants]},

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -125,7 +127,6 @@ class Reader(CheckedTables):
         self.git_commit = text(attrs, "git_commit")
         self.identity = checks.mapping(file, "identity")
         self.columns = selected_results.columns(self.identity)
-        self.joint = checks.mapping(file, "joint")
         self.options = checks.mapping(file, "options")
         self.sampling = checks.mapping(file, "sampling")
         self.fidelity = checks.mapping(file, "fidelity") if "fidelity" in attrs else {}
@@ -312,6 +313,7 @@ class Reader(CheckedTables):
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
         self.limits: dict[str, float] = json.loads(text(attrs, "limits"))
+        self.joint = checks.mapping(self._file, "joint")
 
     def _reopen(self) -> bool:
         """Switch to the file that has replaced this one and includes the histories; return whether there is one."""
@@ -337,3 +339,15 @@ class Reader(CheckedTables):
 def parts_folder(path: Path) -> Path:
     """Folder of the histories of a campaign that is not complete yet."""
     return path.with_name(path.name + ".parts")
+
+
+@contextmanager
+def viewed(source: str | Path | Reader | View) -> Iterator[View]:
+    """View of a result file: of its path, which is opened and closed, or of the open file; a view stays as it is."""
+    if isinstance(source, View):
+        yield source
+    elif isinstance(source, Reader):
+        yield source.view()
+    else:
+        with Reader.open(source) as store:
+            yield store.view()

@@ -97,18 +97,27 @@ def read(store: Reader, slots: NDArray[np.intp], max_angles: int = ANGLES) -> Re
     angles = 2.0 * np.pi * np.arange(0, steps, every) / steps
     moduli = np.empty((2, len(slots), angles.size, 8))
     apart = 0.0
-    if origin == AGAIN and len(slots):
-        warm_up()
-    for part in blocks(len(slots)):
-        if origin == AGAIN:
-            found, difference = _again(store, slots[part])
-            apart = max(apart, difference)
-        else:
-            found = loads(store, slots[part])
+    for part, found, difference in of_components(store, slots):
+        apart = max(apart, difference)
         kept = found[:, ::every].astype(float)
         for k in (0, 1):
             moduli[k, part] = np.linalg.norm(kept[..., 3 * k : 3 * k + 3], axis=-1)
     return Revolutions(angles, moduli[0], moduli[1], origin, apart)
+
+
+def of_components(store: Reader, slots: NDArray[np.intp]) -> Iterator[tuple[slice, NDArray[Any], float]]:
+    """Yield the bushing loads of joints part by part: the part of `slots`, its `loads`, and `Revolutions.apart`.
+
+    Arguments and exceptions as in `read`; joints are simulated again where the file holds no loads.
+    """
+    again = not held(store)
+    if again and len(slots):
+        warm_up()
+    for part in blocks(len(slots)):
+        if again:
+            yield part, *_again(store, slots[part])
+        else:
+            yield part, loads(store, slots[part]), 0.0
 
 
 def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:

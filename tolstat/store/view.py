@@ -256,8 +256,8 @@ class View:
 
     @property
     def most_exceeded(self) -> str:
-        """Load whose limit the largest share of the joints exceeds; without limits see `leading`."""
-        shares = {load.name: load.above(load.limit).estimate for load in self.loads(list(self.limits)) if load.limit}
+        """The leading load whose limit the largest share of the joints exceeds; see `leading`."""
+        shares = {load.name: load.above(load.limit).estimate for load in self.loads(self.leading) if load.limit}
         known = {name: share for name, share in shares.items() if share == share}
         return max(known, key=lambda name: known[name]) if known else next(iter((*self.leading, "cross1.F")))
 

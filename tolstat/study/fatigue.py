@@ -7,16 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import Strict
+from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import CHANNELS
+from tolstat.study import stress_point
 from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve
-
-Positive = Annotated[units.Number, AfterValidator(units.positive)]
-Exponent = Annotated[units.Number, Field(ge=1, le=30)]
+from tolstat.study.stress_point import Exponent, Positive, StressPoint
 
 
 class Settings(Strict):
@@ -40,6 +39,27 @@ class Settings(Strict):
         examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
         json_schema_extra={"x-table": "lines"},
     )
+    starts: Annotated[
+        units.Number,
+        AfterValidator(units.not_negative),
+        Field(description="starts from standstill in the service life, for points", examples=[2e4]),
+    ] = 0.0
+    point: dict[str, Any] = Field(
+        default_factory=dict,
+        description="points of the parts by name, with stress per load and S–N line",
+        examples=[
+            {"pin root": {"bushing": "cross*", "T_t": "0.2 MPa/Nm", "k": 5, "N_D": 2e6, "S_D": "360 MPa", "T_S": 1.25}}
+        ],
+        json_schema_extra={"x-table": "points"},
+    )
+
+    @model_validator(mode="after")
+    def _starts_take_revolutions(self) -> Settings:
+        if self.starts > self.revolutions:
+            raise refuse(
+                "{starts} starts in {revolutions} revolutions", "give at most one for each", "starts", "revolutions"
+            )
+        return self
 
 
 class LineEntry(Strict):
@@ -71,12 +91,18 @@ class Fatigue:
         Number of cycles that the damage-equivalent loads refer to.
     lines : dict
         Name of a channel to (m, S0, N0) of its S–N line; S0 a range, N or N m.
+    starts : float
+        Starts from standstill in the service life.
+    points : tuple of StressPoint
+        Points of the parts.
     """
 
     exponents: tuple[float, ...] = (3.0, 5.0, 10.0)
     revolutions: float = 1e6
     reference_cycles: float = 1e6
     lines: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    starts: float = 0.0
+    points: tuple[StressPoint, ...] = ()
 
 
 def read(table: object, place: str) -> Fatigue:
@@ -99,15 +125,19 @@ def read(table: object, place: str) -> Fatigue:
     claims, faults = Assignments(place), list[Fault]()
     with gather(faults):
         settings = strict.validate(Settings, table, place, prefix=("fatigue",))
-    written = table.get("line", {}) if isinstance(table, Mapping) else {}
-    for entry in entries(written if isinstance(written, Mapping) else {}, "fatigue", "line"):
+    points: tuple[StressPoint, ...] = ()
+    for entry in entries(_inner(table, "line"), "fatigue", "line"):
         with gather(faults):
             names = resolve(entry, CHANNELS, place)
             claims.claim(entry, names)
             lines |= dict.fromkeys(names, _line(entry, CHANNELS[names[0]], place))
+    with gather(faults):
+        points = stress_point.read(_inner(table, "point"), place)
     if faults:
         raise InputError(faults)
-    return Fatigue(tuple(settings.exponents), settings.revolutions, settings.reference_cycles, lines)
+    return Fatigue(
+        tuple(settings.exponents), settings.revolutions, settings.reference_cycles, lines, settings.starts, points
+    )
 
 
 def of_text(text: str, place: str) -> Fatigue:
@@ -119,6 +149,12 @@ def of_text(text: str, place: str) -> Fatigue:
         With every fault.
     """
     return read(tomllib.loads(text).get("fatigue", {}), place)
+
+
+def _inner(table: object, key: str) -> Mapping[str, Any]:
+    """Table inside the section; empty where it has none, or something else that validation refuses."""
+    inner = table.get(key, {}) if isinstance(table, Mapping) else {}
+    return inner if isinstance(inner, Mapping) else {}
 
 
 def _line(entry: Entry, unit: str, place: str) -> tuple[float, float, float]:

@@ -285,8 +285,9 @@ class StudyFile:
             self._fault(("output", "harmonics"), found, f"give at most {most}, or a larger solver.steps_per_rev")
 
     def check_fatigue(self, output: Output) -> None:
-        """Note a fatigue section where no cycles are stored."""
-        if "fatigue" in self.data and output.histories == "none":
+        """Note a fatigue section where no cycles are stored; for points joints are simulated again."""
+        own = self.data.get("fatigue")
+        if output.histories == "none" and isinstance(own, Mapping) and "point" not in own:
             self._fault(("fatigue",), "has no effect without histories", 'write histories = "cycles" in [output]')
 
     def check_limits(self, output: Output, limits: Mapping[str, float]) -> None:

@@ -104,16 +104,15 @@ def joint_text() -> str:
 
 
 def _table(part: Mapping[str, Any], values: Mapping[str, Any], name: str = "") -> Iterator[str]:
-    """Lines of a table: its keys with their values, then the tables in it."""
+    """Lines of a table: its keys with their values, then the tables in it; of one without values as comments."""
     if name:
         yield ""
         yield from textwrap.wrap(part.get("description", ""), WIDTH, initial_indent="# ", subsequent_indent="# ")
-        yield f"[{name}]"
+        yield f"[{name}]" if values else f"# [{name}]"
     lines, inner = [], []
     for key, own in part["properties"].items():
         if own.get("type") == "object":
-            if key in values:
-                inner.append(_table(own, values[key], f"{name}.{key}" if name else key))
+            inner.append(_table(own, values.get(key, {}), f"{name}.{key}" if name else key))
         elif key in values:
             lines.append((f"{key} = {_toml(values[key])}", own))
         else:

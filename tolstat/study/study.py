@@ -16,7 +16,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words
 from tolstat.common.strict import with_lines
 from tolstat.common.tables import DESIGN, Variant
-from tolstat.joint import Joint, Operation
+from tolstat.joint import AFFECT_NOTHING, Joint, Operation
 from tolstat.study import listing
 from tolstat.study.axes import Axis
 from tolstat.study.design import Design, flat
@@ -212,11 +212,11 @@ class Study(Case):
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.
 
-        Limits, comments and the file's name do not belong to it. Two studies of equal identity have the
+        Limits, bearings, comments and the file's name do not belong to it. Two studies of equal identity have the
         same rows with the same results.
         """
         parts: dict[str, Any] = {
-            "joint": {k: v for k, v in self.joint.given("json").items() if k != "description"},
+            "joint": {k: v for k, v in self.joint.given("json").items() if k not in AFFECT_NOTHING},
             "operation": self.operation.model_dump(),
             "solver": self.solver.model_dump(),
             "errors": self.errors,

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.common.units import Quantity
-from tolstat.joint import Joint
+from tolstat.joint import AFFECT_NOTHING, Joint
 from tolstat.joint.sections import quantities
 from tolstat.study.design import nested
 from tolstat.study.listing import Variants
 from tolstat.study.model import SweepAxis
 
-KEYS = quantities(Joint)
-"""SI unit of each quantity of a joint, by dotted key."""
+KEYS = {key: unit for key, unit in quantities(Joint).items() if key.partition(".")[0] not in AFFECT_NOTHING}
+"""SI unit of each quantity of a joint that affects results, by dotted key."""
 MAX_JOINTS = 10_000
 """Maximum number of joints with dimensions of their own."""
 
@@ -40,6 +40,30 @@ class Swept(NamedTuple):
     variants: tuple[Variant, ...]
     joints: tuple[Joint, ...]
     table: NDArray[np.void]
+
+
+def meaning(axes: Sequence[SweepAxis], joint: Joint) -> list[str]:
+    """Describe the axes of clearances and diameters, whose values are deviations from those of the joint.
+
+    Returns
+    -------
+    list of str
+        One line for each such axis, with the key that has the value itself; empty for other sweeps.
+    """
+    of = joint.contact
+    keys = {"clearance": "clearance"} | {f"{part}.diameter": key for part, key in (("hole", "D_H"), ("pin", "D_P"))}
+    lines = []
+    for axis in axes:
+        part, _, kind = axis.names[0].partition(".")
+        key = keys.get(kind) or keys.get(f"{part.rstrip('1234')}.{kind}")
+        if axis.names[0] not in KEYS and key is not None:
+            ends = (f"{1e3 * end:.6g}" for end in (axis.start, axis.stop))
+            whole = (f"{1e3 * (getattr(of, key) + end):.6g}" for end in (axis.start, axis.stop))
+            others = len(axis.names) - 1
+            what = f"{axis.names[0]}{f' and {others} others' if others else ''}"
+            lines.append(f"sweep of {what}: deviations from {' to '.join(ends)} mm,")
+            lines.append(f"  the {kind} is {' to '.join(whole)} mm; to sweep it itself: contact.{key}")
+    return lines
 
 
 def read(axes: Sequence[SweepAxis], variants: Variants, joint: Joint, nominal_first: bool, place: str) -> Swept | None:

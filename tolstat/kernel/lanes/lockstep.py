@@ -93,7 +93,7 @@ def finish_joint(lane, status, rows, options, alone, batch, samples, results):
     elif good:
         if options.fidelity == QUASISTATIC:
             speed_ratios(par, own)
-        summarise(own, out)
+        summarise(par, own, out)
         good = is_finite(out)
         if good:
             status = OK if status == OK else NOT_SETTLED

@@ -171,13 +171,13 @@ def merge_extremes(one, out):
 
 
 @njit
-def keep_revolution(samples, extremes, trail, r):
-    """Store moduli and statistics of revolution `r` (from 0); reset `extremes`; return the statistics.
+def keep_revolution(par, samples, extremes, trail, r):
+    """Store moduli and statistics of revolution `r` (from 0) of the joint; reset `extremes`; return the statistics.
 
     Largest and smallest loads are those of all parts: parabolas through samples of the grid would overshoot spikes.
     """
     own = trail.revolution[r % trail.revolution.size]
-    summarise(samples, own)
+    summarise(par, samples, own)
     clear_extremes(own)
     merge_extremes(extremes, own)
     clear_extremes(extremes)
@@ -354,7 +354,7 @@ def after_revolution(point, iterations, par, options, samples, past, out):
         return NEWTON_FAILED, False
     last = turns.revolution
     turns.revolution += 1
-    own = keep_revolution(samples, past.extremes[1], trail, last)
+    own = keep_revolution(par, samples, past.extremes[1], trail, last)
     out.revolutions = turns.revolution
     force, torque = own.largest[FORCES : FORCES + 8].max(), own.largest[TORQUES : TORQUES + 8].max()
     if not (force < 1e300 and torque < 1e300):

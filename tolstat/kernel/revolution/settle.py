@@ -19,6 +19,7 @@ from tolstat.kernel.mechanics.scale import stiffness
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
+from tolstat.kernel.revolution.bearing import write_equivalent_loads
 from tolstat.kernel.revolution.trail import make_notes
 from tolstat.kernel.simd.borrow import fetch
 from tolstat.kernel.simd.jit import njit
@@ -219,8 +220,8 @@ def step_error(par, samples, out):
 
 
 @njit
-def summarise(samples, out):
-    """Write the statistics of the recorded revolution to a row of KERNEL_RESULT."""
+def summarise(par, samples, out):
+    """Write the statistics of the recorded revolution of the joint `par` to a row of KERNEL_RESULT."""
     n = samples.size
     for i in range(N_LOADS):
         if i < N_AVERAGED:
@@ -241,3 +242,4 @@ def summarise(samples, out):
             for s in range(n):
                 count += samples[s].mode[pin] == mode
             out.mode_share[pin, mode] = count / n
+    write_equivalent_loads(par.alpha, samples, out)

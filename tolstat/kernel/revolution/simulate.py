@@ -99,6 +99,7 @@ def clear_results(out):
     for pin in range(4):
         for k in range(4):
             out.mode_share[pin, k] = nan
+        out.equivalent_load[pin] = nan
 
 
 @njit
@@ -293,7 +294,7 @@ def simulate_joint(par, options, alone, out):
     status = run(par, options, alone, out)
     failed = out.failed_step
     if status in (OK, NOT_SETTLED) and not controlled:
-        summarise(ring.samples, out)
+        summarise(par, ring.samples, out)
         if not is_finite(out):
             status, failed = NOT_FINITE, state.counters[STEPS]
     if status in (OK, NOT_SETTLED) and not controlled:

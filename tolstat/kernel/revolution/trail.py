@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import KERNEL_RESULT
+from tolstat.common.tables import KERNEL_RESULT, LIFE_EXPONENT
 from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_LOADS, TORQUES
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit
@@ -119,3 +119,8 @@ def combine(last, count, trail, out):
         for pin in range(4):
             for mode in range(4):
                 out.mode_share[pin, mode] += trail.revolution[r % kept].mode_share[pin, mode] / count
+    for pin in range(4):
+        total = 0.0
+        for r in range(last - count + 1, last + 1):
+            total += trail.revolution[r % kept].equivalent_load[pin] ** LIFE_EXPONENT
+        out.equivalent_load[pin] = (total / count) ** (1 / LIFE_EXPONENT)

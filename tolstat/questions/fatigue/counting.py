@@ -79,7 +79,7 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
     table[without], number[without] = np.nan, np.nan
     used = max(1, int(np.max(number, initial=0.0, where=np.isfinite(number))))
     table = table[..., :used, :]
-    return Cycles(names, table[..., 0], table[..., 1], number, np.ones(table.shape[2]))
+    return Cycles.of_revolution(names, table[..., 0], table[..., 1], number)
 
 
 def _count(store: Reader, slots: NDArray[np.intp]) -> dict[str, NDArray[Any]]:

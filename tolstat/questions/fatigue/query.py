@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, damage, exceedance, quantile
 from tolstat.analysis.cycles import Cycles, FloatArray
-from tolstat.common.errors import Fault, InputError
 from tolstat.common.shown import shown
-from tolstat.common.tables import CHANNELS, ERROR_FIELDS, Status
+from tolstat.common.tables import CHANNELS, Status
+from tolstat.questions.fatigue import duty
 from tolstat.questions.fatigue.counting import cycles_of
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
@@ -84,27 +84,16 @@ def load_cycles(
     StoreError
         When a file holds no histories, or joints that are no sample of a production.
     """
-    if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
-        found = f"{list(shares)} for {len(views)} files"
-        raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
-    total = sum(shares)
-    shares = [share / total for share in shares]
+    shares = duty.check(views, shares)
     first = views[0]
-    for view in views:
-        view.check_sample(allow_weights=False)
-        if view is not first:
-            _check_same_joints(view, first)
     parts = [_cycles_of(view, names, samples) for view in views]
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
-    status = first.status[:samples]
-    for view in views[1:]:
-        status = np.where(status == Status.OK, view.status[:samples], status)
     return Loading(
         name=" + ".join(view.name for view in views),
         cycles=cycles.duty_cycle([own for own, _ in parts], shares),
-        status=status,
-        nominal=cycles.duty_cycle([_rows(nominal, rows) for _, nominal in parts], shares),
+        status=duty.status(views, samples),
+        nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares),
         iid=first.iid,
         # the section alone, like limits: it is at hand even where the study refers to files that are not
         settings=of_text(first.store.study_text, str(first.path)),
@@ -117,23 +106,7 @@ def _cycles_of(view: View, names: Sequence[str] | None, samples: int | None) -> 
     first, end = map(int, view.slots([0, n]))
     whole = cycles_of(view.store, np.arange(end), names)  # the nominal joint, if the file has it, is before the samples
     settled = int((view.nominal["status"] == Status.OK).sum())
-    return _rows(whole, slice(first, None)), _rows(whole, slice(settled))
-
-
-def _rows(whole: Cycles, rows: slice) -> Cycles:
-    return whole._replace(ranges=whole.ranges[rows], means=whole.means[rows], number=whole.number[rows])
-
-
-def _check_same_joints(view: View, first: View) -> None:
-    names = [f.name for f in ERROR_FIELDS if not f.name.startswith("operation.")]
-    if view.n == first.n and all(
-        np.array_equal(own[name], other[name])
-        for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
-        for name in names
-    ):
-        return
-    remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
-    raise InputError([Fault(str(view.path), f"does not hold the joints of {first.path}", remedy)])
+    return whole.rows(slice(first, None)), whole.rows(slice(settled))
 
 
 def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confidence: float = 0.95) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from tolstat.study.tolerances import meaning
 ENTRIES = (
     Column("tolerance", lambda row: str(row["entry"])),
     Column("its number", lambda row: str(row["number"]), words=True),
-    Column("error", lambda row: str(row["errors"]), words=True),
+    Column("error", lambda row: str(row["errors"]), words=True, rank=1),
     Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
     Column("outside", lambda row: text.percent(math.nan if row["outside"] is None else row["outside"])),
 )

@@ -12,6 +12,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -23,7 +24,7 @@ from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.campaign.extend import grow
-from tolstat.campaign.progress import note
+from tolstat.campaign.progress import Reporter, note
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS
@@ -181,7 +182,13 @@ def rare_event(
     return run(subset_study(study, limit, n, p0, seed, unresolved), Path(out), workers)
 
 
-def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> RareEvent:
+def run(
+    plan: Study,
+    out: Path,
+    workers: int | None = None,
+    tell: Callable[[str], None] = note,
+    progress: Reporter | None = None,
+) -> RareEvent:
     """Run or resume a subset simulation.
 
     Parameters
@@ -195,6 +202,8 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
         joints run in this process, which a crash in the simulation of a joint then ends.
     tell : callable, optional
         Receives a sentence on each completed level.
+    progress : callable, optional
+        Called with the counts of the file's joints, those of completed levels included.
 
     Returns
     -------
@@ -214,17 +223,18 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     first, told = plan.first_sample, 0
     rows = _rows(out) or first + settings.per_level
     held = _is_done(_sized(plan, rows), out)  # by any version of the code: reading it needs no simulation
+    simulate = partial(_simulate, plan, out, workers=workers, tell=tell, progress=progress)
     if not held:
-        _simulate(plan, out, rows, rows, workers, tell)  # also checks that the file is of the same plan and code
+        simulate(rows, rows)  # also checks that the file is of the same plan and code
     while not walk.done:
         stage = range(first, first + walk.next.parent.size)
         if rows < stage.stop:
             if held:
-                _simulate(plan, out, rows, rows, workers, tell)  # nothing to simulate: checks before rows are appended
+                simulate(rows, rows)  # nothing to simulate: checks before rows are appended
                 held = False
             rows = stage.stop
             _append(plan, out, stage, walk.next)
-            _simulate(plan, out, rows, len(stage), workers, tell)
+            simulate(rows, len(stage))
         loads, n_unresolved = _loads(plan, settings, out, stage, walk.next)
         unresolved.append(n_unresolved)
         walk.take(loads)
@@ -265,12 +275,20 @@ def _sized(plan: Study, rows: int) -> Study:
     return replace(plan, sampling=plan.sampling.model_copy(update={"n": rows - plan.first_sample}))
 
 
-def _simulate(plan: Study, out: Path, rows: int, count: int, workers: int | None, tell: Callable[[str], None]) -> None:
+def _simulate(
+    plan: Study,
+    out: Path,
+    rows: int,
+    count: int,
+    workers: int | None,
+    tell: Callable[[str], None],
+    progress: Reporter | None,
+) -> None:
     """Simulate the pending rows of the file, about `count` of them."""
     execution = Execution(workers=workers)
     if workers is None and count < MIN_PARALLEL:
         execution = Execution("serial", 1, block=count)
-    campaign.run(_sized(plan, rows), out, execution=execution, tell=tell, check=False)
+    campaign.run(_sized(plan, rows), out, execution=execution, tell=tell, check=False, progress=progress)
 
 
 def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -28,6 +29,8 @@ _HEADS = {HALF: "half as wide, %", EXACT: "exact, %", FINER: "finer, %", COARSER
 _RANKS = {HALF: 0, EXACT: 1, COARSER: 2, FINER: 5}
 _ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
 """Style of the accepted share."""
+_STEPS = ("half as wide", "one step coarser", "exact")
+"""Legend of the tornado."""
 _KINDS = {"offset", "tilt", "diameter", "clearance", "position"}
 """Errors whose lines have a name in words."""
 
@@ -144,13 +147,16 @@ def tornado_panel(found: WhatIf, accepted: float) -> Panel:
     halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in table.to_dict("records"))
     limit = text.limit({"load": found.load, "level": found.level, "unit": found.unit})
     labels = _labels(table)
+    left = drawing.rows_left([part for label in labels for part in label.split("\n")])
+    top = drawing.legend_room(_STEPS, left)
     return Panel(
         f"what-if-{found.load.replace('.', '-')}",
         f"Share of the joints with {limit}, if one line is changed",
         f"As drawn {text.percent(found.share)}. Half as wide: {halves}",
         partial(_tornado, found=found, table=table, labels=labels, accepted=accepted),
-        (4.9, 0.34 * (len(table) + 1) + drawing.BOTTOM + drawing.TOP),
-        drawing.rows_left([part for label in labels for part in label.split("\n")]),
+        (drawing.WIDTH, 0.34 * (len(table) + 2.2) + drawing.BOTTOM + top),
+        left,
+        top,
     )
 
 
@@ -165,8 +171,15 @@ def curve_panel(found: WhatIf, accepted: float) -> Panel:
             for line, own in ((line, part.to_dict("records")) for line, part in table.groupby("line", sort=False))
         ),
         partial(_curves, found=found, table=table, accepted=accepted),
-        (4.9, 3.6),
+        (drawing.WIDTH, 3.4 + (room := drawing.legend_room(_curve_labels(table, accepted)))),
+        top=room,
     )
+
+
+def _curve_labels(table: pd.DataFrame, accepted: float) -> list[str]:
+    lines = [str(line) for line in table["line"].unique()]
+    others = ["the other lines"] if len(lines) > CURVES else []
+    return [*lines[:CURVES], *others, *([f"accepted {text.percent(accepted)}"] if accepted > 0.0 else [])]
 
 
 def _labels(table: pd.DataFrame) -> list[str]:
@@ -175,12 +188,12 @@ def _labels(table: pd.DataFrame) -> list[str]:
 
 def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], accepted: float) -> None:
     drawing.rows(ax, labels)
-    ax.set_ylim(len(labels) + 0.5, -0.6)  # one more row, for what the vertical lines are
+    ax.set_ylim(len(labels) + 0.6, -1.2)  # a row above and one below, for what the vertical lines are
     ax.tick_params(axis="y", labelsize=7.6)
     floor = _floor(found, accepted)
     style.share_axis(ax, floor, "x")
     shares = [found.upper, *found.table["share"], *(found.share + found.table["change_upper"])]
-    ax.set_xlim(floor, min(1.0, 1.25 * float(np.nanmax(shares))))
+    ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax(shares))))
     ax.axvspan(max(found.lower, floor), found.upper, color=drawing.GREY, alpha=0.3, lw=0)
     ax.axvline(found.share, color=style.INK, lw=1.2)
     for step, colour, height in ((COARSER, style.COLOURS[1], 0.3), (HALF, style.COLOURS[0], 0.56)):
@@ -194,14 +207,14 @@ def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], ac
         if not np.isnan(row.get(EXACT, np.nan)):
             marks: dict[str, Any] = {"mfc": "white", "mec": style.INK, "ms": 5.5, "zorder": 4, "clip_on": False}
             ax.plot(max(row[EXACT], floor), place, "o", **marks)
-    below: dict[str, Any] = {"y": len(labels) + 0.1, "va": "center", "fontsize": 8.0}
-    ax.text(found.upper * 1.03, s=f"as drawn {text.percent(found.share)}", **below)
+    said: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0}
+    ax.text(found.share, -0.9, f"as drawn {text.percent(found.share)}", backgroundcolor="white", **said)
     if accepted > 0.0:
         ax.axvline(accepted, **_ACCEPTED)
-        ax.text(accepted * 1.03, s=f"accepted {text.percent(accepted)}", **below)
+        ax.text(accepted, len(labels) + 0.1, f"accepted {text.percent(accepted)}", backgroundcolor="white", **said)
     handles: list[Patch | Line2D] = [Patch(color=style.COLOURS[0]), Patch(color=style.COLOURS[1])]
     handles.append(Line2D([], [], ls="", marker="o", mfc="white", mec=style.INK, ms=5.5))
-    drawing.legend_above(ax, handles, ["half as wide", "one step coarser", "exact"])
+    drawing.legend_above(ax, handles, _STEPS)
     ax.set_xlabel("share of the joints above the limit")
 
 
@@ -209,26 +222,25 @@ def _curves(ax: Axes, found: WhatIf, table: pd.DataFrame, accepted: float) -> No
     floor = _floor(found, accepted)
     style.share_axis(ax, floor)
     top = floor
-    for place, (line, part) in enumerate(table.groupby("line", sort=False)):
+    handles: list[Artist] = []
+    for place, (_, part) in enumerate(table.groupby("line", sort=False)):
         own = part.sort_values("factor")
         at = int(np.searchsorted(own["factor"], 1.0))
-        x, y = (np.insert(own[name].to_numpy(), at, drawn) for name, drawn in (("factor", 1.0), ("share", found.share)))
+        x, y = (np.insert(own[name].to_numpy(), at, value) for name, value in (("factor", 1.0), ("share", found.share)))
         top, grey = max(top, float(y.max())), place >= CURVES
         colour = drawing.GREY if grey else style.COLOURS[place]
         dash = "-" if grey else style.DASHES[place]
-        label = ("the other lines" if place == CURVES else "_") if grey else str(line)
-        ax.plot(
-            x, np.maximum(y, floor), color=colour, ls=dash, marker="o", ms=3.0, lw=1.0 if grey else 1.6, label=label
-        )
+        (drawn,) = ax.plot(x, np.maximum(y, floor), color=colour, ls=dash, marker="o", ms=3.0, lw=1.0 if grey else 1.6)
+        handles += [drawn] if place <= CURVES else []
         if place == 0:
             low, high = (np.insert(found.share + own[f"change_{end}"], at, found.share) for end in ("lower", "upper"))
             ax.fill_between(x, np.maximum(low, floor), np.maximum(high, floor), color=colour, alpha=0.18, lw=0)
     ax.plot(1.0, found.share, "D", color=style.INK, ms=6.0, zorder=5)
-    ax.set_ylim(floor, min(1.0, 6.0 * top))
+    ax.set_ylim(floor, min(1.0, 2.0 * top))
     if accepted > 0.0:
-        ax.axhline(accepted, label=f"accepted {text.percent(accepted)}", **_ACCEPTED)
+        handles.append(ax.axhline(accepted, **_ACCEPTED))
     ax.set(xlabel="width of the line, relative to the drawing", ylabel="share above the limit")
-    ax.legend(loc="upper left", handlelength=2.6)
+    drawing.legend_above(ax, handles, _curve_labels(table, accepted))
 
 
 def _floor(found: WhatIf, accepted: float) -> float:

@@ -12,6 +12,8 @@ from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import CHANNELS
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
+from tolstat.joint.model import DEFAULT_JOINT
+from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.fatigue import LineEntry, Settings
 from tolstat.study.listed import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
@@ -19,13 +21,12 @@ from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
 from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.stress_point import PointEntry
 from tolstat.study.swept import KEYS
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
 
-DEFAULT_JOINT = "cirelli2021"
-"""Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
 ERRORS = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
 """Unit of each error that can be given a value."""
 
@@ -128,8 +129,9 @@ def _positive(unit: str) -> Schema:
 
 
 def numbers(low: float, high: float) -> Schema:
-    """JSON schema of numbers by name or pattern of errors that scatter."""
-    return table({name: {"type": "number", "minimum": low, "maximum": high} for name in TOLERANCED})
+    """JSON schema of numbers by name or pattern of the quantities that are drawn: errors, and vectors of zones."""
+    drawn = [own for name in TOLERANCED for own in (vectors_of(name) if is_zone(name) else (name,))]
+    return table({name: {"type": "number", "minimum": low, "maximum": high} for name in drawn})
 
 
 SECTIONS: dict[str, Section] = {
@@ -166,6 +168,7 @@ def tables() -> dict[str, Schema]:
         "shift": numbers(-MAX_SHIFT, MAX_SHIFT),
         "quantity": {"type": ["string", "number"]},
         fits.KEY: of_model(fits.FitEntry),
+        "points": {"type": "object", "additionalProperties": of_model(PointEntry)},
         "lines": table({name: {"x-table": _of_unit(LineEntry.__name__, unit)} for name, unit in CHANNELS.items()}),
     }
     for name, unit in TOLERANCED.items():

@@ -266,4 +266,6 @@ class Banded(HalfBand):
         """See `SingleEntry.number`."""
         if self.lower is None or self.upper is None:
             return super().number(site)
-        return f"limits {units.shown(self.lower, site.unit)} to {units.shown(self.upper, site.unit)}"
+        ends = [units.shown(end, site.unit) for end in (self.lower, self.upper)]
+        numbers = [end.partition(" ")[0] for end in ends]
+        return f"{numbers[0]} to {ends[1]}" if numbers[0] != ends[0] else " to ".join(ends)

@@ -32,8 +32,8 @@ PAIRS = len(PINS)
 EXAMPLE = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
 _KEYS_OF = {"cpk": "normal", "truncate": "normal", "a": "beta", "b": "beta"}
 """Keys of one distribution, which others do not have."""
-NEGLIGIBLE = 1e-12
-"""Probability of a misfit that is not told."""
+NEGLIGIBLE = 1e-8
+"""Probability of a misfit of one pair that is not told."""
 _POINTS = 4000
 """Number of midpoints in probability of each diameter."""
 

@@ -1,0 +1,72 @@
+"""Rating life of bearings that oscillate: catalogues, published examples, and the geometry behind the formulas."""
+
+from __future__ import annotations
+
+import doctest
+
+import numpy as np
+import pytest
+
+from tolstat.analysis import rating_life
+from tolstat.analysis.rating_life import A1, basic_life, critical_amplitude, system_life, turns_per_revolution
+
+
+def test_examples():
+    assert doctest.testmod(rating_life).failed == 0
+
+
+@pytest.mark.parametrize(("angle", "rpm", "ratio"), [(3.0, 100.0, 1.0), (12.0, 500.0, 0.4), (25.0, 60.0, 2.5)])
+def test_hours_of_a_universal_joint_catalogue(angle, rpm, ratio):
+    """AISCO, Universal joint sizing: 1.5e6/(A N) (Tc/Ta)^(10/3) h; Tc is the torque for 5000 h at 3 deg, 100 rpm."""
+    catalogue = 1.5e6 / (angle * rpm) * ratio ** (10 / 3)
+    hours = basic_life(1.0, ratio) / (turns_per_revolution(np.radians(angle)) * rpm * 60)
+    assert hours == pytest.approx(catalogue, rel=1e-12)
+    if ratio == 1.0:
+        assert hours == pytest.approx(5000.0)
+
+
+def test_hours_of_an_oscillating_crossed_roller_bearing():
+    """Harmonic Drive, SHG series, eq. 44.1: 1e6/(60 n1) 180/phi (C/P)^(10/3) h, n1 a minute, of the way 2 phi each."""
+    phi, rate, ratio = 40.0, 15.0, 5.0
+    catalogue = 1e6 / (60 * rate) * 180 / phi * ratio ** (10 / 3)
+    hours = basic_life(1.0, ratio) / (turns_per_revolution(np.radians(phi / 2)) * rate * 60)
+    assert hours == pytest.approx(catalogue, rel=1e-12)
+
+
+def test_published_example_of_a_roller_bearing():
+    """Solution 11-3 of Shigley's Mechanical Engineering Design: 10.279 kN for 1440 million revolutions take 91.1 kN."""
+    assert basic_life(10.279e3, 91.1e3) == pytest.approx(1440e6, rel=2e-3)
+
+
+def test_factors_are_those_of_the_three_parameter_weibull_distribution():
+    """ISO/TR 1281-2: the factors of ISO 281 follow from a least life of 0.05 L10 and the slope 1.5."""
+    for reliability, factor in A1.items():
+        expected = 0.95 * (np.log(1 / reliability) / np.log(1 / 0.9)) ** (1 / 1.5) + 0.05
+        assert factor == pytest.approx(expected, abs=0.006 if factor > 0.1 else 0.0006)
+
+
+def test_the_first_failure_of_four_bearings():
+    """Weibull distributed lives, ten per cent of which are below each bearing's L10."""
+    rng, slope = np.random.default_rng(5), rating_life.WEIBULL_SLOPE
+    own = np.array([100.0, 150.0, 400.0, 90.0])
+    scale = own / np.log(1 / 0.9) ** (1 / slope)
+    first = (scale * rng.weibull(slope, (200_000, 4))).min(axis=1)
+    early = (first < system_life(own)).mean()
+    assert early == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / 200_000))
+
+
+@pytest.mark.parametrize("inner", [False, True])
+def test_tracks_of_neighbouring_needles_overlap_from_the_critical_amplitude_on(inner):
+    """Rolling without slip: the cage turns so far that a needle's contact moves alike on both rings."""
+    needles, needle, pitch = 28, 3.0, 40.0
+    outer_radius, inner_radius = 0.5 * (pitch + needle), 0.5 * (pitch - needle)
+
+    def overlap(amplitude):
+        swing = np.linspace(-amplitude, amplitude, 5)  # of the inner ring
+        cage = swing * inner_radius / (inner_radius + outer_radius)
+        moves = cage - swing if inner else cage  # of the contact, in axes of the ring
+        return np.ptp(moves) >= 2 * np.pi / needles
+
+    critical = critical_amplitude(needles, needle, pitch)
+    assert overlap(1.001 * critical)
+    assert overlap(0.999 * critical) == inner  # the outer ring's tracks overlap last

@@ -1,0 +1,212 @@
+"""Lives of bearings: closed forms, joints without a life, bearings that are edited after the run, page and JSON."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tolstat
+from tests.support import synthetic, views
+from tolstat import joint
+from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.errors import StoreError
+from tolstat.common.tables import PINS, Mode, Status
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panels, Table, Text
+from tolstat.questions.bearing_life import query, rendering
+from tolstat.questions.bearing_life.lives import PLACES, lives_of
+from tolstat.questions.bearing_life.section import sections
+
+BEARING = {"C": "22 kN", "needles": 32, "needle_diameter": "4 mm", "pitch_diameter": "42 mm", "required_life": "8e6 h"}
+
+
+def held(**changes):
+    """Sections of a joint with bearings, as a result file holds them."""
+    return joint.load("cirelli2021", {"bearing": BEARING | changes}, "x.toml").given("json")
+
+
+def view(n=201, alpha=None, **kwargs):
+    return views.view(n, joint=kwargs.pop("joint", None) or held(), alpha=alpha, **kwargs)
+
+
+def answer(made):
+    lives = lives_of(made)
+    return rendering.verdict(lives, query.below(lives), query.quantiles(lives))
+
+
+def test_lives_in_hours():
+    made = view(alpha=np.radians(15))
+    lives, loads = lives_of(made), made.read_results(("equivalent_load",))["equivalent_load"]
+    rpm = 52.36 * 30 / np.pi
+    pins = 1.5e6 / (15 * rpm) * (22e3 / loads) ** (10 / 3)  # the formula of catalogues
+    np.testing.assert_allclose(lives.hours[:, :4], pins, rtol=1e-12)
+    np.testing.assert_allclose(lives.hours[:, 4], (pins**-1.125).sum(axis=1) ** (-1 / 1.125), rtol=1e-12)
+    assert lives.nominal_hours[0] == pytest.approx(1.5e6 / (15 * rpm) * (22e3 / 600.0) ** (10 / 3))
+    assert lives.required == pytest.approx(8e6)
+
+
+def test_shares_and_quantiles_are_those_of_the_lives():
+    lives = lives_of(view())
+    table, hours = query.below(lives).set_index("place"), lives.hours[:, 4]
+    count = int((hours < 8e6).sum())
+    assert 20 < count < 180
+    assert (table.loc["joint", "count"], table.loc["joint", "n"]) == (count, 200)
+    assert (table.loc["joint", "lower"], table.loc["joint", "upper"]) == clopper_pearson(count, 200)
+    assert list(table.index) == list(PLACES)
+    row = query.quantiles(lives).set_index(["place", "share"]).loc[("joint", 0.9)]
+    assert (hours >= row["estimate"]).mean() == pytest.approx(0.9)
+    assert row["lower"] < row["estimate"] < row["upper"]
+    # with the load rating given, this share reaches the required life
+    better = lives_of(view(joint=held(C=f"{row['rating']} N")))
+    assert (better.hours[:, 4] >= 8e6 * (1 - 1e-9)).mean() == pytest.approx(0.9)
+
+
+def test_joints_without_a_life_are_counted_both_ways():
+    lives = lives_of(view(failed=6, unsettled=4))
+    row = query.below(lives).iloc[-1]
+    count = int((lives.hours[:190, 4] < 8e6).sum())
+    assert (row["n_failed"], row["n_unsettled"], row["count"]) == (6, 4, count)
+    assert (row["bound_lower"], row["bound_upper"]) == (count / 200, (count + 10) / 200)
+    assert row["total_lower"] < row["lower"]
+    assert row["total_upper"] > row["upper"]
+
+
+def test_the_numerical_error_widens_the_total_interval():
+    lives = lives_of(view())
+    wide = query.below(replace(lives, load_error=0.05)).iloc[-1]
+    plain = query.below(lives).iloc[-1]
+    assert wide["total_lower"] < plain["total_lower"] < plain["total_upper"] < wide["total_upper"]
+    assert (wide["estimate"], wide["lower"]) == (plain["estimate"], plain["lower"])
+
+
+def test_half_of_the_joints_failed_gives_no_verdict():
+    made = view(failed=100)
+    first, *others = answer(made)
+    assert first.startswith("no verdict: 100 of 200 joints have no life")
+    assert not others
+    assert rendering.BELOW[2].cell(query.below(lives_of(made)).iloc[-1].to_dict()) == "-"
+
+
+def test_all_joints_failed_gives_no_verdict():
+    assert answer(view(failed=200))[0].startswith("no verdict: 200 of 200 joints have no life")
+
+
+@pytest.mark.parametrize("alpha", [0.0, np.radians(12.4), -np.radians(3)])
+def test_below_the_critical_amplitude_there_is_no_rating(alpha):
+    made = view(alpha=alpha)
+    lives = lives_of(made)
+    assert (np.isnan(lives.hours).all(), lives.unrated) == (True, 200)
+    assert answer(made)[0].startswith("no rating: every joint swings by less than 12.4 deg")
+    (section,) = sections(made, Asked(made.path))
+    titles = [block.title for block in section.blocks if isinstance(block, Table)]
+    assert not any("L10" in title or "reach" in title for title in titles)
+    assert any("equivalent load" in title for title in titles)
+
+
+def test_some_joints_without_a_rating():
+    alpha = np.full(201, np.radians(15))
+    alpha[1:5] = np.radians(12)
+    lives = lives_of(view(alpha=alpha))
+    assert (lives.unrated, int(query.below(lives)["n_failed"].iloc[-1])) == (4, 4)
+    assert any(
+        note.startswith("4 of 200 joints have no rating") for note in rendering.notes(lives, query.contacts(view()))
+    )
+
+
+def test_reliability_and_lubrication_shorten_the_life():
+    plain, strict = (lives_of(view(joint=held(**more))) for more in ({}, {"reliability": 0.99, "a_iso": 0.8}))
+    np.testing.assert_allclose(strict.hours, 0.25 * 0.8 * plain.hours)
+
+
+def test_no_required_life():
+    bearing = {key: value for key, value in BEARING.items() if key != "required_life"}
+    made = view(joint=joint.load("cirelli2021", {"bearing": bearing}, "x.toml").given("json"))
+    assert answer(made) == ["no required life is given: bearing.required_life"]
+    assert query.below(lives_of(made)).empty
+
+
+def test_joints_loaded_at_one_end():
+    def change(results):
+        results["mode_share"] = 0.0
+        results["mode_share"][:, :, Mode.UNIFORM] = 1.0
+        results["mode_share"][:30, 2] = [0.0, 0.6, 0.4, 0.0]
+        results["mode_share"][20:50, 3] = [0.0, 0.4, 0.6, 0.0]
+
+    table = query.contacts(view(change=change)).set_index("place")
+    assert table["one_end"].tolist() == [0.0, 0.0, 0.15, 0.0, 0.15]
+    assert table["opposite_ends"].tolist() == [0.0, 0.0, 0.0, 0.15, 0.15]
+    assert table.loc["any", "along"] == 1.0
+    notes = rendering.notes(lives_of(view(change=change)), query.contacts(view(change=change)))
+    assert any("In 15 % of the joints at least one bearing is loaded at one end only" in note for note in notes)
+
+
+def test_without_independent_joints_there_are_no_intervals():
+    table = query.below(lives_of(view(method="sobol")))
+    assert table[["lower", "upper", "total_lower", "total_upper"]].isna().all(axis=None)
+    assert "interval" not in answer(view(method="sobol"))[0]
+
+
+def test_the_page_and_the_json():
+    made = view()
+    (section,) = sections(made, Asked(made.path))
+    assert isinstance(section.blocks[0], Text)
+    assert section.blocks[0].text.endswith("do not reach the required 8000000 h.")
+    assert sum(isinstance(block, Panels) for block in section.blocks) == 1
+    found = query.summary(made, 0.95)["bearing_life"]
+    assert (found["symbol"], len(found["lives"]), len(found["below_required"])) == ("L10", 15, 5)
+    without = views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json"))
+    assert (sections(without, Asked(without.path)), query.summary(without, 0.95)) == ([], {})
+
+
+def test_refused_files():
+    with pytest.raises(StoreError, match="joint without bearings"):
+        lives_of(views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json")))
+    some = tuple(column for column in RESULT_COLUMNS if column.name != "pin2.equivalent_load")
+    with pytest.raises(StoreError, match="does not keep the equivalent loads"):
+        lives_of(view(columns=some))
+    with pytest.raises(StoreError, match="no sample"):
+        lives_of(view(method="sweep"))
+
+
+STUDY = (
+    synthetic.HEAD
+    + """
+[joint.bearing]
+C = "10 kN"
+needles = 32
+needle_diameter = "4 mm"
+pitch_diameter = "42 mm"
+required_life = "20000 h"
+[solver]
+fidelity = "ideal"
+[tolerances]
+"operation.torque" = { plus_minus = "40 N*m", distribution = "uniform" }
+[sampling]
+n = 40
+seed = 1
+"""
+)
+
+
+def test_bearings_may_be_edited_after_the_run(tmp_path):
+    file, target = tmp_path / "study.toml", tmp_path / "study.h5"
+    file.write_text(STUDY, encoding="utf-8")
+    tolstat.run(tolstat.load(file), target, workers=1)
+    with tolstat.open(target) as store:
+        first, created = tolstat.lives_of(store.view()), store.created
+        torque = store.errors()["operation.torque"][1:]
+    assert (first.status == Status.OK).all()
+    # without inertia to speak of, forces and equivalent loads are in proportion to the torque
+    np.testing.assert_allclose(
+        first.loads / torque[:, None], (first.loads / torque[:, None])[:1].repeat(40, 0), rtol=0.02
+    )
+    file.write_text(STUDY.replace("10 kN", "20 kN"), encoding="utf-8")
+    tolstat.run(tolstat.load(file), target, workers=1)
+    with tolstat.open(target) as store:
+        second = tolstat.lives_of(store.view())
+        assert store.created == created
+    np.testing.assert_allclose(second.hours, 2 ** (10 / 3) * first.hours)
+    assert np.isfinite(second.hours[:, : len(PINS)]).all()

@@ -1,0 +1,301 @@
+"""Stresses at points of the parts: from load components, starts, duty cycles, the command, the page."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import tolstat
+from tolstat.analysis import strength
+from tolstat.analysis.cycles import Cycles
+from tolstat.common.errors import InputError
+from tolstat.common.tables import BUSHINGS, Status
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panels, Table
+from tolstat.questions.fatigue import parts
+from tolstat.questions.fatigue.section import sections
+from tolstat.questions.fatigue.stress import Stresses, load_stresses
+from tolstat.solver import rainflow
+from tolstat.store import Reader
+from tolstat.study.fatigue import Fatigue, of_text
+from tolstat.study.stress_point import StressPoint
+
+STUDY = """
+[joint]
+base = "cirelli2021"
+[operation]
+alpha = "{alpha} deg"
+speed = "500 rpm"
+torque = "100 N*m"
+[tolerances]
+"pin*.offset_t" = {{ plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }}
+"pin*.diameter" = {{ lower = "-0.1 mm", upper = "0.22 mm", distribution = "uniform" }}
+[sampling]
+n = 12
+seed = 1
+[output]
+histories = "{histories}"
+[fatigue]
+revolutions = 1e9
+starts = 1e4
+[fatigue.point.weld]
+bushing = "fork[12]"
+F_z = "2.5 MPa/kN"
+T_e = "-0.2 MPa/Nm"
+k = 3
+N_D = 1e7
+S_aD = "9 MPa"
+T_N = 3.4
+[fatigue.point."pin root"]
+bushing = "cross3"
+T_t = "0.2 MPa/Nm"
+k = 5
+N_D = 2e6
+S_D = "36 MPa"
+T_S = 1.25
+M = 0.3
+"""
+NAMES = ("weld, fork1", "weld, fork2", "pin root")
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """Result file of the study with these histories and operating point; run once."""
+    folder = tmp_path_factory.mktemp("parts")
+
+    def run(histories: str = "full", alpha: float = 15.0) -> Path:
+        source = folder / f"{histories}_{alpha:g}.toml"
+        out = source.with_suffix(".h5")
+        if not out.exists():
+            source.write_text(STUDY.format(histories=histories, alpha=alpha), encoding="utf-8")
+            tolstat.run(tolstat.load(source), out, workers=1, check=False)
+        return out
+
+    return run
+
+
+def stresses(files, shares=(1.0,), samples=None):
+    with ExitStack() as stack:
+        views = [stack.enter_context(Reader.open(file)).view() for file in files]
+        return load_stresses(views, shares, samples)
+
+
+def of_signals(signals, names=("a",)):
+    """Stresses of joints at one point, Pa, from their signals over a revolution."""
+    counted = [rainflow.periodic(signal) for signal in signals]
+    table = np.zeros((2, len(signals), 1, max(1, *(len(ranges) for ranges, _ in counted))))
+    for i, pair in enumerate(counted):
+        for kind in (0, 1):
+            table[kind, i, 0, : len(pair[kind])] = pair[kind]
+    number = np.array([[len(ranges)] for ranges, _ in counted], float)
+    low, high = (np.array([[end(signal)] for signal in signals]) for end in (np.min, np.max))
+    return Stresses(Cycles.of_revolution(names, *table, number), low, high)
+
+
+def point(line, name="a"):
+    return StressPoint(name, "fork1", (0.0, 0.0, 1.0, 0.0, 0.0, 0.0), line)
+
+
+def test_stress_is_formed_before_cycles_are_counted(campaign):
+    found = stresses([campaign()])
+    settings = of_text(campaign().with_suffix(".toml").read_text(encoding="utf-8"), "a.toml")
+    assert found.settings == settings
+    assert found.own.cycles.channels == NAMES
+    assert found.valid.any()
+    assert not found.valid.all()
+    with Reader.open(campaign()) as store:
+        loads = store.histories("loads", np.arange(store.n)).astype(float)
+    for p, own in enumerate(settings.points):
+        at = loads[:, :, BUSHINGS.index(own.bushing)]
+        signal = {"weld": 2.5e3 * at[..., 2] - 2e5 * at[..., 3], "pin root": 2e5 * at[..., 4]}[own.name.split(",")[0]]
+        for stressed, first in ((found.own, 1), (found.nominal, 0)):
+            for i in range(len(stressed.low)):
+                if np.isnan(stressed.low[i, p]):
+                    assert not found.valid[i]
+                    continue
+                ranges, means = rainflow.periodic(signal[first + i], 1e-3 * np.ptp(signal[first + i]))
+                cycles = stressed.cycles
+                np.testing.assert_allclose(cycles.ranges[i, p, : len(ranges)], ranges, rtol=1e-9)
+                np.testing.assert_allclose(cycles.means[i, p, : len(ranges)], means, rtol=1e-6, atol=1.0)
+                assert stressed.high[i, p] == pytest.approx(signal[first + i].max())
+    assert np.isnan(found.own.cycles.ranges[~found.valid]).all()
+
+
+def test_joints_are_simulated_again_where_the_file_has_no_loads(campaign):
+    stored, again = stresses([campaign()]), stresses([campaign("none")])
+    np.testing.assert_array_equal(stored.own.cycles.ranges, again.own.cycles.ranges)
+    np.testing.assert_array_equal(stored.nominal.high, again.nominal.high)
+    part = stresses([campaign("none")], samples=5)
+    np.testing.assert_array_equal(part.own.low, again.own.low[:5])
+
+
+@pytest.mark.slow
+def test_a_duty_cycle_adds_damage_and_starts_reach_the_extremes_of_all_points(campaign):
+    files = [campaign(), campaign(alpha=5.0)]
+    both = stresses(files, [0.25, 0.75])
+    single = [stresses([file]) for file in files]
+    np.testing.assert_array_equal(both.valid, single[0].valid & single[1].valid)
+    steady = both.settings.__class__(revolutions=1e9, points=both.settings.points)
+    for p, own in enumerate(both.settings.points):
+        damage = [strength.damage_at(*parts.evaluated(s.own, steady)[p])[both.valid] for s in (both, *single)]
+        np.testing.assert_allclose(damage[0], 0.25 * damage[1] + 0.75 * damage[2], rtol=1e-9)
+        highest = np.maximum(*(s.own.high[both.valid, p] for s in single))
+        np.testing.assert_array_equal(both.own.high[both.valid, p], highest, own.name)
+    with pytest.raises(InputError, match="their sum is 1"):
+        stresses(files, [0.5, 0.6])
+
+
+@pytest.mark.parametrize("offset", [0.0, 7.0, -7.0, 1.5])
+def test_starts_are_the_cycles_of_the_whole_course(offset):
+    rng = np.random.default_rng(4)
+    signal = rng.normal(size=40) + offset
+    line = strength.Line(k=3.0, k_2=5.0, N_D=100.0, S_D=2.0, M=0.2)
+    n, starts = 30, 3
+    settings = Fatigue(revolutions=float(n), starts=float(starts), points=(point(line),))
+    found = strength.damage_at(*parts.evaluated(of_signals([signal]), settings)[0])[0]
+    course = np.concatenate([[0.0], *[np.roll(signal, -int(np.argmax(np.abs(signal))))] * (n // starts)])
+    ranges, means = rainflow.periodic(np.tile(course, starts))
+    whole = strength.sort_out(strength.at_ratio(ranges, means, line.M)[None], np.ones((1, len(ranges))), line)
+    assert found == pytest.approx(strength.damage_at(whole, line)[0], rel=0.03)
+    without = strength.damage_at(
+        *parts.evaluated(of_signals([signal]), Fatigue(revolutions=30.0, points=(point(line),)))[0]
+    )[0]
+    assert (found > 1.1 * without) == (abs(offset) == 7.0)
+
+
+def synthetic(n=400, seed=3, scatter=1.3, status=None):
+    """Joints whose stress is one cycle of lognormal range at two points."""
+    from tolstat.questions.fatigue.stress import Stressed
+
+    rng = np.random.default_rng(seed)
+    line = strength.Line(k=5.0, k_2=9.0, N_D=1e6, S_D=200.0, T_S=scatter)
+    size = 120.0 * np.exp(rng.normal(0.0, 0.3, (n, 2)))
+    state = np.full(n, Status.OK, np.uint8) if status is None else np.asarray(status, np.uint8)
+    size[state != Status.OK] = np.nan
+    cycles = Cycles.of_revolution(
+        ("a", "b"), size[..., None], 0.0 * size[..., None], np.where(np.isnan(size), size, 1.0)
+    )
+    own = Stresses(cycles, -0.5 * size, 0.5 * size)
+    settings = Fatigue(revolutions=1e6, points=(point(line), point(line, "b")))
+    return Stressed("made", own, state, own.rows(slice(0)), True, settings, n, 0.0), size, line
+
+
+def test_failures_and_lives_of_one_cycle_in_closed_form():
+    stressed, size, line = synthetic()
+    table = parts.part_failures(stressed).set_index("point")
+    factor = size / line.S_D  # N_D cycles: the critical strength is the range itself
+    chances = strength.probability(factor, line.T_S)
+    np.testing.assert_allclose(table["estimate"][["a", "b"]], chances.mean(axis=0))
+    assert table["estimate"][parts.ANY] == pytest.approx((1 - (1 - chances).prod(axis=1)).mean())
+    assert table["median"]["a"] == pytest.approx(
+        np.sort(factor[:, 0])[199] ** (9 if np.sort(factor[:, 0])[199] < 1 else 5)
+    )
+    assert np.isnan(table["nominal"]["a"])
+    assert np.isnan(table["median"][parts.ANY])
+    for name, group in (("a", [0]), ("b", [1]), (parts.ANY, [0, 1])):
+        lives = table["life"][name] / 1e6
+        slope = np.where(factor * lives ** (1 / 9) < 1, 9, 5)  # the part that fails just now, by the slope of its cycle
+        critical = np.where(lives > 1, factor * lives ** (1 / 9), factor * lives ** (1 / 5))
+        assert np.all(slope > 0)
+        survive = (1 - strength.probability(critical[:, group], line.T_S)).prod(axis=1)
+        assert 1 - survive.mean() == pytest.approx(parts.SHARE, rel=2e-3)
+        assert table["life_lower"][name] < table["life"][name] < table["life_upper"][name]
+        assert (table["estimate"] > 0.1)[name] == (table["life"][name] < 1e6)
+
+
+def test_joints_without_stresses_count_both_ways_and_pending_ones_not_at_all():
+    status = np.full(400, Status.OK)
+    status[:10], status[10:30], status[30:40] = Status.NEWTON_FAILED, Status.STATIONARY, Status.PENDING
+    stressed, size, line = synthetic(status=status)
+    row = parts.part_failures(stressed).iloc[0]
+    assert (row["n"], row["n_failed"], row["n_unsettled"]) == (390, 10, 20)
+    chances = strength.probability(size[40:, 0] / line.S_D, line.T_S)
+    assert row["estimate"] == pytest.approx(chances.mean())
+    assert row["outer_upper"] > (chances.sum() + 30) / 390 > row["upper"]
+    assert row["outer_lower"] < row["lower"]
+    nothing, *_ = synthetic(status=np.full(400, Status.NEWTON_FAILED))
+    row = parts.part_failures(nothing).iloc[0]
+    assert np.isnan([row["estimate"], row["life"], row["median"], row["life_lower"]]).all()
+    assert (row["outer_lower"], row["outer_upper"]) == (0.0, 1.0)
+
+
+def test_every_fault_of_the_points_is_told():
+    text = """
+    [fatigue]
+    revolutions = 1e4
+    starts = 2e4
+    point.a = { bushing = "forks", T_z = "1 MPa/Nm", k = 5, N_D = 2e6, S_aD = "180 MPa", T_N = 3 }
+    point.b = { bushing = "fork1", k = 5, N_D = 2e6, S_aD = "180 MPa", T_N = 3 }
+    point.c = { bushing = "fork1", T_e = "1 MPa/kN", k = 5, N_D = 2e6, S_aD = "180 MPa", T_N = 3 }
+    point.d = { bushing = "fork1", T_e = "1 MPa/Nm", k = 5, N_D = 2e6, S_aD = "180 MPa", S_D = "3 MPa", T_N = 3 }
+    point.e = { bushing = "fork1", T_e = "1 MPa/Nm", k = 5, N_D = 2e6, S_D = "180 MPa" }
+    point.f = { bushing = "fork1", T_e = "1 MPa/Nm", N_D = 2e6, S_D = "180 N", T_S = 0.5, x = 1 }
+    point.g = 3
+    """
+    with pytest.raises(InputError) as error:
+        of_text(text, "a.toml")
+    found = {fault.place.removeprefix("a.toml: fatigue"): fault.found for fault in error.value.faults}
+    assert list(found) == [
+        *("", ".point.a.bushing", ".point.b", ".point.c.T_e", ".point.d", ".point.e"),
+        *(".point.f.k", ".point.f.S_D", ".point.f.T_S", ".point.f.x", ".point.g"),
+    ]
+    assert "has both S_D and S_aD" in found[".point.d"]
+    assert "has neither T_S nor T_N" in found[".point.e"]
+    with pytest.raises(InputError, match=r"fatigue\.point: 3"):
+        of_text("[fatigue]\npoint = 3", "a.toml")
+
+
+def test_the_command_prints_a_row_a_point(campaign):
+    from tests.cli.test_cli import call
+
+    done = call("fatigue", campaign("none"))
+    assert done.exit_code == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert [line.split("  ")[0] for line in lines] == ["point", *NAMES, parts.ANY]
+    assert max(map(len, lines)) <= 80
+    assert "with 10000 starts" in done.stderr
+    assert "damage-equivalent" not in done.stdout
+    table = parts.part_failures(stresses([campaign("none")]))
+    found = json.loads(call("fatigue", campaign("none"), "--json").stdout)
+    assert list(found) == ["points"]
+    assert [row["estimate"] for row in found["points"]] == pytest.approx(table["estimate"].tolist())
+
+
+@pytest.mark.slow
+def test_the_command_prints_loads_below_the_parts(campaign):
+    from tests.cli.test_cli import call
+
+    both = call("fatigue", campaign(), "--joints", 6)
+    assert both.stdout.startswith("point")
+    assert "\ndamage-equivalent loads\nchannel and exponent" in both.stdout
+    failed = call("fatigue", campaign("none"), "--by", "cross1.F_t")
+    assert (failed.exit_code, failed.stdout) == (2, "")
+    assert "holds neither cycles nor load histories" in failed.stderr
+
+
+def test_a_study_without_points_says_so(campaign, tmp_path):
+    with Reader.open(campaign("none")) as store:
+        store.study_text = store.study_text.split("[fatigue]")[0]
+        with pytest.raises(InputError, match="names no point of a part\n  hint: add"):
+            load_stresses([store.view()])
+
+
+def test_the_page_shows_parts_before_loads(campaign, tmp_path):
+    with Reader.open(campaign("none")) as store:
+        assert sections(store.view(), Asked(tmp_path / "a.h5")) == []
+        found = sections(store.view(), Asked(tmp_path / "a.h5", replay=1000))
+    panels, table, *notes = found[0].blocks
+    assert isinstance(panels, Panels)
+    assert isinstance(table, Table)
+    assert [row[0] for row in table.rows] == [*NAMES, parts.ANY]
+    assert notes[0].text.startswith(f"{stresses([campaign('none')]).valid.sum()} of 12 joints settled")
+    ax = Figure().add_subplot()
+    panels.panels[0].draw(ax)
+    (curve, _) = ax.get_lines()
+    assert np.all(np.diff(curve.get_ydata()) >= 0)
+    assert curve.get_xdata()[0] < 1e9 < curve.get_xdata()[-1]

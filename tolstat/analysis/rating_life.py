@@ -1,0 +1,122 @@
+"""Rating life of roller bearings that swing to and fro, on plain arrays (ISO 281; docs/model.md, Bearing life).
+
+The life of a bearing is counted in equivalent revolutions: a swing counts for its travel over a whole turn. This is the
+oscillation factor of Harris, which takes no account of how the load moves over the rings (Houpert and Menck 2022, Menck
+and Stammler 2024).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.tables import LIFE_EXPONENT
+
+WEIBULL_SLOPE = 9 / 8
+"""Slope e of the lives of bearings with line contact (Lundberg and Palmgren 1952): combines bearings of a joint."""
+A1 = {
+    0.9: 1.0,
+    0.95: 0.64,
+    0.96: 0.55,
+    0.97: 0.47,
+    0.98: 0.37,
+    0.99: 0.25,
+    0.992: 0.22,
+    0.994: 0.19,
+    0.996: 0.16,
+    0.998: 0.12,
+    0.999: 0.093,
+    0.9992: 0.087,
+    0.9994: 0.080,
+    0.9995: 0.077,
+}
+"""Life modification factor a_1 by reliability (ISO 281:2007, Table 12)."""
+
+
+def basic_life(load: ArrayLike, rating: float) -> FloatArray:
+    """Basic rating life L10 of a roller bearing.
+
+    Parameters
+    ----------
+    load : array_like
+        Dynamic equivalent load P, N.
+    rating : float
+        Basic dynamic load rating C, N.
+
+    Returns
+    -------
+    ndarray
+        Equivalent revolutions, shape of `load`; infinite without load.
+
+    Examples
+    --------
+    >>> round(float(basic_life(1000.0, 10e3)) / 1e6, 1)  # million
+    2154.4
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(1e6 * (rating / np.asarray(load, float)) ** LIFE_EXPONENT)
+
+
+def turns_per_revolution(alpha: ArrayLike) -> FloatArray:
+    """Equivalent revolutions of a pin's bearing in a revolution of the shaft.
+
+    Parameters
+    ----------
+    alpha : array_like
+        Misalignment, rad. Each pin swings from -alpha to alpha and back once a revolution.
+
+    Examples
+    --------
+    >>> round(float(turns_per_revolution(np.deg2rad(90.0))), 12)
+    1.0
+    """
+    return np.asarray(4.0 * np.abs(alpha) / (2.0 * np.pi))
+
+
+def system_life(lives: ArrayLike) -> FloatArray:
+    """Life, of the same reliability, until the first of several bearings fails.
+
+    Parameters
+    ----------
+    lives : array_like, shape (..., m)
+        Lives of m bearings with independent Weibull distributions of slope `WEIBULL_SLOPE`, any unit.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        In the unit of `lives`.
+
+    Examples
+    --------
+    >>> round(float(system_life([100.0, 100.0])), 2)
+    54.0
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray((np.asarray(lives, float) ** -WEIBULL_SLOPE).sum(axis=-1) ** (-1.0 / WEIBULL_SLOPE))
+
+
+def critical_amplitude(needles: int, needle_diameter: float, pitch_diameter: float) -> float:
+    """Amplitude of a swing from which on the tracks of neighbouring needles overlap on both raceways.
+
+    When one ring turns by an angle, a needle travels (1 - gamma)/2 of it on the outer raceway and (1 + gamma)/2 on the
+    inner one, gamma the ratio of the diameters. Tracks overlap where the travel reaches the pitch of the needles.
+
+    Parameters
+    ----------
+    needles : int
+        Number of needles.
+    needle_diameter, pitch_diameter : float
+        Of a needle, and of the circle of their axes; one unit.
+
+    Returns
+    -------
+    float
+        Half the swing from end to end, rad.
+
+    Examples
+    --------
+    >>> round(float(np.rad2deg(critical_amplitude(32, 4.0, 42.0))), 2)
+    12.43
+    """
+    return float(2.0 * np.pi / (needles * (1.0 - needle_diameter / pitch_diameter)))

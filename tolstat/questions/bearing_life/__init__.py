@@ -1,0 +1,1 @@
+"""How long the needle bearings of the pins last."""

@@ -1,0 +1,180 @@
+"""Rating life of the bearings of each joint of a campaign (docs/model.md, Bearing life)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.analysis import accuracy
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.shown import shown
+from tolstat.common.tables import PINS, VALID
+from tolstat.joint import Bearing
+from tolstat.store.recorded import joint_of
+from tolstat.store.sample_load import SampleLoad
+from tolstat.store.view import View
+
+JOINT = "joint"
+PLACES = (*PINS, JOINT)
+"""Bearings, named by their pins, and the joint: it lasts until the first of its four bearings fails."""
+HOUR = 3600.0
+
+
+@shown
+@dataclass(frozen=True, eq=False)
+class Lives:
+    """Rating lives of n joints.
+
+    Attributes
+    ----------
+    name : str
+        Name of the study.
+    bearing : Bearing
+        Section ``[bearing]`` of the joint.
+    loads : ndarray, shape (n, 4)
+        Dynamic equivalent load of each pin's bearing, N; NaN without a result.
+    hours : ndarray, shape (n, 5)
+        Life of each bearing and of the joint, as in `PLACES`, h; NaN without a result or without a rating.
+    nominal_loads, nominal_hours : ndarray, shape (4,) and (5,)
+        The same of the nominal joint; NaN if there is none.
+    unrated : int
+        Valid joints without a rating: their misalignment is below ``bearing.critical_amplitude``.
+    load_error : float
+        Relative numerical error of an equivalent load that 95 % of the checked joints stay below; NaN if unknown.
+    status : ndarray, shape (n,)
+        `tables.Status` of each joint.
+    weights : ndarray, shape (n,), optional
+        Weight of each joint; without it all joints count equally.
+    iid : bool
+        Whether the joints are independent samples.
+    """
+
+    name: str
+    bearing: Bearing
+    loads: FloatArray
+    hours: FloatArray
+    nominal_loads: FloatArray
+    nominal_hours: FloatArray
+    unrated: int
+    load_error: float
+    status: NDArray[np.uint8]
+    weights: FloatArray | None
+    iid: bool
+
+    @property
+    def valid(self) -> int:
+        """Number of joints with a valid result."""
+        return int(np.isin(self.status, VALID).sum())
+
+    @property
+    def required(self) -> float:
+        """Required life, h; NaN if none is given."""
+        return np.nan if self.bearing.required_life is None else self.bearing.required_life / HOUR
+
+    def rate(self, place: str) -> SampleLoad:
+        """Reciprocal of the life of a bearing or of the joint, 1/h: as with a load, higher is worse."""
+        k = PLACES.index(place)
+        with np.errstate(divide="ignore"):
+            return self._load(place, "1/h", 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k])
+
+    def load(self, pin: str) -> SampleLoad:
+        """Dynamic equivalent load of a pin's bearing, N."""
+        k = PINS.index(pin)
+        return self._load(pin, "N", float(self.nominal_loads[k]), self.loads[:, k])
+
+    def _load(self, name: str, unit: str, nominal: float, values: FloatArray) -> SampleLoad:
+        return SampleLoad(name, unit, None, nominal, values, (values, values), self.status, self.weights, self.iid)
+
+
+def bearing_of(view: View) -> Bearing | None:
+    """Section ``[bearing]`` of the joint of a file, if it has one."""
+    return joint_of(view.store, 0).bearing
+
+
+def keeps_loads(view: View) -> bool:
+    """Whether the study keeps the equivalent loads of all pins."""
+    return sum(column.field == "equivalent_load" for column in view.columns) == len(PINS)
+
+
+def lives_of(view: View) -> Lives:
+    """Rating lives of the joints of a campaign.
+
+    Parameters
+    ----------
+    view : View
+        Joints drawn from tolerances, of a study whose joint has a section ``[bearing]``.
+
+    Raises
+    ------
+    StoreError
+        When the joint has no such section, the equivalent loads are not kept, or the joints are no sample.
+    """
+    view.check_sample()
+    bearing = bearing_of(view)
+    if bearing is None:
+        remedy = (
+            "add the section [bearing] to the joint file or [joint.bearing] to the study, then repeat tolstat run: "
+            "no joint is simulated again"
+        )
+        raise StoreError(str(Fault(str(view.path), "holds a joint without bearings", remedy)))
+    if not keeps_loads(view):
+        remedy = 'add "pin*.equivalent_load" to [output] results of the study'
+        raise StoreError(str(Fault(str(view.path), "does not keep the equivalent loads of the bearings", remedy)))
+    loads = view.read_results(("equivalent_load",))["equivalent_load"]
+    operation = view.errors(np.arange(view.n), ("operation.alpha", "operation.speed"))
+    nominal_loads, nominal_hours = np.full(len(PINS), np.nan), np.full(len(PLACES), np.nan)
+    if len(view.nominal):
+        nominal_loads = view.nominal["equivalent_load"][0]
+        nominal_hours = _hours(view.nominal["equivalent_load"], view.store.errors(slice(0, 1)), bearing)[0]
+    unrated = np.isin(view.status, VALID) & _unrated(operation, bearing)
+    return Lives(
+        name=view.name,
+        bearing=bearing,
+        loads=loads,
+        hours=_hours(loads, operation, bearing),
+        nominal_loads=nominal_loads,
+        nominal_hours=nominal_hours,
+        unrated=int(unrated.sum()),
+        load_error=load_error(view),
+        status=view.status,
+        weights=view.weights,
+        iid=view.iid,
+    )
+
+
+def _unrated(operation: NDArray[np.void], bearing: Bearing) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(operation["operation.alpha"]) < bearing.critical_amplitude * (1.0 - 1e-9))
+
+
+def _hours(loads: FloatArray, operation: NDArray[np.void], bearing: Bearing) -> FloatArray:
+    """Lives of bearings and joint, (m, 5), h, from equivalent loads (m, 4) and a table with the columns of ERROR."""
+    turns = turns_per_revolution(operation["operation.alpha"])
+    hourly = np.abs(operation["operation.speed"]) / (2.0 * np.pi) * turns * HOUR
+    with np.errstate(divide="ignore"):
+        pins = bearing.factor * basic_life(loads, bearing.C) / hourly[:, None]
+    hours = np.column_stack([pins, system_life(pins)])
+    hours[_unrated(operation, bearing)] = np.nan
+    return hours
+
+
+def load_error(view: View) -> float:
+    """Relative numerical error of an equivalent load, `analysis.accuracy.USUAL` of the checked joints; NaN if unknown.
+
+    It is estimated as that of largest loads (`analysis.accuracy.estimate`); the largest of the four bearings counts.
+    """
+    if view.verification is None:
+        return np.nan
+    base = view.verification.base
+    changes = {
+        name: np.where(
+            np.isin(base["status"], VALID)[:, None],
+            base["equivalent_load"] / check.results["equivalent_load"] - 1.0,
+            np.nan,
+        )
+        for name, check in view.verification.checks.items()
+    }
+    return accuracy.spread(accuracy.estimate(changes).max(axis=1)).usual

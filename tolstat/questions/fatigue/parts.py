@@ -1,0 +1,193 @@
+"""Fatigue of the parts: damage and life at points, and the share of the parts that fail in the service life."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from tolstat.analysis import exceedance, quantile, strength
+from tolstat.analysis.cycles import FloatArray
+from tolstat.analysis.strength import Collective, Failures, Line
+from tolstat.common.tables import Status
+from tolstat.questions.fatigue.stress import Stressed, Stresses
+from tolstat.study.fatigue import Fatigue
+
+SHARE = 0.1
+"""Share of the parts that have failed at the end of the life given, B10."""
+ANY = "any of them"
+"""Name of the row for all points together."""
+LONGEST = 1e12
+"""Lives beyond so many service lives are given as infinite."""
+
+
+class Evaluated(NamedTuple):
+    """Stress cycles of the joints at one point in the service life, and its S–N line."""
+
+    collective: Collective
+    line: Line
+
+
+class Course(NamedTuple):
+    """Joints of one campaign at some points that fail together: the share of failures after any time.
+
+    Attributes
+    ----------
+    points : sequence of Evaluated
+        The points; the joint fails at the weakest.
+    done : ndarray of bool, shape (n,)
+        Which joints were simulated; those without stresses among them have NaN.
+    n_failed, n_unsettled : int
+        Joints without stresses.
+    iid : bool
+        Whether the joints are independent samples.
+    """
+
+    points: Sequence[Evaluated]
+    done: NDArray[np.bool_]
+    n_failed: int
+    n_unsettled: int
+    iid: bool
+
+    def chances(self, lives: float = 1.0) -> FloatArray:
+        """Probability for each simulated joint that a part has failed after so many service lives, (m,)."""
+        survive = np.zeros(int(self.done.sum()))  # logarithm of the probability
+        with np.errstate(divide="ignore"):
+            for collective, line in self.points:
+                factor = strength.critical_factor(collective, line, lives)[self.done]
+                survive += np.log1p(-strength.probability(factor, line.T_S))
+        return -np.expm1(survive)
+
+    def failures(self, lives: float = 1.0, confidence: float = 0.95) -> Failures:
+        """Share of the parts that have failed after so many service lives."""
+        return strength.failures(self.chances(lives), self.n_failed, self.n_unsettled, confidence, self.iid)
+
+
+def part_failures(stressed: Stressed, confidence: float = 0.95) -> pd.DataFrame:
+    """Damage, life and probability of failure at each point of the parts.
+
+    Parameters
+    ----------
+    stressed : Stressed
+        Stress cycles of the joints, from `load_stresses`.
+    confidence : float
+        Confidence level of the intervals.
+
+    Returns
+    -------
+    DataFrame
+        One row per point, and one for all of them if there are several (the strengths of two points are independent):
+        ``point``, ``bushing``, fields of `analysis.strength.Line` (S_D in Pa); ``nominal``, ``median``, ``upper_99``
+        (damage sum at the median strength: of the nominal joint, and not exceeded by half and by 99 % of the joints);
+        ``life`` (revolutions after which a tenth of the parts has failed), ``life_lower``, ``life_upper`` (joints
+        without a valid load counted both ways); ``nominal_failures`` (share of the parts that fail in the nominal
+        joint); the fields of `analysis.strength.Failures`, ``confidence``.
+    """
+    own, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
+    each = [(_damage(stressed, p, own[p], nominal[p]), [p]) for p in range(len(own))]
+    together = [({"point": ANY, "bushing": ""}, list(range(len(own))))] if len(own) > 1 else []
+    rows = []
+    for head, group in each + together:
+        course = course_of(stressed, [own[p] for p in group])
+        ideal = Course([nominal[p] for p in group], np.ones(len(stressed.nominal.low), bool), 0, 0, False)
+        life = _life(course, stressed.settings.revolutions, confidence)
+        found = course.failures(1.0, confidence)._asdict()
+        head |= life | {"nominal_failures": ideal.failures().estimate} | found | {"confidence": confidence}
+        rows.append(head)
+    return pd.DataFrame(rows)
+
+
+def failures_over_life(stressed: Stressed, revolutions: Sequence[float], confidence: float = 0.95) -> pd.DataFrame:
+    """Share of the joints with a failed part at any point after numbers of revolutions.
+
+    Returns
+    -------
+    DataFrame
+        One row per number: ``revolutions``, the fields of `analysis.strength.Failures`.
+    """
+    course = course_of(stressed, evaluated(stressed.own, stressed.settings))
+    lives = [number / stressed.settings.revolutions for number in revolutions]
+    rows = [course.failures(life, confidence)._asdict() for life in lives]
+    return pd.DataFrame([{"revolutions": n, **row} for n, row in zip(revolutions, rows, strict=True)])
+
+
+def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
+    """Cycles in the service life at each point, each at the stress ratio of the point's S–N line.
+
+    A start goes from the unstressed joint to the extremes of the revolution and back; its cycle, between the extremes
+    and zero, takes the place of the largest cycle of one revolution.
+    """
+    found = []
+    for p, point in enumerate(settings.points):
+        line, cycles = point.line, stresses.cycles
+        ranges, means = cycles.ranges[:, p], cycles.means[:, p]
+        numbers = np.broadcast_to(cycles.weights * settings.revolutions, ranges.shape).copy()
+        if settings.starts:
+            joints = np.arange(len(ranges))
+            numbers[joints, np.argmax(np.nan_to_num(ranges), axis=1)] -= settings.starts
+            numbers = np.maximum(numbers, 0.0)
+            low, high = np.minimum(stresses.low[:, p], 0.0), np.maximum(stresses.high[:, p], 0.0)
+            ranges, means = np.column_stack([ranges, high - low]), np.column_stack([means, 0.5 * (high + low)])
+            numbers = np.column_stack([numbers, np.full(len(ranges), settings.starts)])
+        at_line = strength.at_ratio(ranges, means, line.M, line.R)
+        found.append(Evaluated(strength.sort_out(at_line, numbers, line), line))
+    return found
+
+
+def course_of(stressed: Stressed, points: Sequence[Evaluated]) -> Course:
+    """Failures of the joints at some points; joints that are not settled, or never repeat, have no stresses."""
+    failed = exceedance.split(np.zeros(stressed.status.size), stressed.status)[1]
+    done = stressed.status != Status.PENDING
+    n_failed, n_without = int(failed.sum()), int((done & ~stressed.valid).sum())
+    return Course(points, done, n_failed, n_without - n_failed, stressed.iid)
+
+
+def _damage(stressed: Stressed, p: int, own: Evaluated, nominal: Evaluated) -> dict[str, Any]:
+    point = stressed.settings.points[p]
+    sums, ideal = strength.damage_at(*own), strength.damage_at(*nominal)
+    ends = [quantile.quantile(sums, stressed.status, share).estimate for share in (0.5, 0.99)]
+    return {
+        "point": point.name,
+        "bushing": point.bushing,
+        **point.line._asdict(),
+        "nominal": float(ideal[0]) if ideal.size else np.nan,
+        "median": ends[0],
+        "upper_99": ends[1],
+    }
+
+
+def _life(course: Course, revolutions: float, confidence: float) -> dict[str, float]:
+    """Revolutions after which a share `SHARE` of the parts has failed, with the ends of an interval."""
+
+    def estimate(lives: float) -> float:
+        return float(np.nanmean(course.chances(lives)))
+
+    def least(lives: float) -> float:
+        return course.failures(lives, confidence).outer_lower
+
+    def most(lives: float) -> float:
+        return course.failures(lives, confidence).outer_upper
+
+    found = {"life": np.nan, "life_lower": np.nan, "life_upper": np.nan}
+    some = course.done.sum() > course.n_failed + course.n_unsettled
+    if some:
+        found["life"] = revolutions * _reaches(estimate)
+    if some and course.iid:
+        found["life_lower"], found["life_upper"] = (revolutions * _reaches(end) for end in (most, least))
+    return found
+
+
+def _reaches(share: Callable[[float], float]) -> float:
+    """Number of service lives at which a share that grows with them reaches `SHARE`; 0 or infinite beyond `LONGEST`."""
+    low, high = -np.log(LONGEST), np.log(LONGEST)
+    if share(np.exp(low)) >= SHARE:
+        return 0.0
+    if share(np.exp(high)) < SHARE:
+        return np.inf
+    while high - low > 1e-4:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if share(np.exp(middle)) >= SHARE else (middle, high)
+    return float(np.exp(0.5 * (low + high)))

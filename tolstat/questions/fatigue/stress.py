@@ -1,0 +1,188 @@
+"""Stress cycles of the joints at points of their parts, from the load components over a revolution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.analysis.cycles import Cycles, FloatArray, duty_cycle
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.shown import shown
+from tolstat.common.tables import BUSHINGS, Status
+from tolstat.questions.fatigue import duty
+from tolstat.solver import rainflow
+from tolstat.store import revolutions
+from tolstat.store.view import View
+from tolstat.study.fatigue import Fatigue, of_text
+from tolstat.study.stress_point import StressPoint
+
+if TYPE_CHECKING:
+    from tolstat.store.reader import Reader
+
+
+class Stresses(NamedTuple):
+    """Stresses of joints at p points over a revolution, or over a mixture of revolutions.
+
+    Attributes
+    ----------
+    cycles : Cycles
+        Rainflow cycles, Pa; its channels are the names of the points. NaN for a joint that has not settled.
+    low, high : ndarray, shape (n, p)
+        Smallest and largest stress, Pa, at all operating points together.
+    """
+
+    cycles: Cycles
+    low: FloatArray
+    high: FloatArray
+
+    def rows(self, joints: slice) -> Stresses:
+        """Select joints."""
+        return Stresses(self.cycles.rows(joints), self.low[joints], self.high[joints])
+
+
+@shown
+@dataclass(frozen=True)
+class Stressed:
+    """Stresses of the joints of one campaign or of a duty cycle, and the settings of their evaluation.
+
+    Attributes
+    ----------
+    name : str
+        Name of the study, or of the studies.
+    own : Stresses
+        Stresses of the n samples.
+    status : ndarray, shape (n,)
+        `tables.Status`; with several operating points the first that is not ``OK``.
+    nominal : Stresses
+        Stresses of the nominal joint; no rows if there is none that settled.
+    iid : bool
+        Whether the joints are independent samples.
+    settings : Fatigue
+        Section ``[fatigue]`` of the study; of the first study if there are several.
+    total : int
+        Number of samples of the campaign, those not evaluated included.
+    apart : float
+        As in `revolutions.Revolutions`.
+    """
+
+    name: str
+    own: Stresses
+    status: NDArray[np.uint8]
+    nominal: Stresses
+    iid: bool
+    settings: Fatigue
+    total: int
+    apart: float
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Which joints settled to a motion that repeats at all operating points, (n,)."""
+        return np.asarray(self.status == Status.OK)
+
+
+def load_stresses(views: Sequence[View], shares: Sequence[float] = (1.0,), samples: int | None = None) -> Stressed:
+    """Stress cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
+
+    The stress of each point is formed from the load components at each input angle before cycles are counted. Where a
+    file holds no load histories, its joints are simulated again.
+
+    Parameters
+    ----------
+    views : sequence of View
+        The campaign at each operating point; the joints of the campaigns differ in ``operation.*`` only. The study of
+        the first has ``[fatigue.point]``.
+    shares : sequence of float
+        Share of the revolutions at each operating point; the sum is 1.
+    samples : int, optional
+        Number of samples, from the first; by default all.
+
+    Raises
+    ------
+    InputError
+        When the study has no points, the shares are not shares, or the campaigns have different joints.
+    StoreError
+        When a file holds joints that are no sample of a production.
+    """
+    shares = duty.check(views, shares)
+    first = views[0]
+    settings = of_text(first.store.study_text, str(first.path))
+    if not settings.points:
+        remedy = 'add [fatigue.point."NAME"] to the study, and run it again; no joint is simulated anew'
+        raise InputError([Fault(str(first.path), "its study names no point of a part", remedy)])
+    status = duty.status(views, samples)
+    settled = np.flatnonzero(status == Status.OK)
+    parts, apart = [], 0.0
+    for view in views:
+        slots = np.concatenate([_nominal(view), view.slots(settled)])
+        found, difference = stresses_of(view.store, slots, settings.points)
+        parts.append(found)
+        apart = max(apart, difference)
+    skips = [_nominal(view).size for view in views]
+    nominal = [part.rows(slice(min(skips))) for part in parts]  # settled at all operating points, or no row
+    own = [_spread(part.rows(slice(skip, None)), settled, status.size) for part, skip in zip(parts, skips, strict=True)]
+    name = " + ".join(view.name for view in views)
+    return Stressed(name, _mixed(own, shares), status, _mixed(nominal, shares), first.iid, settings, first.n, apart)
+
+
+def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:
+    """Stresses of settled joints over one revolution, and `Revolutions.apart`.
+
+    Parameters
+    ----------
+    store : Reader
+        The campaign.
+    slots : ndarray of int, shape (m,)
+        File slots, ascending.
+    points : sequence of StressPoint
+        Points of the parts.
+    """
+    low, high = np.zeros((2, len(slots), len(points)))
+    counted: list[tuple[FloatArray, FloatArray]] = []
+    apart = 0.0
+    for part, loads, difference in revolutions.of_components(store, slots):
+        apart = max(apart, difference)
+        signals, noise = zip(*(_signal(loads, point) for point in points), strict=True)
+        low[part], high[part] = (np.stack([end(s, axis=1) for s in signals], axis=1) for end in (np.min, np.max))
+        for joint in range(len(loads)):
+            counted += [rainflow.periodic(s[joint], gate[joint]) for s, gate in zip(signals, noise, strict=True)]
+    number = np.array([len(ranges) for ranges, _ in counted], float).reshape(low.shape)
+    table = np.zeros((len(counted), max(1, int(number.max(initial=0.0))), 2))
+    for place, (ranges, means) in enumerate(counted):
+        table[place, : len(ranges), 0], table[place, : len(ranges), 1] = ranges, means
+    table = table.reshape(*low.shape, *table.shape[1:])
+    names = tuple(point.name for point in points)
+    return Stresses(Cycles.of_revolution(names, table[..., 0], table[..., 1], number), low, high), apart
+
+
+def _signal(loads: NDArray[np.floating], point: StressPoint) -> tuple[FloatArray, FloatArray]:
+    """Stress over the revolution, (m, samples), and the range up to which cycles may be numerical noise, (m,), Pa."""
+    own, factors = loads[:, :, BUSHINGS.index(point.bushing)].astype(float), np.array(point.per_load)
+    return own @ factors, rainflow.GATE * np.max(np.abs(own) @ np.abs(factors), axis=1)
+
+
+def _nominal(view: View) -> NDArray[np.intp]:
+    """File slots of the nominal joint if it settled, (1,) or (0,)."""
+    return np.asarray(view.nominal_slots[view.nominal["status"] == Status.OK])
+
+
+def _spread(part: Stresses, settled: NDArray[np.intp], n: int) -> Stresses:
+    """Put the joints `settled` in their rows of a table of n joints; NaN in the others."""
+
+    def rows(values: FloatArray) -> FloatArray:
+        table = np.full((n, *values.shape[1:]), np.nan)
+        table[settled] = values
+        return table
+
+    cycles = part.cycles
+    spread = Cycles.of_revolution(cycles.channels, rows(cycles.ranges), rows(cycles.means), rows(cycles.number))
+    return Stresses(spread, rows(part.low), rows(part.high))
+
+
+def _mixed(parts: Sequence[Stresses], shares: Sequence[float]) -> Stresses:
+    cycles = duty_cycle([part.cycles for part in parts], shares)
+    low, high = np.min([part.low for part in parts], axis=0), np.max([part.high for part in parts], axis=0)
+    return Stresses(cycles, low, high)

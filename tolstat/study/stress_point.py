@@ -1,0 +1,149 @@
+"""``[fatigue.point]``: points of the parts whose stress follows from the load of a bushing, with their S–N lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import AfterValidator, Field, model_validator
+
+from tolstat.analysis.strength import Line
+from tolstat.common import strict, units
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.strict import Strict, did_you_mean, refuse
+from tolstat.common.tables import BUSHINGS
+from tolstat.study.selection import select
+
+Positive = Annotated[units.Number, AfterValidator(units.positive)]
+Exponent = Annotated[units.Number, Field(ge=1, le=30)]
+PerForce = Annotated[float, units.Quantity("1/m^2")]
+PerTorque = Annotated[float, units.Quantity("1/m^3")]
+PositiveStress = Annotated[units.Stress, AfterValidator(units.positive)]
+COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
+
+
+def _per(what: str) -> str:
+    return f"stress at the point by the {what} of the bushing"
+
+
+def _found(name: str, other: str, value: float | None) -> str:
+    return f"has neither {name} nor {other}" if value is None else f"has both {name} and {other}"
+
+
+class PointEntry(Strict):
+    """Point of a part: its stress is a sum of the bushing's load components, each times a factor."""
+
+    bushing: Annotated[
+        str, Field(description="bushing whose load stresses the point, or pattern of several", examples=["fork*"])
+    ]
+    F_e: Annotated[PerForce, Field(description=_per("force along e"), examples=["2.5 MPa/kN"])] = 0.0
+    F_t: Annotated[PerForce, Field(description=_per("force along t"), examples=["0.8 MPa/kN"])] = 0.0
+    F_z: Annotated[PerForce, Field(description=_per("force along z"), examples=["2.5 MPa/kN"])] = 0.0
+    T_e: Annotated[PerTorque, Field(description=_per("torque about e"), examples=["0.2 MPa/(N*m)"])] = 0.0
+    T_t: Annotated[PerTorque, Field(description=_per("torque about t"), examples=["-0.2 MPa/(N*m)"])] = 0.0
+    T_z: Annotated[PerTorque, Field(description=_per("torque about z"), examples=["0.1 MPa/(N*m)"])] = 0.0
+    k: Annotated[Exponent, Field(description="exponent of the S–N line above the knee", examples=[3])]
+    k_2: Annotated[
+        units.Number | None,
+        Field(ge=1, le=100, description="exponent below the knee; 2k - 1 (Haibach) by default", examples=[5]),
+    ] = None
+    N_D: Annotated[Positive, Field(description="cycles at the knee", examples=[1e7])]
+    S_D: Annotated[
+        PositiveStress | None,
+        Field(description="range of the stress at the knee that half of the parts survive", examples=["29 MPa"]),
+    ] = None
+    S_aD: Annotated[
+        PositiveStress | None,
+        Field(description="amplitude of the stress at the knee, half of S_D; instead of S_D", examples=["14.5 MPa"]),
+    ] = None
+    T_S: Annotated[
+        units.Number | None,
+        Field(ge=1, description="scatter of the strength: 90 % quantile over 10 % quantile; 1: none", examples=[1.5]),
+    ] = None
+    T_N: Annotated[
+        units.Number | None,
+        Field(ge=1, description="scatter of the life at one range, T_S^k; instead of T_S", examples=[3.4]),
+    ] = None
+    D_c: Annotated[Positive, Field(description="damage sum at which a part fails", examples=[0.3])] = 1.0
+    M: Annotated[
+        units.Number,
+        Field(ge=0, le=1, description="mean-stress sensitivity; 0: the mean has no effect", examples=[0.3]),
+    ] = 0.0
+    R: Annotated[
+        units.Number,
+        Field(ge=-1, lt=1, description="stress ratio, smallest over largest stress, of the S–N line", examples=[0.0]),
+    ] = -1.0
+
+    @model_validator(mode="after")
+    def _complete(self) -> PointEntry:
+        if not any(self.per_load):
+            raise refuse("no load stresses the point", 'give a stress per load, for example T_e = "0.2 MPa/(N*m)"')
+        if (self.S_D is None) == (self.S_aD is None):
+            raise refuse(_found("S_D", "S_aD", self.S_D), "give one of them: S_D is a range, S_aD an amplitude")
+        if (self.T_S is None) == (self.T_N is None):
+            raise refuse(
+                _found("T_S", "T_N", self.T_S), "give one of them; T_S = 1 is a strength that does not scatter"
+            )
+        return self
+
+    @property
+    def per_load(self) -> tuple[float, ...]:
+        """Stress per load component, in the order of `COMPONENTS`, 1/m^2 and 1/m^3."""
+        return tuple(float(getattr(self, name)) for name in COMPONENTS)
+
+    @property
+    def line(self) -> Line:
+        """S–N line with all that follows from other keys."""
+        k_2 = 2.0 * self.k - 1.0 if self.k_2 is None else self.k_2
+        size = 2.0 * self.S_aD if self.S_aD is not None else self.S_D
+        scatter = self.T_N ** (1.0 / self.k) if self.T_N is not None else self.T_S
+        assert size is not None
+        assert scatter is not None
+        return Line(self.k, k_2, self.N_D, size, scatter, self.D_c, self.M, self.R)
+
+
+class StressPoint(NamedTuple):
+    """A point of a part.
+
+    Attributes
+    ----------
+    name : str
+        Name in the study; with the bushing where the study names several.
+    bushing : str
+        One of `tables.BUSHINGS`.
+    per_load : tuple of float
+        Stress per load component along e, t, z: three forces, 1/m^2, and three torques, 1/m^3.
+    line : Line
+        S–N line.
+    """
+
+    name: str
+    bushing: str
+    per_load: tuple[float, ...]
+    line: Line
+
+
+def read(table: Mapping[str, Any], place: str) -> tuple[StressPoint, ...]:
+    """Read ``[fatigue.point]``.
+
+    Raises
+    ------
+    InputError
+        With every fault.
+    """
+    points, faults = list[StressPoint](), list[Fault]()
+    for name, value in table.items():
+        prefix = ("fatigue", "point", name)
+        with gather(faults):
+            entry = strict.validate(PointEntry, value, place, prefix=prefix)
+            bushings = select(entry.bushing, BUSHINGS)
+            if not bushings:
+                where = f"{place}: {strict.dotted((*prefix, 'bushing'))}"
+                found = f"{entry.bushing!r} is not a bushing"
+                raise InputError([Fault(where, found, did_you_mean(entry.bushing, BUSHINGS))])
+            for bushing in bushings:
+                own = name if len(bushings) == 1 else f"{name}, {bushing}"
+                points.append(StressPoint(own, bushing, entry.per_load, entry.line))
+    if faults:
+        raise InputError(faults)
+    return tuple(points)

@@ -1,0 +1,154 @@
+"""Tables of the bench: one line a statistic, one line a case; as text and as Markdown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tolstat.benchmarks.coverage.run import MOST, Coverage
+from tolstat.benchmarks.coverage.statistics import CONTROL, STATISTICS
+from tolstat.benchmarks.coverage.trial import Row
+from tolstat.display.text import align
+
+ENOUGH = 0.05
+"""Share of the seeds that must have an interval for a row to count in the summary."""
+
+
+class Line(NamedTuple):
+    """A statistic in the summary.
+
+    Attributes
+    ----------
+    name : str
+        Key of `statistics.STATISTICS`.
+    rows : list of Row
+        Its cases with enough intervals.
+    cases : int
+        Number of all cases.
+    """
+
+    name: str
+    rows: list[Row]
+    cases: int
+
+    @property
+    def worst(self) -> Row | None:
+        """Case with the most misses on one side."""
+        return max(self.rows, key=lambda row: max(row.above, row.below) / row.given, default=None)
+
+    def covered(self) -> str:
+        """Smallest, middle and largest coverage of the cases, per cent."""
+        found = [100.0 * row.covered[0] for row in self.rows]
+        return f"{min(found):.1f}, {np.median(found):.1f}, {max(found):.1f}" if found else "-"
+
+    def given(self) -> str:
+        """Smallest and largest share of the seeds with an interval, per cent, of the cases that count."""
+        found = [100.0 * row.given / row.seeds for row in self.rows]
+        return _range(found, ".0f") if found else "-"
+
+    def width(self) -> str:
+        """Smallest and largest width over that of fresh joints."""
+        found = [row.width for row in self.rows if math.isfinite(row.width)]
+        return _range(found, ".2g") if found else ""
+
+    def sides(self) -> str:
+        """Largest share of the intervals above the truth, and below it, per cent."""
+        if not self.rows:
+            return "-"
+        return ", ".join(
+            f"{100.0 * max(getattr(row, side) / row.given for row in self.rows):.1f}" for side in ("above", "below")
+        )
+
+
+def lines(found: Coverage) -> list[Line]:
+    """Summary, in the order of the statistics."""
+    made = []
+    for name in STATISTICS:
+        rows = [row for row in found.rows if row.asked.statistic == name]
+        if rows:
+            made.append(Line(name, [row for row in rows if row.given >= max(1.0, ENOUGH * row.seeds)], len(rows)))
+    return made
+
+
+def text(found: Coverage, every: bool = False) -> str:
+    """Tables for a terminal: the summary, and with `every` all cases."""
+    head = ["statistic", "cases", "covered, %", "above, below, %", "given, %", "width"]
+    rows = [
+        [line.name, str(line.cases), line.covered(), line.sides(), line.given(), line.width()] for line in lines(found)
+    ]
+    parts = [align([head, *rows]), _legend(found)]
+    if every:
+        parts.append(align([_CASE, *(_case(found, row) for row in found.rows)], words=[True, True]))
+    return "\n\n".join([*parts, *_verdict(found)])
+
+
+def markdown(found: Coverage) -> str:
+    """Tables for a document: the summary, what misses, and all cases."""
+    head = ["estimator", "claim", "covered, %", "above, below, %", "given, %", "width", "refuses", "shown by"]
+    rows = []
+    for line in lines(found):
+        about = STATISTICS[line.name]
+        numbers = [line.covered(), line.sides(), line.given(), line.width()]
+        rows.append([f"{line.name} ({line.cases})", about.claim, *numbers, about.refuses, about.where])
+    of_cases = _markdown(_CASE, [_case(found, row) for row in found.rows])
+    return "\n\n".join([_markdown(head, rows), _legend(found), *_verdict(found, "- "), "## Every case", of_cases])
+
+
+_CASE = ["statistic", "case", "joints", "given, %", "covered, %", "its interval", "above, %", "below, %", "width", ""]
+
+
+def _case(found: Coverage, row: Row) -> list[str]:
+    covered, lower, upper = (100.0 * share for share in row.covered)
+    about = [row.asked.statistic, row.asked.case, str(row.asked.n), f"{100.0 * row.given / row.seeds:.1f}"]
+    if not row.given:
+        return [*about, *["-"] * 4, "", ""]
+    sides = [f"{100.0 * count / row.given:.1f}" for count in (row.above, row.below)]
+    width = f"{row.width:.2g}" if math.isfinite(row.width) else ""
+    mark = "misses" if found.misses(row) else ""
+    return [*about, f"{covered:.1f}", f"{lower:.1f} to {upper:.1f}", *sides, width, mark]
+
+
+def _legend(found: Coverage) -> str:
+    seeds = max(row.seeds for row in found.rows)
+    return (
+        f"Seeds 0 to {seeds - 1}. Covered: least, median and largest of the cases in which at least "
+        f"{100 * ENOUGH:.0f} % of the seeds give an interval. Above and below: largest share of the intervals that lie "
+        "above the truth, and below it. Width: median, over that of as many independent joints of equal weight."
+    )
+
+
+def _verdict(found: Coverage, bullet: str = "") -> list[str]:
+    """Sentences: which rows miss, whether the bench finds the wrong estimator."""
+    missing = [row for row in found.rows if found.misses(row) and row.asked.statistic != CONTROL]
+    told = [f"{bullet}{_sentence(row)}" for row in missing]
+    controls = [row for row in found.rows if row.asked.statistic == CONTROL]
+    parts = []
+    if missing:
+        parts.append(f"Intervals that miss on one side in surely more than {100 * MOST:g} % of the seeds:")
+        parts.append("\n".join(told))
+    else:
+        parts.append(f"No interval misses on one side in surely more than {100 * MOST:g} % of the seeds.")
+    if controls:
+        found_out = "not found in every case" if found.controls_pass else "found in every case"
+        parts.append(f"The estimator that is wrong on purpose was {found_out}.")
+    return parts
+
+
+def _sentence(row: Row) -> str:
+    side = "above" if row.above > row.below else "below"
+    share = 100.0 * max(row.above, row.below) / row.given
+    why = f" ({row.asked.known})" if row.asked.known else ""
+    return f"{row.asked.statistic}, {row.asked.case}, {row.asked.n} joints: {share:.1f} % {side} the truth{why}"
+
+
+def _range(values: Sequence[float], form: str) -> str:
+    low, high = f"{min(values):{form}}", f"{max(values):{form}}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    made = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(row) + " |" for row in made)

@@ -67,7 +67,7 @@ def test_every_interval_covers_in_one_experiment():
     first = {one.asked[0].statistic: one for one in reversed(run.experiments())}
     found = run.measure(60, among=tuple(first.values()))
     assert {row.asked.statistic for row in found.rows} == set(STATISTICS)
-    assert [row for row in found.failed] == []
+    assert found.failed == []
 
 
 def test_the_command_prints_tables_and_writes_them_into_a_document(tmp_path):

@@ -17,7 +17,7 @@ Rng = np.random.Generator
 
 
 class Two(NamedTuple):
-    """Two loads whose normal scores are correlated by `rho`; B is `to_b` of a load of the law, whose inverse is `from_b`."""
+    """Two loads whose normal scores are correlated by `rho`; B is `to_b` of a load of the law, `from_b` its inverse."""
 
     name: str
     law: Law

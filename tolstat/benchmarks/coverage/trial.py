@@ -123,7 +123,7 @@ class Row(NamedTuple):
 
     @property
     def covered(self) -> tuple[float, float, float]:
-        """Share of the intervals that contain the truth, with its own Clopper–Pearson interval; NaN if none is given."""
+        """Share of the intervals that contain the truth, with its own Clopper–Pearson interval; NaN without any."""
         if not self.given:
             return np.nan, np.nan, np.nan
         hits = self.given - self.above - self.below
@@ -131,5 +131,5 @@ class Row(NamedTuple):
         return hits / self.given, float(lower), float(upper)
 
     def misses_surely(self, most: float) -> bool:
-        """Whether one side surely misses more often than `most`: the lower end of the interval of its share is above."""
+        """Whether the interval of the share of misses on one side lies above `most`."""
         return bool(max(clopper_pearson([self.above, self.below], self.given)[0]) > most)

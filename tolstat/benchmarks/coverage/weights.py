@@ -18,6 +18,9 @@ from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Normal
 
 ERRORS = 10
+OTHERS = 0.8
+"""Share of the joints of importance sampling that do not come from the tolerances."""
+UNSEEN = "a second way to the limit, which the proposal does not reach"
 GROUPS, EACH = 2, 4
 """Groups of errors whose tolerances are allocated, and errors in each."""
 Rng = np.random.Generator
@@ -179,7 +182,6 @@ class _Proposal(NamedTuple):
     name: str
     dimensions: int
     n: int
-    others: float
     draw: Callable[[Rng, int, int], FloatArray]
     ratio: Callable[[FloatArray], FloatArray]
     load: Callable[[FloatArray], FloatArray]
@@ -207,50 +209,31 @@ def _important() -> Iterator[Experiment]:
     def total(x: FloatArray) -> FloatArray:
         return np.asarray(x.sum(axis=1) / math.sqrt(x.shape[1]))
 
-    half = "a second way to the limit that the proposal cannot see"
+    def modulus(x: FloatArray) -> FloatArray:
+        return np.abs(total(x))
+
     for beta in (2.0, 3.0, 4.75):
         for n in (500, 2000):
-            yield _of_proposal(
-                _Proposal("sum, moved to the limit", 10, n, 0.8, *along(beta, 10), total, beta, float(norm.sf(beta)))
-            )
+            share = float(norm.sf(beta))
+            yield _of_proposal(_Proposal("sum, moved to the limit", 10, n, *along(beta, 10), total, beta, share))
     for s, beta, d in ((1.3, 3.0, 20), (1.6, 3.0, 5), (1.6, 4.0, 5)):
-        yield _of_proposal(
-            _Proposal(f"sum, {s:g} times as wide", d, 4000, 0.8, *widened(s), total, beta, float(norm.sf(beta)))
-        )
-    yield _of_proposal(
-        _Proposal(
-            "modulus of the sum, 1.6 times as wide",
-            5,
-            4000,
-            0.8,
-            *widened(1.6),
-            lambda x: np.abs(total(x)),
-            3.0,
-            float(2 * norm.sf(3.0)),
-        )
-    )
+        share = float(norm.sf(beta))
+        yield _of_proposal(_Proposal(f"sum, {s:g} times as wide", d, 4000, *widened(s), total, beta, share))
+    both = float(2.0 * norm.sf(3.0))
+    yield _of_proposal(_Proposal("both sides, 1.6 times as wide", 5, 4000, *widened(1.6), modulus, 3.0, both))
     for beta in (3.0, 4.0):
+        both = float(2.0 * norm.sf(beta))
         yield _of_proposal(
-            _Proposal(
-                "modulus of the sum, moved to one side",
-                10,
-                2000,
-                0.8,
-                *along(beta, 10),
-                lambda x: np.abs(total(x)),
-                beta,
-                float(2 * norm.sf(beta)),
-                half,
-            )
+            _Proposal("both sides, moved to one", 10, 2000, *along(beta, 10), modulus, beta, both, UNSEEN)
         )
 
 
 def _of_proposal(own: _Proposal) -> Experiment:
     def once(rng: Rng) -> list[Found]:
-        m = round(own.others * own.n)
+        m = round(OTHERS * own.n)
         x = np.concatenate([own.draw(rng, m, own.dimensions), rng.standard_normal((own.n - m, own.dimensions))])
-        kept = 1.0 - own.others
-        weights = 1.0 / (kept + own.others * own.ratio(x))
+        kept = 1.0 - OTHERS
+        weights = 1.0 / (kept + OTHERS * own.ratio(x))
         loads = own.load(x)
         found = weighted.weighted_exceedance(loads, ok(own.n), weights, own.level, heaviest=1.0 / kept)
         trust = weighted.trust(loads, ok(own.n), weights, own.level, 1.0 / kept)

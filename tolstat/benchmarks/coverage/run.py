@@ -15,6 +15,7 @@ from tolstat.benchmarks.coverage import causes, pairs, rare, shares, weights
 from tolstat.benchmarks.coverage.laws import laws
 from tolstat.benchmarks.coverage.statistics import CONTROL, STATISTICS
 from tolstat.benchmarks.coverage.trial import Asked, Experiment, FloatArray, Found, Row
+from tolstat.campaign.executors.processes import one_thread_each
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import did_you_mean
 
@@ -135,7 +136,7 @@ def measure(
         _collect(parts, jobs, done, say)
     else:
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        with one_thread_each(), ProcessPoolExecutor(workers, mp_context=context) as pool:
             _collect(parts, jobs, pool.map(_job, jobs, chunksize=4), say)
     rows = []
     for k in numbers:

@@ -62,7 +62,7 @@ def experiments() -> Iterator[Experiment]:
         for factor, n in ((0.8, 256), (0.8, 1024), (1.1, 1024), (1.1, 4096), (1.15, 4096), (1.3, 4096)):
             yield _reweighted(load, factor, n)
     for name in _ALLOCATED:
-        for n in (1024, 4096):
+        for n in (2048, 4096):
             yield _allocated(name, n)
     yield from _important()
 
@@ -222,10 +222,8 @@ def _important() -> Iterator[Experiment]:
     both = float(2.0 * norm.sf(3.0))
     yield _of_proposal(_Proposal("both sides, 1.6 times as wide", 5, 4000, *widened(1.6), modulus, 3.0, both))
     for beta in (3.0, 4.0):
-        both = float(2.0 * norm.sf(beta))
-        yield _of_proposal(
-            _Proposal("both sides, moved to one", 10, 2000, *along(beta, 10), modulus, beta, both, UNSEEN)
-        )
+        both, moved = float(2.0 * norm.sf(beta)), along(beta, 10)
+        yield _of_proposal(_Proposal("both sides, moved to one", 10, 2000, *moved, modulus, beta, both, UNSEEN))
 
 
 def _of_proposal(own: _Proposal) -> Experiment:

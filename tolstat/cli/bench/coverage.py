@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import as_text
+from tolstat.cli._app import Workers, as_text
 from tolstat.cli._talk import fail, say
 
 MARK = "coverage"
@@ -24,7 +24,7 @@ def coverage(
     only: Annotated[
         str, typer.Option("--only", metavar="WORD", help="Statistics whose name has this word.", show_default=False)
     ] = "",
-    workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Number of processes.")] = 1,
+    workers: Workers = None,
     every: Annotated[bool, typer.Option("--cases", help="Also print every case.")] = False,
     into: Annotated[
         Path | None,
@@ -45,12 +45,13 @@ def coverage(
     Example: tolstat bench coverage --only band --seeds 200
     """
     from tolstat.benchmarks.coverage import page, run
+    from tolstat.campaign.executors.common import available_workers
     from tolstat.display import marks
 
     if into is not None:
         marks.split(into, MARK)
     number = seeds if seeds is not None else run.QUICK if quick else run.FULL
-    found = run.measure(number, only, workers, say)
+    found = run.measure(number, only, available_workers() if workers is None else workers, say)
     typer.echo(as_text({"cases": found.plain()}) if as_json else page.text(found, every))
     if into is not None:
         marks.insert(into, MARK, page.markdown(found))

@@ -73,7 +73,7 @@ def test_every_interval_covers_in_one_experiment():
 def test_the_command_prints_tables_and_writes_them_into_a_document(tmp_path):
     file = tmp_path / "page.md"
     file.write_text("# Page\n\n<!-- coverage -->\n<!-- end of coverage -->\n", encoding="utf-8")
-    call = ("bench", "coverage", "--only", "on purpose", "--seeds", "60")
+    call = ("bench", "coverage", "--only", "on purpose", "--seeds", "60", "--workers", "1")
     done = CliRunner().invoke(app, [*call, "--into", str(file), "--cases"])
     assert done.exit_code == 0, done.stderr
     assert "found in every case" in done.stdout

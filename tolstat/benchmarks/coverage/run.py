@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -54,11 +55,12 @@ class Coverage(NamedTuple):
         return row.misses_surely(MOST)
 
     def plain(self) -> list[dict[str, object]]:
-        """Rows of plain values, for JSON."""
+        """Rows of plain values, for JSON; None where there is no number."""
         found = []
         for row in self.rows:
             covered, lower, upper = row.covered
-            numbers = {"covered": covered, "covered_lower": lower, "covered_upper": upper, "width": row.width}
+            measured = {"covered": covered, "covered_lower": lower, "covered_upper": upper, "width": row.width}
+            numbers = {name: value if math.isfinite(value) else None for name, value in measured.items()}
             counts = {"seeds": row.seeds, "given": row.given, "above": row.above, "below": row.below}
             about = {"statistic": row.asked.statistic, "case": row.asked.case, "n": row.asked.n}
             found.append({**about, **counts, **numbers, "misses": self.misses(row), "known": row.asked.known})

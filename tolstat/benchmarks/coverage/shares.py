@@ -97,7 +97,7 @@ def _unresolved(law: Law, n: int) -> Experiment:
 
 def _capability(law: Law, n: int) -> Experiment:
     limit = float(law.ppf(0.999))
-    points = law.ppf((np.arange(200_000) + 0.5) / 200_000)
+    points = law.ppf((np.arange(100_000) + 0.5) / 100_000)
     by_moments = (limit - points.mean()) / (3.0 * points.std())
     middle, high = (float(law.ppf(share)) for share in (0.5, capability.REFERENCE))
     by_quantiles = (limit - middle) / (high - middle)

@@ -108,7 +108,7 @@ def of_event(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95
     >>> above = lambda x: x[..., 0] + 2.0 * x[..., 1] > 3.0
     >>> mixed = np.stack([np.where([True, False], b, a), np.where([False, True], b, a)], axis=1)
     >>> of_event(above(a), above(b), above(mixed)).total.estimate.round(1).tolist()
-    [0.4, 0.9]
+    [0.5, 0.9]
     """
     x, y, mixed = _checked(a, b, ab)
     share = float(0.5 * (x.mean() + y.mean()))
@@ -116,8 +116,7 @@ def of_event(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95
     counts = valid.sum(axis=0)
     up, down = (valid & ((mixed - x[:, None]) == sign) for sign in (1.0, -1.0))
     with_b = (y == 1.0)[:, None]
-    cells = np.array([(up & with_b).sum(axis=0), (up & ~with_b).sum(axis=0)])
-    cells = np.append(cells, [(down & with_b).sum(axis=0), (down & ~with_b).sum(axis=0)], axis=0)
+    cells = np.array([(way & own).sum(axis=0) for way in (up, down) for own in (with_b, ~with_b)])
     signs = np.array([1.0 - share, -share, share - 1.0, share])[:, None]
     low, high = (float(end) for end in clopper_pearson(share * 2 * len(x), 2 * len(x), confidence))
     of_ends = low * (1.0 - low), high * (1.0 - high)

@@ -100,7 +100,7 @@ def _given_data(load: Load, n: int) -> Experiment:
     return Experiment(tuple(asked), once)
 
 
-def _exchanged(load: Callable[[FloatArray], FloatArray], ab: FloatArray) -> tuple[FloatArray, ...]:
+def _exchanged(load: Callable[[FloatArray], FloatArray], ab: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Loads of points A and B, (2, n, 3), and of A with one error of B."""
     a, b = ab
     return load(a), load(b), load(np.stack([np.where(np.arange(3) == k, b, a) for k in range(3)], axis=1))

@@ -1,4 +1,4 @@
-"""Tables of the bench: one line a statistic, one line a case; as text and as Markdown."""
+"""Tables of the bench: a line for each statistic, and one for each case."""
 
 from __future__ import annotations
 
@@ -86,15 +86,14 @@ def text(found: Coverage, every: bool = False) -> str:
 
 
 def markdown(found: Coverage) -> str:
-    """Tables for a document: the summary, what misses, and all cases."""
+    """Table for a document, and what misses."""
     head = ["estimator", "claim", "covered, %", "above, below, %", "given, %", "width", "refuses", "shown by"]
     rows = []
     for line in lines(found):
         about = STATISTICS[line.name]
         numbers = [line.covered(), line.sides(), line.given(), line.width()]
         rows.append([f"{line.name} ({line.cases})", about.claim, *numbers, about.refuses, about.where])
-    of_cases = _markdown(_CASE, [_case(found, row) for row in found.rows])
-    return "\n\n".join([_markdown(head, rows), _legend(found), *_verdict(found, "- "), "## Every case", of_cases])
+    return "\n\n".join([_markdown(head, rows), _legend(found), *_verdict(found, "- ")])
 
 
 _CASE = ["statistic", "case", "joints", "given, %", "covered, %", "its interval", "above, %", "below, %", "width", ""]

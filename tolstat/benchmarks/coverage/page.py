@@ -14,7 +14,7 @@ from tolstat.benchmarks.coverage.trial import Row
 from tolstat.display.text import align
 
 ENOUGH = 0.05
-"""Share of the seeds that must have an interval for a row to count in the summary."""
+"""Share of the seeds that must have an interval for a case to count in the summary."""
 
 
 class Line(NamedTuple):
@@ -26,28 +26,25 @@ class Line(NamedTuple):
         Key of `statistics.STATISTICS`.
     rows : list of Row
         Its cases with enough intervals.
-    cases : int
-        Number of all cases.
+    every : list of Row
+        All of its cases.
     """
 
     name: str
     rows: list[Row]
-    cases: int
-
-    @property
-    def worst(self) -> Row | None:
-        """Case with the most misses on one side."""
-        return max(self.rows, key=lambda row: max(row.above, row.below) / row.given, default=None)
+    every: list[Row]
 
     def covered(self) -> str:
-        """Smallest, middle and largest coverage of the cases, per cent."""
-        found = [100.0 * row.covered[0] for row in self.rows]
-        return f"{min(found):.1f}, {np.median(found):.1f}, {max(found):.1f}" if found else "-"
+        """Smallest coverage of the cases with its interval, and the median, per cent."""
+        found = [tuple(100.0 * share for share in row.covered) for row in self.rows]
+        if not found:
+            return "-"
+        least, lower, upper = min(found)
+        return f"{least:.1f} ({lower:.1f} to {upper:.1f}), {np.median([own[0] for own in found]):.1f}"
 
     def given(self) -> str:
-        """Smallest and largest share of the seeds with an interval, per cent, of the cases that count."""
-        found = [100.0 * row.given / row.seeds for row in self.rows]
-        return _range(found, ".0f") if found else "-"
+        """Smallest and largest share of the seeds with an interval, per cent, of all cases."""
+        return _range([100.0 * row.given / row.seeds for row in self.every], ".0f")
 
     def width(self) -> str:
         """Smallest and largest width over that of fresh joints."""
@@ -69,7 +66,7 @@ def lines(found: Coverage) -> list[Line]:
     for name in STATISTICS:
         rows = [row for row in found.rows if row.asked.statistic == name]
         if rows:
-            made.append(Line(name, [row for row in rows if row.given >= max(1.0, ENOUGH * row.seeds)], len(rows)))
+            made.append(Line(name, [row for row in rows if row.given >= max(1.0, ENOUGH * row.seeds)], rows))
     return made
 
 
@@ -77,7 +74,8 @@ def text(found: Coverage, every: bool = False) -> str:
     """Tables for a terminal: the summary, and with `every` all cases."""
     head = ["statistic", "cases", "covered, %", "above, below, %", "given, %", "width"]
     rows = [
-        [line.name, str(line.cases), line.covered(), line.sides(), line.given(), line.width()] for line in lines(found)
+        [line.name, str(len(line.every)), line.covered(), line.sides(), line.given(), line.width()]
+        for line in lines(found)
     ]
     parts = [align([head, *rows]), _legend(found)]
     if every:
@@ -92,7 +90,7 @@ def markdown(found: Coverage) -> str:
     for line in lines(found):
         about = STATISTICS[line.name]
         numbers = [line.covered(), line.sides(), line.given(), line.width()]
-        rows.append([f"{line.name} ({line.cases})", about.claim, *numbers, about.refuses, about.where])
+        rows.append([f"{line.name} ({len(line.every)})", about.claim, *numbers, about.refuses, about.where])
     return "\n\n".join([_markdown(head, rows), _legend(found), *_verdict(found, "- ")])
 
 
@@ -113,9 +111,10 @@ def _case(found: Coverage, row: Row) -> list[str]:
 def _legend(found: Coverage) -> str:
     seeds = max(row.seeds for row in found.rows)
     return (
-        f"Seeds 0 to {seeds - 1}. Covered: least, median and largest of the cases in which at least "
-        f"{100 * ENOUGH:.0f} % of the seeds give an interval. Above and below: largest share of the intervals that lie "
-        "above the truth, and below it. Width: median, over that of as many independent joints of equal weight."
+        f"Seeds 0 to {seeds - 1}. Covered: least of the cases, with its 95 % interval, and their median; cases count in "
+        f"which at least {100 * ENOUGH:.0f} % of the seeds give an interval. Above, below: largest share of the intervals "
+        "that lie above the truth, and below it. Given: share of the seeds with an interval. Width: median, over that of "
+        "as many independent joints of equal weight."
     )
 
 

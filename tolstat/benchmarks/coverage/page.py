@@ -34,6 +34,10 @@ class Line(NamedTuple):
     rows: list[Row]
     every: list[Row]
 
+    def numbers(self) -> list[str]:
+        """Cells that are measured."""
+        return [self.covered(), self.sides(), self.given(), self.width()]
+
     def covered(self) -> str:
         """Smallest coverage of the cases with its interval, and the median, per cent."""
         found = [tuple(100.0 * share for share in row.covered) for row in self.rows]
@@ -73,10 +77,7 @@ def lines(found: Coverage) -> list[Line]:
 def text(found: Coverage, every: bool = False) -> str:
     """Tables for a terminal: the summary, and with `every` all cases."""
     head = ["statistic", "cases", "covered, %", "above, below, %", "given, %", "width"]
-    rows = [
-        [line.name, str(len(line.every)), line.covered(), line.sides(), line.given(), line.width()]
-        for line in lines(found)
-    ]
+    rows = [[line.name, str(len(line.every)), *line.numbers()] for line in lines(found)]
     parts = [align([head, *rows]), _legend(found)]
     if every:
         parts.append(align([_CASE, *(_case(found, row) for row in found.rows)], words=[True, True]))
@@ -89,8 +90,8 @@ def markdown(found: Coverage) -> str:
     rows = []
     for line in lines(found):
         about = STATISTICS[line.name]
-        numbers = [line.covered(), line.sides(), line.given(), line.width()]
-        rows.append([f"{line.name} ({len(line.every)})", about.claim, *numbers, about.refuses, about.where])
+        head_of = [f"{line.name} ({len(line.every)})", about.claim]
+        rows.append([*head_of, *line.numbers(), about.refuses, about.where])
     return "\n\n".join([_markdown(head, rows), _legend(found), *_verdict(found, "- ")])
 
 
@@ -111,10 +112,10 @@ def _case(found: Coverage, row: Row) -> list[str]:
 def _legend(found: Coverage) -> str:
     seeds = max(row.seeds for row in found.rows)
     return (
-        f"Seeds 0 to {seeds - 1}. Covered: least of the cases, with its 95 % interval, and their median; cases count in "
-        f"which at least {100 * ENOUGH:.0f} % of the seeds give an interval. Above, below: largest share of the intervals "
-        "that lie above the truth, and below it. Given: share of the seeds with an interval. Width: median, over that of "
-        "as many independent joints of equal weight."
+        f"Seeds 0 to {seeds - 1}. Covered: least of the cases, with its 95 % interval, and their median; cases count "
+        f"in which at least {100 * ENOUGH:.0f} % of the seeds give an interval. Above, below: largest share of the "
+        "intervals that lie above the truth, and below it. Given: share of the seeds with an interval. Width: median, "
+        "over that of as many independent joints of equal weight."
     )
 
 

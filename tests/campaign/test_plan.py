@@ -91,7 +91,7 @@ def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400
     made = fakes.Study(n=n)
 
     def run(row: int) -> None:
-        campaign.run(made, path, workers, block, stages=fakes.stages(), until_row=row)
+        fakes.run(made, path, workers, block, until_row=row)
 
     return stop_rule.run_until(made, path, stop_rule.parse(RULE), run)
 

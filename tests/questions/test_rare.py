@@ -100,11 +100,11 @@ def load(folder, text=PLAN, name="plan"):
 
 def asked(plan, beta=2.5, **more):
     above = 700.0 + 100.0 * beta
-    question = {"load": "cross1.F", "above": above, "per_level": 100, "p0": 0.5}
+    question = {"load": "cross1.F", "above": above, "per_level": 100, "p0": 0.2}
     return study.subset_of(plan, question | more)
 
 
-def perturb(joint, errors):
+def perturb(joint, operation, errors):
     params = np.zeros(len(errors), PARAM)
     params["R"] = sum(errors[f"pin{i}.offset_t"] for i in (1, 2, 3, 4)) * 3e4 / SIGMA
     params["alpha"] = errors["pin1.offset_t"] * 3e4
@@ -272,6 +272,7 @@ def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, 
     assert CliRunner().invoke(app, ["rare", str(path), "--n", "300"]).exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
     plan, found, path = whole
     monkeypatch.setattr(campaign, "versions", lambda: dict.fromkeys(("tolstat", "sources"), "other"))

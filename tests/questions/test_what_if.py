@@ -76,7 +76,7 @@ def path(tmp_path):
     errors = sampling.draw(plan)
     file = tmp_path / "made.h5"
     with ResultStore.create(file, plan, errors) as store:
-        store.write(np.arange(plan.rows), stand_in(perturb(plan.joint, errors), None))
+        store.write(np.arange(plan.rows), stand_in(perturb(plan.joint, plan.operation, errors), None))
     return file
 
 
@@ -146,8 +146,8 @@ def test_an_unchanged_line_gives_the_joints_of_the_campaign(tmp_path):
     """Loads of the campaign's joints, simulated as joints of a change that changes nothing, are the same bits."""
     plan = loaded(tmp_path, TEXT.replace("n = 400", "n = 8"))
     options = plan.solver.options()
-    base = simulate_rows(perturb(plan.joint, sampling.draw(plan)), options).results
-    again = simulate_rows(perturb(plan.joint, sets.as_drawn(plan).draw(range(8))), options).results
+    base = simulate_rows(perturb(plan.joint, plan.operation, sampling.draw(plan)), options).results
+    again = simulate_rows(perturb(plan.joint, plan.operation, sets.as_drawn(plan).draw(range(8))), options).results
     assert base[plan.first_sample :].tobytes() == again.tobytes()
 
 
@@ -162,7 +162,7 @@ def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
     other = loaded(tmp_path, TEXT.replace('iso2768 = "f", nominal = "36.4 mm"', 'plus_minus = "0.25 deg"'))
     n = int(row["n"])
     joints = sampling.draw(study.load(other.path, n=n))[other.first_sample :]
-    expected = stand_in(perturb(other.joint, joints), None).results["F_max"][:, 0] > 700.0
+    expected = stand_in(perturb(other.joint, other.operation, joints), None).results["F_max"][:, 0] > 700.0
     assert row["share"] == pytest.approx(expected.mean(), abs=1e-12)
     assert row["change_upper"] < 0.0
     assert row["share_lower"] < row["share"] < row["share_upper"]

@@ -109,7 +109,7 @@ def test_a_fit_sets_nominal_diameters_and_their_tolerances() -> None:
 def test_drawn_clearances_lie_within_the_zones() -> None:
     loaded = load(H7_F7.replace('"normal", cpk = 1.0', '"uniform"'))
     errors = sampling.draw(loaded)
-    clearance = joint.perturb(loaded.joint, errors)["clearance"]
+    clearance = joint.perturb(loaded.joint, loaded.operation, errors)["clearance"]
     assert clearance[0] == pytest.approx(30e-6, rel=1e-9)
     assert ((clearance > 15e-6) & (clearance < 45e-6)).all()
     assert np.ptp(clearance) > 5e-6

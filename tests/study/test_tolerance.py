@@ -168,11 +168,11 @@ def test_normal_entries() -> None:
     )
     shifted = build(normal | {"lower": "-0.02 mm", "upper": "0 mm", "mean": "-0.005 mm", "cpk": 1.0})
     assert shifted == distributions.Normal(pytest.approx(-5e-6), pytest.approx(5e-6 / 3))
-    assert build(normal | {"mean": "100 N*m", "std": "5 N*m"}, "operation.torque", 90.0, "N*m") == distributions.Normal(
-        100, 5
+    assert build(normal | {"mean": "1 N*m", "std": "5 N*m"}, "operation.torque", 0.0, "N*m") == distributions.Normal(
+        1, 5
     )
-    about = build(normal | {"plus_minus": "30 N*m"}, "operation.torque", 90.0, "N*m")
-    assert about == distributions.Normal(90.0, pytest.approx(10.0))
+    about = build(normal | {"plus_minus": 0.3}, "material.E_factor", 0.9, "1")
+    assert about == distributions.Normal(0.9, pytest.approx(0.1))
 
 
 def test_other_entries() -> None:

@@ -19,7 +19,7 @@ from tolstat.analysis import exceedance
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import LOADS
-from tolstat.store import Reader, ResultStore
+from tolstat.store import Reader, ResultStore, worst
 from tolstat.store.result_file import BLOCK
 from tolstat.study import rule as rules
 
@@ -31,7 +31,7 @@ EXAMPLE = 'write --until "P(cross1.F > 700 N) width < 0.01"'
 
 
 class Rule(NamedTuple):
-    """Stop when the interval of P(load > level) is narrower than `width`.
+    """Stop when the interval of P(load > level) is narrower than `width`; of several operating points the worst counts.
 
     Attributes
     ----------
@@ -196,8 +196,9 @@ def _look(store: Reader, rule: Rule, rows: range, n_looks: int) -> Look:
     count = unresolved = 0
     for begin in range(0, len(rows), BLOCK):
         block = rows[begin : begin + BLOCK]
-        results = store.results(slice(block.start, block.stop))
-        part = exceedance.exceedance(LOADS[rule.load].of(results), results["status"], rule.level, iid=False)
+        results = [one.results(slice(block.start, block.stop)) for one in store.each()]
+        values, status, _ = worst.load_of(results, LOADS[rule.load])
+        part = exceedance.exceedance(values, status, rule.level, iid=False)
         count += part.count
         unresolved += part.n_failed + part.n_unsettled
     return Look(len(rows), unresolved, count, *interval(count, unresolved, len(rows), n_looks))

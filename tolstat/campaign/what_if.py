@@ -98,7 +98,7 @@ def options_of(study: Study, store: ResultStore) -> Options:
 
 def seconds_per_joint(study: Study, options: Options, joints: int) -> float:
     """Time of a joint in one process, s, from the first samples; kernels must be ready."""
-    params = perturb(study.joint, as_drawn(study).draw(range(joints)))
+    params = perturb(study.joint, study.operation, as_drawn(study).draw(range(joints)))
     begin = time.perf_counter()
     simulate_rows(params, options)
     return (time.perf_counter() - begin) / joints
@@ -207,7 +207,7 @@ def _blocks(study: Study, options: Options, todo: Sequence[tuple[Change, range]]
         for first in range(0, len(numbers), BLOCK):
             own = numbers[first : first + BLOCK]
             slots = np.arange(begin + first, begin + first + len(own))
-            yield Block(slots, perturb(study.joint, change.draw(own)), options)
+            yield Block("", slots, perturb(study.joint, study.operation, change.draw(own)), options)
         begin += len(numbers)
 
 

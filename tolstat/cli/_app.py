@@ -104,6 +104,24 @@ ByMany = Annotated[
     list[str] | None,
     typer.Option("--by", metavar="LOAD", help="Load, such as cross1.F; repeatable; default: loads with limits."),
 ]
+AtPoints = Annotated[
+    str | None,
+    typer.Option(
+        "--point",
+        metavar="POINT",
+        help="Operating point, such as cruise, or the worst of some: cruise+start; default: the worst of all.",
+    ),
+]
+AtPoint = Annotated[
+    str | None,
+    typer.Option("--point", metavar="POINT", help="Operating point, such as cruise; needed if FILE has several."),
+]
+AtOne = Annotated[
+    str | None,
+    typer.Option(
+        "--point", metavar="POINT", help="Operating point of STUDY, such as cruise; needed if it has several."
+    ),
+]
 Accept = Annotated[
     str | None,
     typer.Option(
@@ -168,8 +186,10 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
         for name, annotation, default in added
     ]
-    run.__signature__ = own.replace(parameters=[*own.parameters.values(), *parameters])  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
+    signature = own.replace(parameters=[*own.parameters.values(), *parameters])
+    decorated: Any = run
+    decorated.__signature__ = signature
+    decorated.__annotations__ = {p.name: p.annotation for p in signature.parameters.values()}
     return run
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, StudyOption, Wide, as_text, output_file, print_table
+from tolstat.cli._app import AsJson, AtPoints, ResultFile, StudyOption, Wide, as_text, output_file, print_table
 from tolstat.cli._talk import progress, say
 
 
@@ -42,6 +42,7 @@ def allocate(
         Path | None,
         typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the proposed tolerances."),
     ] = None,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -67,7 +68,7 @@ def allocate(
     if out is not None:
         check_target(out, file)
     with progress("search for the cheapest tolerances"), Reader.open(file) as store:
-        found = allocated(store.view(study_file), target, costs, keep or ())
+        found = allocated(store.view(study_file).at(point or ""), target, costs, keep or ())
     if out is not None:
         content = found.text
         with output_file(out) as temporary:

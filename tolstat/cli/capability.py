@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
+from tolstat.cli._app import AsJson, AtPoints, ResultFile, Wide, as_text, print_table
 from tolstat.cli._talk import progress, say, warn, wrapped
 from tolstat.common.errors import Fault, InputError, StoreError
 
@@ -17,6 +17,7 @@ def capability(
         list[float] | None,
         typer.Option("--one-in", metavar="N", min=1, help="Print the load that one in N joints exceeds; repeatable."),
     ] = None,
+    point: AtPoints = None,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
@@ -36,7 +37,7 @@ def capability(
     from tolstat.store import Reader
 
     with progress("capability"), Reader.open(file) as store:
-        view = store.view()
+        view = store.view().at(point or "")
         if not view.limits or view.method in ("sweep", "cases"):
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
             raise StoreError(str(Fault(str(file), "has no limits, or its joints are no random sample", remedy)))

@@ -10,6 +10,7 @@ import typer
 
 from tolstat.cli._app import (
     AsJson,
+    AtPoints,
     ByOne,
     StudyOption,
     Wide,
@@ -94,6 +95,7 @@ def causes(
     joints: Annotated[
         int, typer.Option("--joints", metavar="N", min=100, help="With --against-angle: number of joints used.")
     ] = 1000,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -121,7 +123,7 @@ def causes(
     if against_angle:
         if points is not None:
             raise InputError([Fault("--against-angle", "cannot be combined with --pick-freeze", "remove one of them")])
-        _against_angle(file, by, top, logarithm, out, joints, study_file, wide)
+        _against_angle(file, by, top, logarithm, out, joints, point, study_file, wide)
         return
     if run:
         if points is not None or out is not None:
@@ -141,9 +143,9 @@ def causes(
         remedy = "add --pick-freeze 1024, or --against-angle"
         raise InputError([Fault("--out", "is used with --pick-freeze or --against-angle only", remedy)])
     with progress("causes"), Reader.open(file) as store:
-        view = store.view(study_file)
+        view = store.view(study_file).at(point or "")
         load = by or view.most_exceeded
-        lines = what_if(view, load) if points is None and not view.study.groups else None
+        lines = what_if(view, load) if view.altered else None
         found = causes_of(view, load, log=logarithm)
     if as_json:
         typer.echo(as_text(rendering.values(found) | ({"what_if": whatifs.values(lines)} if lines else {})))
@@ -195,6 +197,7 @@ def _against_angle(
     logarithm: bool,
     out: Path | None,
     joints: int,
+    point: str | None,
     study_file: Path | None,
     wide: bool,
 ) -> None:
@@ -207,8 +210,8 @@ def _against_angle(
         for path in (out, out.with_suffix(".png")):
             check_target(path, file)
     with progress("causes over the input angle"), Reader.open(file) as store:
-        view = store.view(study_file)
-        load = by or view.most_exceeded
+        view = store.view(study_file).at(point or "")
+        view, load = view.narrowed(by or view.most_exceeded)
         if not revolutions.held(store):
             announce_compilation()
         found = against_angle(view, [load], joints, (load,) if logarithm else ())[0]

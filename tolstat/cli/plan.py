@@ -51,7 +51,7 @@ def plan(
 
 def _lines(made: Plan) -> str:
     lines = [
-        f"joints: {made.rows}",
+        f"joints: {made.rows}" + (f", each at {', '.join(made.points)}" if all(made.points) else ""),
         f"random numbers a joint: {made.dimensions}",
         f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
         *([made.fidelity] if made.fidelity else []),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import AsJson, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
+from tolstat.cli._app import AsJson, AtOne, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
 from tolstat.cli._talk import fail, progress, say, wrapped
 from tolstat.common.errors import Fault, InputError, gather
 
@@ -54,6 +54,7 @@ def rare(
             help="Whether failed and unsettled joints count as above or below the level; default: below.",
         ),
     ] = None,
+    point: AtOne = None,
     study_file: StudyOption = None,
     workers: Workers = None,
     wide: Wide = False,
@@ -78,9 +79,9 @@ def rare(
     given = {"n": n, "p0": p0, "seed": seed, "unresolved": None if unresolved is None else unresolved.value}
     given = {name: value for name, value in given.items() if value is not None}
     if source.suffix == ".toml":
-        plan, path = _read_study(source, limit, given), out or Path(f"{source.stem}_rare.h5")
+        plan, path = _read_study(source, limit, point, given), out or Path(f"{source.stem}_rare.h5")
     else:
-        plan, path = _recall(source, study_file, [limit, out, *given.values()]), source
+        plan, path = _recall(source, study_file, [limit, out, point, *given.values()]), source
     announce_compilation()
     try:
         with progress("levels of the subset simulation") as shown:
@@ -101,7 +102,7 @@ def rare(
     _print_messages(found, path)
 
 
-def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
+def _read_study(source: Path, limit: str | None, point: str | None, given: dict[str, Any]) -> Study:
     from tolstat import study
     from tolstat.questions.rare.query import parse_limit, subset_study
 
@@ -112,7 +113,7 @@ def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study
         with gather(faults):
             parse_limit(limit)
     with gather(faults):
-        plan = study.load(source)
+        plan = study.load(source).at(point or "")
     if faults or limit is None:
         raise InputError(faults)
     return subset_study(plan, limit, **given)

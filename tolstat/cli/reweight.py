@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, StudyOption, Wide, as_text, output_file, print_table
+from tolstat.cli._app import AsJson, AtPoints, ResultFile, StudyOption, Wide, as_text, output_file, print_table
 from tolstat.cli._talk import progress, say
 
 
@@ -23,6 +23,7 @@ def reweight(
         Path | None,
         typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the changed tolerances."),
     ] = None,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -47,7 +48,7 @@ def reweight(
     if out is not None:
         check_target(out, file)
     with progress("reweighting"), Reader.open(file) as store:
-        found = reweighted(store.view(study_file), settings)
+        found = reweighted(store.view(study_file).at(point or ""), settings)
     if out is not None:
         with output_file(out) as temporary:
             temporary.write_text(found.text, encoding="utf-8")

@@ -106,20 +106,14 @@ def run(
     from tolstat.campaign.blocks import Execution
     from tolstat.campaign.retry import parse
 
-    faults: list[Fault] = []
     limit, part, again = 0.0, None, None
+    faults = _cannot_be_combined(rows, until, retry, settings)
+    if scheduler is not None and executor is not Executor.DASK:
+        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     with gather(faults):
         limit = parse_time(joint_timeout)
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
-    if rows is not None and until is not None:
-        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
-    if until is not None and retry is not None:
-        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
-    if scheduler is not None and executor is not Executor.DASK:
-        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
-    if settings and retry is None:
-        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
     with gather(faults):
         plan = study.load(study_file, n=n)
         again = None if retry is None else parse(retry, settings or (), plan)
@@ -134,6 +128,19 @@ def run(
     else:
         simulate(plan, path, until, execution=execution, check=verify)
     conclude(path, report, wide, str(study_file))
+
+
+def _cannot_be_combined(
+    rows: str | None, until: str | None, retry: str | None, settings: list[str] | None
+) -> list[Fault]:
+    faults = []
+    if rows is not None and until is not None:
+        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
+    if until is not None and retry is not None:
+        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
+    if settings and retry is None:
+        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
+    return faults
 
 
 def parse_time(text: str, option: str = "--joint-timeout") -> float:
@@ -182,7 +189,10 @@ def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) 
     except WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
-    say(f"{path}: {counts.done} joints, {counts.shortfall}")
+    done = f"{counts.done} joints"
+    if len(plan.points) > 1:
+        done = f"{counts.done} simulations of joints at {len(plan.points)} operating points"
+    say(f"{path}: {done}, {counts.shortfall}")
 
 
 def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None:
@@ -200,12 +210,11 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
             made = build(path, None, width_of(wide), shown.stage)
         tell(made)
     with Reader.open(path) as store:
-        found = reasons(store, store.status())
+        found = reasons(store, {one.point or "": one.status() for one in store.each()})
         for reason in found:
             say(reason.text)
-        for reason in found:
-            if reason.retry:
-                say(f"again: tolstat run {study} --out {path} {reason.retry}")
+        for retry in dict.fromkeys(reason.retry for reason in found if reason.retry):
+            say(f"again: tolstat run {study} --out {path} {retry}")
         say(f"next: {_next(store, path)}")
 
 

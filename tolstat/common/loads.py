@@ -16,6 +16,9 @@ from tolstat.common.tables import LOAD_KINDS, SPAN
 
 FloatArray = NDArray[np.float64]
 
+AT = " at "
+"""What stands between a load and the operating points that it is taken at: ``"cross1.F at cruise+start"``."""
+
 
 class Load(NamedTuple):
     """One load: its largest value over the revolution. Higher is worse for every load.
@@ -48,6 +51,17 @@ class Load(NamedTuple):
         """Interval of the load in each joint, (n,) each, SI: the load itself unless the joint is stationary."""
         values = self.of(results)
         return values * results[f"{self.kind}_lower"], values * results[f"{self.kind}_upper"]
+
+
+def split(name: str) -> tuple[str, str]:
+    """Load and operating points of a name: of ``"cross1.F at cruise"`` ``("cross1.F", "cruise")``; ``""`` are all."""
+    load, _, points = name.partition(AT)
+    return load, points
+
+
+def load_of(name: str) -> Load:
+    """Load that a name is about, whatever operating points it names."""
+    return LOADS[split(name)[0]]
 
 
 def of_kind(results: NDArray[np.void], kind: str) -> FloatArray:
@@ -93,7 +107,7 @@ def limits_in_words(limits: Mapping[str, float]) -> str:
     """Limits by name, SI, as one text: loads of the same limit together."""
     loads: dict[str, list[str]] = {}
     for name, limit in limits.items():
-        loads.setdefault(f"{limit:g} {unit_text(UNIT_OF_LOAD[name])}".rstrip(), []).append(name)
+        loads.setdefault(f"{limit:g} {unit_text(load_of(name).unit)}".rstrip(), []).append(name)
     return "; ".join(f"{', '.join(names)}: {limit}" for limit, names in loads.items()) or "none"
 
 

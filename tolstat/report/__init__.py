@@ -61,6 +61,7 @@ def build(
     width: int | None = WIDTH,
     stage: Callable[[str], None] = silent,
     accepted: float = math.nan,
+    point: str = "",
 ) -> Report:
     """Write the report of a result file; the campaign may be unfinished.
 
@@ -82,6 +83,9 @@ def build(
         Called with the name of each stage when it begins.
     accepted : float
         Accepted share: share of the joints that may be above each limit; NaN if none is given.
+    point : str
+        Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; names of files end in it. The worst of
+        all by default.
 
     Returns
     -------
@@ -105,6 +109,7 @@ def build(
             stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
                 return _noted(_cases(store, stem, width), stands_on)
+            stem = stem.with_name(f"{stem.name}_{point}") if point else stem
             report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width, accepted)
             for note in (view.missing(), _stopped(store.stop) if store.stop else "", stands_on):
                 report = _noted(report, note)
@@ -138,6 +143,9 @@ def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> R
         limits = query.limits(view)
         files.append(text.csv(limits, stem, "limits"))
         shown, more = _fitted(rendering.LIMITS, limits, width)
+        points = query.at_points(view)
+        if len(points):
+            shown += f"\n\n{rendering.AT_POINTS}\n{_fitted(rendering.at_points(view), points, width)[0]}"
     if verdict is not None:
         sentence = text.sentence(verdict.sentence)
         shown = f"{sentence if width is None else textwrap.fill(sentence, width)}\n\n{shown}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,7 @@ def write_page(
     accepted: float = np.nan,
     replay: int = REPLAYED,
     stage: Callable[[str], None] = silent,
+    point: str = "",
 ) -> Path:
     """Write the report of a result file as one page; the campaign may be unfinished.
 
@@ -49,6 +51,8 @@ def write_page(
         the page shows no histories.
     stage : callable
         Called with the name of each part of the page when its computation begins.
+    point : str
+        Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; the worst of all by default.
 
     Returns
     -------
@@ -69,7 +73,7 @@ def write_page(
         if view.store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
             raise StoreError(str(Fault(str(view.path), "lists its joints one by one", remedy)))
-        made = compose(view, Asked(view.path, accepted, replay, stage=stage))
+        made = compose(view.at(point), Asked(view.path, accepted, replay, stage=stage))
         stage("page: pictures")  # drawn from the view
         html.write(made, Path(out))
     return Path(out)
@@ -83,6 +87,10 @@ def compose(view: View, asked: Asked) -> Page:
     asked.notes.extend(
         note for note in (fidelity.sentence(view.store.options, view.store.fidelity), _stopped(view)) if note
     )
+    if len(view.points) > 1:
+        remedy = f"tolstat report {asked.path.name} --point {view.points[0]} --out PAGE.html"
+        asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
+        asked = replace(asked, replay=0)
     sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
     facts = Facts(tuple(_facts(view.store)))
     text = Listing("The study as it was run", view.store.study_text)
@@ -106,6 +114,8 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
     rows = f"{store.n}" if store.whole else f"{store.rows[0]} to {store.rows[-1]} of {store.campaign_rows}"
     yield "Rows of the campaign", rows
     yield "Sampling", f"{store.sampling['method']}, seed {store.sampling['seed']}"
+    for point in store.points.values():
+        yield f"Operating point {point.name}".strip(), point.in_words
     yield "Begun", store.created
     yield "Versions", ", ".join(f"{name} {value}" for name, value in store.versions.items() if name != "sources")
     yield "Code", f"{store.git_commit or 'no commit known'}; sources {store.versions.get('sources', 'unknown')}"
@@ -119,8 +129,9 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
 
 
 def results_digest(store: Reader) -> str:
-    """SHA-256 over the checksums of all rows: equal for files with the same joints and results."""
+    """SHA-256 over the checksums of all rows, point by point: equal for files with the same joints and results."""
     digest = hashlib.sha256()
-    for first in range(0, store.n, BLOCK):
-        digest.update(store.column("ledger", "results_check", slice(first, first + BLOCK)).tobytes())
+    for one in store.each():
+        for first in range(0, store.n, BLOCK):
+            digest.update(one.column("ledger", "results_check", slice(first, first + BLOCK)).tobytes())
     return digest.hexdigest()

@@ -57,7 +57,7 @@ def limits(view: View, asked: Asked) -> list[Section]:
         "; ".join(said),
         partial(_forest, table=table, accepted=asked.accepted),
         (4.9, drawing.rows_height(len(table))),
-        1.4,
+        max(1.4, drawing.rows_left(_above(table))),
     )
     how = [Text(line, small=True) for line in _how(view, asked)]
     return [Section("limits", "Each limit", [Panels([panel], beside=how), block])]
@@ -135,6 +135,11 @@ def _how(view: View, asked: Asked) -> list[str]:
     return paragraphs
 
 
+def _above(table: pd.DataFrame) -> list[str]:
+    """Each limit as a label: ``cross1.F > 1500 N``."""
+    return [f"{row['load']} > {text.value(row['level'], row['unit'])}" for row in table.to_dict("records")]
+
+
 def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
     """Estimate, interval and total interval of each limit, on an axis from the least to the largest of them."""
     rows = table.to_dict("records")
@@ -143,7 +148,7 @@ def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
     shown = np.array([*table["estimate"], *np.ravel(spans)], float)
     shown = np.array([*shown[shown >= 0.5 / n], *([accepted] if accepted > 0 else ())])
     high = min(1.4 * shown.max(initial=0.5 / n), 1.0)
-    drawing.rows(ax, [text.limit(row) for row in rows])
+    drawing.rows(ax, _above(table))
     style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
     low = ax.get_xlim()[0]
     for i, (row, span) in enumerate(zip(rows, spans, strict=True)):

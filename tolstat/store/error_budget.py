@@ -19,13 +19,15 @@ def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | Non
     error = relative(view, load.name)
     if np.isnan(error):
         return None
-    by = error * size(view.results, load.name)
+    narrowed, name = view.narrowed(load.name)
+    by = error * size(narrowed.results, name)
     return load.shifted(-by), load.shifted(by)
 
 
 def relative(view: View, name: str) -> float:
     """Numerical error of a load, relative to the largest load of its kind in the joint; NaN if unknown."""
-    return view.numerical_error.get(LOADS[name].kind, np.nan)
+    narrowed, plain = view.narrowed(name)
+    return narrowed.numerical_error.get(LOADS[plain].kind, np.nan)
 
 
 def total_interval(

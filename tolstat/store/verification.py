@@ -65,10 +65,10 @@ class Verification(NamedTuple):
 
 def read(store: Reader) -> Verification | None:
     """Read the verification from a result file; None if it holds none."""
-    file = store._file
-    if GROUP not in file:
+    held = store._held()
+    if GROUP not in held:
         return None
-    group = file[GROUP]
+    group = held[GROUP]
     rows = np.asarray(group["rows"][:], np.intp)
     checks = {}
     for name in text(group.attrs, "checks").split():
@@ -90,13 +90,14 @@ def write(store: ResultStore, verification: Verification) -> None:
     StoreError
         When there is no room for a second copy of the file.
     """
-    store._replace(lambda file: _write(file, verification, store.columns))
+    where = store._held().name
+    store._replace(lambda file: _write(file[where], verification, store.columns))
 
 
-def _write(file: h5py.File, verification: Verification, columns: tuple[Column, ...]) -> None:
-    if GROUP in file:
-        del file[GROUP]
-    group = file.create_group(GROUP)
+def _write(holder: h5py.Group, verification: Verification, columns: tuple[Column, ...]) -> None:
+    if GROUP in holder:
+        del holder[GROUP]
+    group = holder.create_group(GROUP)
     about = "joints of the campaign simulated again in other ways, to know its numerical error"
     names = " ".join(verification.checks)
     put_attributes(group, {"description": about, "seed": verification.seed, "checks": names})

@@ -97,7 +97,7 @@ def pairs_of(view: View, by: str) -> Pairs:
         raise StoreError(str(Fault(str(view.path), found, f"run {FEWEST} joints or more")))
     errors, values = view.errors(samples), load.values[samples]
     chosen, seen = slice(None, None, 2), slice(1, None, 2)
-    used = combinations(errors, perturb(view.study.joint, errors))
+    used = combinations(errors, perturb(view.study.joint, view.parts[0].store.operation, errors))
     rank = sorted(used, key=lambda name: -_spearman(used[name][chosen], values[chosen]))
     best = rank[0]
     single = {name: np.abs(errors[name] - errors[name].mean()) for name in _scattering(errors)}

@@ -81,9 +81,11 @@ def _table(tail: Tail) -> Table:
     rows = []
     for joint in tail.joints:
         errors = ",  ".join(f"{name} {z:+.1f} σ" for name, z in list(joint.scores.items())[:ERRORS])
-        rows.append([str(joint.row), text.value(joint.value, tail.unit), joint.status.label, errors])
-    head = ["row", tail.by, "status", "largest errors, in standard deviations"]
-    return Table(f"Largest {tail.by}", head, rows, frozenset({0, 2, 3}))
+        point = [joint.point] if joint.point else []
+        rows.append([str(joint.row), text.value(joint.value, tail.unit), *point, joint.status.label, errors])
+    at = ["at"] if any(joint.point for joint in tail.joints) else []
+    head = ["row", tail.by, *at, "status", "largest errors, in standard deviations"]
+    return Table(f"Largest {tail.by}", head, rows, frozenset({0, *range(2, len(head))}))
 
 
 def _histories(view: View, tail: Tail, against: Sequence[AgainstAngle]) -> _Histories:

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import load_of, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
@@ -58,6 +58,26 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
         rows.append(row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan))
     return pd.DataFrame(rows)
+
+
+def at_points(view: View) -> pd.DataFrame:
+    """Share of the joints above each limit at each of the operating points that it holds at.
+
+    Returns
+    -------
+    DataFrame
+        One row per limit that holds at several points, in the study's order: ``load``, ``unit``, ``level``, and under
+        the name of each point of the view the share there; NaN where the limit does not hold, or weighted joints do not
+        support it. No rows for a view of one point.
+    """
+    rows = []
+    for name, level in view.limits.items():
+        at, plain = view.narrowed(name)
+        if len(at.points) > 1:
+            loads = {part.points[0]: part.load(plain) for part in at.parts}
+            shares = {p: own.above(level).estimate if own.supports(level) else np.nan for p, own in loads.items()}
+            rows.append({"load": name, "unit": load_of(name).unit, "level": level} | shares)
+    return pd.DataFrame(rows, columns=["load", "unit", "level", *view.points])
 
 
 def _error_budget(view: View, load: SampleLoad, level: float, confidence: float) -> dict[str, float]:
@@ -177,8 +197,9 @@ def _round_levels(low: float, high: float, limit: float | None) -> NDArray[np.fl
 
 
 def summary(view: View, confidence: float) -> dict[str, Any]:
-    """JSON values: ``limits`` and ``quantiles``, the rows of the tables of these names."""
+    """JSON values: ``limits``, ``at_points`` and ``quantiles``, the rows of the tables of these names."""
     return {
         "limits": text.records(limits(view, confidence)) if view.limits else [],
+        "at_points": text.records(at_points(view)),
         "quantiles": text.records(quantiles(view, confidence)) if view.shown_loads else [],
     }

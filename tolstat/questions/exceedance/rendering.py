@@ -58,6 +58,20 @@ LIMITS = (
 columns count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""
 
 
+def at_points(view: View) -> tuple[Column, ...]:
+    """Columns of the table `query.at_points`: the share above each limit at each operating point."""
+
+    def share(point: str) -> Column:
+        return Column(point, lambda row: text.percent(row[point]))
+
+    head = (Column("load", lambda row: str(row["load"])), Column("limit", lambda r: text.value(r["level"], r["unit"])))
+    return (*head, *map(share, view.points))
+
+
+AT_POINTS = "share of the joints above each limit at each operating point"
+"""Title of the table `query.at_points`."""
+
+
 def _numerical(row: Row) -> str:
     return text.percent(max(abs(row[f"numerical_{end}"] - row["estimate"]) for end in ("lower", "upper")))
 

@@ -33,6 +33,9 @@ def sections(view: View, asked: Asked) -> list[Section]:
     blocks.append(Text(_note(view), small=True))
     blocks.append(Reader(query.readings(view), view.most_exceeded))
     blocks.append(_quantiles(view))
+    points = query.at_points(view)
+    if len(points):
+        blocks.append(as_block(rendering.AT_POINTS.capitalize(), rendering.at_points(view), points))
     if view.limits and view.sampled and view.numerical_error:
         title = "What makes the shares above limits uncertain, in per cent of the joints"
         blocks.append(as_block(title, rendering.BUDGET, query.limits(view)))

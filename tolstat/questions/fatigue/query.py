@@ -36,7 +36,7 @@ class Loading:
     cycles : Cycles
         Cycles of the n samples.
     status : ndarray, shape (n,)
-        `tables.Status`; with several operating points the first that is not ``OK``.
+        `tables.Status`; with several operating points the worst, see `store.worst.deciding`.
     nominal : Cycles
         Cycles of the nominal joint; no rows if there is none that settled.
     iid : bool
@@ -60,18 +60,20 @@ class Loading:
 
 def load_cycles(
     views: Sequence[View],
-    shares: Sequence[float] = (1.0,),
+    shares: Sequence[float] | None = None,
     names: Sequence[str] | None = None,
     samples: int | None = None,
 ) -> Loading:
-    """Rainflow cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
+    """Rainflow cycles of a campaign, or of the same joints at the several operating points of a duty cycle.
 
     Parameters
     ----------
     views : sequence of View
-        The campaign at each operating point; the joints of the campaigns differ in ``operation.*`` only.
-    shares : sequence of float
-        Share of the revolutions at each operating point; the sum is 1.
+        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
+        each operating point.
+    shares : sequence of float, optional
+        Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
+        campaign follow from their shares of the time and their speeds, see `duty.revolutions_at`.
     names : sequence of str, optional
         Channels to keep, keys of `tables.CHANNELS`; by default all 64: some 8 kB per joint.
     samples : int, optional
@@ -80,17 +82,18 @@ def load_cycles(
     Raises
     ------
     InputError
-        When the shares are not shares, or the campaigns have different joints.
+        When the shares are not shares or not known, or the campaigns have different joints.
     StoreError
         When a file holds no histories, or joints that are no sample of a production.
     """
-    shares = duty.check(views, shares)
+    name = " + ".join(view.name for view in views)
+    views, shares = duty.members(views, shares)
     first = views[0]
     parts = [_cycles_of(view, names, samples) for view in views]
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
     return Loading(
-        name=" + ".join(view.name for view in views),
+        name=name,
         cycles=cycles.duty_cycle([own for own, _ in parts], shares),
         status=duty.status(views, samples),
         nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares),

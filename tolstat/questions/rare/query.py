@@ -134,7 +134,7 @@ def subset_study(
     load, above = parse_limit(limit)
     own = {} if seed is None else {"seed": seed}
     fields = {"load": load, "above": above, "per_level": n, "p0": p0, "unresolved": unresolved}
-    return subset_of(study, fields | own)
+    return subset_of(study.at(""), fields | own)
 
 
 def rare_event(

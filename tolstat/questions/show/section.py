@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import split
 from tolstat.common.tables import SIMULATED
 from tolstat.display import text
 from tolstat.display.asked import Asked
@@ -39,7 +39,7 @@ def worst(view: View, load: str, asked: Asked) -> Panel | None:
         Takes a note if there is no drawing.
     """
     with asked.noting("the joint is not drawn"):
-        place = load.rpartition(".")[0]
+        place = split(load)[0].rpartition(".")[0]
         front, side, _ = _joint(view, [place] if place else [])
         title = "The joint"
         if place:
@@ -52,7 +52,7 @@ def worst(view: View, load: str, asked: Asked) -> Panel | None:
 
 
 def _joint(view: View, marked: Collection[str]) -> tuple[Panel, Panel, Panel]:
-    alpha = float(view.store.identity["operation.alpha"])
+    alpha = view.parts[0].store.operation.alpha
     return sheets.joint(query.dimensions(joint_of(view.store, 0), alpha), marked)
 
 
@@ -76,13 +76,14 @@ def _worst(view: View) -> list[Panel]:
     """One drawing for each joint that has the largest of a leading load."""
     loads: dict[int, list[str]] = {}
     for name in view.leading:
-        values = np.where(np.isin(view.status, SIMULATED), LOADS[name].of(view.results), np.nan)
+        load = view.load(name)
+        values = np.where(np.isin(load.status, SIMULATED), load.values, np.nan)
         sample = int(np.nanargmax(values))
-        loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), LOADS[name].unit)}")
+        loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), load.unit)}")
     panels = []
     for sample, said in loads.items():
         joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
         errors = view.errors(np.array([sample]))
-        d = query.dimensions(joint, float(errors["operation.alpha"][0]))
+        d = query.dimensions(joint, 0.0)
         panels.append(sheets.one(query.pairs(joint, errors), d, f"Row {row}: {', '.join(said)}", f"drawn-{row}"))
     return panels

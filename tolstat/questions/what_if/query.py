@@ -148,6 +148,9 @@ def check(view: View) -> None:
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
+    if len(view.store.points) > 1:
+        remedy = "run the study with one of its points in [operation]"
+        raise StoreError(str(Fault(str(view.path), "has several operating points", remedy)))
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
         raise StoreError(str(Fault(str(view.path), "holds a part of the campaign only", remedy)))

@@ -38,6 +38,17 @@ LIFE_EXPONENT = 10 / 3
 MAX_ITERATIONS = 40
 """Upper bound on a joint's Newton iterations per step of the longest run allowed, so that no joint blocks a campaign.
 Joints that never settle take some 8 to 10."""
+MOST_ITERATIONS = 3_000_000
+"""Newton iterations that the refinement of a joint may take: half a minute of a core."""
+
+
+def iterations_allowed(steps_per_rev: int, max_revs: int) -> int:
+    """Newton iterations of a joint, over all its simulations, at which it is given up.
+
+    They suffice for the longest run with uniform steps twice, in lanes and alone, and for a refinement. An explicit
+    step counts as ``1 / STEPS_PER_ITERATION``.
+    """
+    return min(MOST_ITERATIONS + 2 * MAX_ITERATIONS * steps_per_rev * max_revs, 2**31 - 1)
 
 
 class Status(IntEnum):

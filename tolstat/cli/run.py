@@ -57,9 +57,9 @@ def run(
         typer.Option(
             "--joint-timeout",
             metavar="TIME",
-            help="Time limit of a joint, with unit s, min or h; if exceeded twice, its status is timeout.",
+            help="Processor time without progress, with unit s, min or h; a joint that exceeds it twice is a timeout.",
         ),
-    ] = "300 s",
+    ] = "60 s",
     retry: Annotated[
         str | None,
         typer.Option(

@@ -97,10 +97,10 @@ STATUS_TEXT = {
     Status.STATIONARY: "never the same in each revolution, but its largest loads are as large in the first half of the "
     "revolutions watched as in the second: results are the largest of solver.duration revolutions, estimated, with an "
     "interval (lower, upper); of a sub-harmonic joint those of its whole period",
-    Status.TIMEOUT: "took longer than the time allowed to a joint; results are NaN",
+    Status.TIMEOUT: "made no progress in the processor time allowed; results are NaN",
     Status.CRASHED: "its process died with it twice; results are NaN",
     Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
-    Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or the joint took too many; results are NaN",
+    Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or too many iterations were spent; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
     Status.OUTSIDE_MODEL: "negative clearance (interference fit), |alpha| of 90 deg or more, no speed, or stiffness "
     "not positive: the model has no meaning there; results are NaN",

@@ -69,7 +69,8 @@ class Watch:
 def _processor_time(pid: int) -> tuple[float, bool]:
     """Processor time of a process, s, and whether it sleeps; where the system does not say, the time on the clock."""
     try:
-        state, *fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:
         return time.monotonic(), False
+    state, *fields = text.rpartition(")")[2].split()  # the name of the program, in brackets, may have spaces
     return (int(fields[10]) + int(fields[11])) / os.sysconf("SC_CLK_TCK"), state == "S"

@@ -12,7 +12,7 @@ COMMANDS = {
     "Run": ("run", "extend", "merge", "status", "verify", "replay"),
     "Read": ("report", "capability", "worst", "causes", "fatigue", "bearing_life", "time_above"),
     "Decide": ("reweight", "allocate", "compare", "rare", "multifidelity"),
-    "Share": ("export", "docs"),
+    "Share": ("export", "docs", "cache"),
 }
 """Headings of ``tolstat --help`` in the order of the work, and under each the files of this package with the commands,
 each with a function of the same name; on the command line ``-`` stands for ``_``."""

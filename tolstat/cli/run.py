@@ -105,6 +105,7 @@ def run(
     from tolstat import study
     from tolstat.campaign.blocks import Execution
     from tolstat.campaign.retry import parse
+    from tolstat.common.files import check_target
 
     faults: list[Fault] = []
     limit, part, again = 0.0, None, None
@@ -120,6 +121,9 @@ def run(
         faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     if settings and retry is None:
         faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
+    path = out if out is not None else Path(f"{study_file.stem}.h5")
+    with gather(faults):
+        check_target(path)  # now, not when the pictures of the report are written
     with gather(faults):
         plan = study.load(study_file, n=n)
         again = None if retry is None else parse(retry, settings or (), plan)
@@ -127,7 +131,6 @@ def run(
         raise InputError(faults)
     print_warnings(study_file, plan.joints, plan.variants)
     warn_without_interval(plan.sampling.method)
-    path = out if out is not None else Path(f"{study_file.stem}.h5")
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:
         simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)

@@ -157,7 +157,8 @@ def _more_revs(options: Mapping[str, Any]) -> int:
 def _of_newton_failure(row: np.void, options: Mapping[str, Any]) -> str:
     place, steps = _place(row), _more_steps(options)
     if row["newton_iterations"] == iterations_allowed(options["steps_per_rev"], options["max_revs"]):
-        return f"all {row['newton_iterations']} iterations of a joint were spent at {place}: try solver.steps_per_rev = {steps}"
+        spent = f"all {row['newton_iterations']} iterations that a joint may take were spent at {place}"
+        return f"{spent}: try solver.steps_per_rev = {steps}"
     if row["newton_iterations"] > MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
         return f"{MAX_ITERATIONS} iterations a step were spent at {place}: try solver.steps_per_rev = {steps}"
     return f"failed at {place}: try solver.steps_per_rev = {steps}, or solver.max_halvings = 20"

@@ -75,11 +75,11 @@ def busy(number: int) -> Iterator[None]:
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [2, 8])
 def test_a_campaign_in_which_no_joint_comes_through_ends(tmp_path: Path, workers: int) -> None:
-    study, path = fakes.Study(n=4), tmp_path / "a.h5"
+    study, path = fakes.Study(n=3), tmp_path / "a.h5"
     stages = fakes.stages(partial(simulate_slowly, seconds=3 * LIMIT_S))
     execution = Execution("processes", workers, 2, joint_timeout=LIMIT_S)
     counts = campaign.run(study, path, stages=stages, execution=execution, tell=lambda _: None)
-    assert (counts.done, counts.failed) == (4, 4)
+    assert (counts.done, counts.failed) == (3, 3)
     with Reader.open(path) as store:
         assert (store.status() == Status.TIMEOUT).all()
 
@@ -87,15 +87,15 @@ def test_a_campaign_in_which_no_joint_comes_through_ends(tmp_path: Path, workers
 @pytest.mark.slow
 @pytest.mark.usefixtures("supervised")
 def test_a_joint_that_hangs_in_a_campaign_of_one_block_is_given_up_alone(tmp_path: Path) -> None:
-    study, path = fakes.Study(n=7), tmp_path / "a.h5"
+    study, path = fakes.Study(n=3), tmp_path / "a.h5"
     values = fakes.draw(study)["pin1.offset_t"]
-    stages = fakes.stages(partial(fakes.simulate_badly, kills=values[2], hangs=values[5]))
-    execution = Execution(workers=1, block=7, joint_timeout=LIMIT_S)
+    stages = fakes.stages(partial(fakes.simulate_badly, kills=values[1], hangs=values[2]))
+    execution = Execution(workers=1, block=3, joint_timeout=LIMIT_S)
     campaign.run(study, path, stages=stages, execution=execution, tell=lambda _: None)
     with Reader.open(path) as store:
-        found = store.status()
-    assert (found[2], found[5]) == (Status.CRASHED, Status.TIMEOUT)
-    assert not np.isin(np.delete(found, [2, 5]), [Status.CRASHED, Status.TIMEOUT, Status.PENDING]).any()
+        first, *others = store.status()
+    assert others == [Status.CRASHED, Status.TIMEOUT]
+    assert first in (Status.OK, Status.NOT_SETTLED, Status.NEWTON_FAILED)
 
 
 def test_blocks_that_take_as_long_as_their_joints_may_are_no_timeouts() -> None:
@@ -121,11 +121,11 @@ def test_what_sleeps_is_a_timeout() -> None:
 @pytest.mark.slow
 def test_ten_busy_processes_beside_change_no_byte(tmp_path: Path) -> None:
     """Each joint takes half of what it may; on the clock it takes several times as long as that."""
-    study, limit = fakes.Study(n=6), 0.2
+    study, limit = fakes.Study(n=3), 0.2
     campaign.run(study, tmp_path / "a.h5", 1, stages=fakes.stages())
     stages = fakes.stages(partial(simulate_slowly, seconds=limit / 2))
-    execution = Execution("processes", 2, 3, joint_timeout=limit)
-    begin, used = time.monotonic(), 6 * limit
+    execution = Execution("processes", 1, 3, joint_timeout=limit)
+    begin, used = time.monotonic(), 3 * limit
     with busy(5 * (os.cpu_count() or 1)):
         campaign.run(study, tmp_path / "b.h5", stages=stages, execution=execution)
     assert time.monotonic() - begin > used

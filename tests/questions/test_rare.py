@@ -19,6 +19,7 @@ from tolstat import sampling, study
 from tolstat.analysis import subset
 from tolstat.analysis.subset import Settings, Walk
 from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
@@ -289,3 +290,21 @@ def test_every_fault_of_a_question_is_told(tmp_path):
     assert not (tmp_path / "no.h5").exists()
     with pytest.raises(InputError, match="is set by tolstat rare"):
         load(tmp_path, PLAN.replace("seed = 2021", 'seed = 2021\nmethod = "subset"'))
+
+
+def hang_together(params, options, histories="none", n_harmonics=0):
+    while len(params) > 6:
+        pass
+    return simulate(params, options)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("supervised")
+def test_a_stage_whose_blocks_outlast_their_limit_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr(rare, "Execution", partial(Execution, joint_timeout=0.01))
+    plan, whole, parts = asked(load(tmp_path), beta=-1.0, per_level=20), tmp_path / "a.h5", tmp_path / "b.h5"
+    rare.run(plan, whole, tell=lambda _: None)
+    monkeypatch.setattr(campaign, "run", partial(RUN, stages=stages(hang_together)))
+    found = rare.run(plan, parts, tell=lambda _: None)
+    assert (found.reached, found.joints) == (True, 20)
+    assert datasets(parts) == datasets(whole)

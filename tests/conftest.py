@@ -37,9 +37,8 @@ DEFAULT_KIND = blocks.default_kind
 def with_law(par: np.recarray, law: str) -> np.recarray:
     """Give joints of PARAM the contact stations that `law` names; returns them."""
     stations = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
-    own = joints.perturb(
-        stations, joints.nominal_errors(1, joints.Operation.model_construct(alpha=0, speed=1, torque=0))
-    )
+    still = joints.Operation.model_construct(alpha=0, speed=1, torque=0)
+    own = joints.perturb(stations, still, joints.nominal_errors(1))
     for name in ("n_stations", "station_s", "station_k1", "station_k2", "station_weight"):
         par[name] = own[name][0]
     return par
@@ -57,10 +56,11 @@ def params(cirelli: joints.Joint) -> Params:
     def make(
         alpha: float = 0.0, speed: float = 500 * np.pi / 30, torque: float = 100.0, **errors: float
     ) -> np.recarray[Any, np.dtype[np.void]]:
-        table = joints.nominal_errors(1, joints.Operation.model_construct(alpha=alpha, speed=speed, torque=torque))
+        operation = joints.Operation.model_construct(alpha=alpha, speed=speed, torque=torque)
+        table = joints.nominal_errors(1)
         for name, value in errors.items():
             table[name.replace("__", ".")] = value
-        row = joints.perturb(cirelli, table)
+        row = joints.perturb(cirelli, operation, table)
         assert row.dtype == PARAM
         return row.view(np.recarray)
 

@@ -115,9 +115,9 @@ def arrows(cirelli):
 def test_arrow_of_an_error_has_the_sense_that_perturb_gives_it(cirelli, arrows, kind, name):
     """A small positive error of pin 1 or hole 4, in axes of its frame, against the arrow on the drawing."""
     feature = {"pin": "pin1", "hole": "hole4"}[name]
-    errors = nominal_errors(1, OPERATION)
+    errors = nominal_errors(1)
     errors[f"{feature}.{kind}"] = 1e-5
-    row, before = (perturb(cirelli, table)[0] for table in (errors, nominal_errors(1, OPERATION)))
+    row, before = (perturb(cirelli, OPERATION, table)[0] for table in (errors, nominal_errors(1)))
     if kind == "diameter":
         wider = (row["clearance"][0] - before["clearance"][0]) * (1.0 if name == "hole" else -1.0)
         for i, sign in ((1, -1.0), (2, 1.0)):
@@ -134,10 +134,10 @@ def test_arrow_of_an_error_has_the_sense_that_perturb_gives_it(cirelli, arrows, 
 
 
 def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_errors):
-    errors = nominal_errors(1, OPERATION)
+    errors = nominal_errors(1)
     for name, value in random_errors(5).items():
         errors[name.replace("__", ".")] = value
-    par, (pin, z) = perturb(cirelli, errors)[0], (cirelli.contact.D_P, cirelli.contact.z)
+    par, (pin, z) = perturb(cirelli, OPERATION, errors)[0], (cirelli.contact.D_P, cirelli.contact.z)
     pairs = query.pairs(cirelli, errors)
     factor = one_joint.enlargement(pairs, pin, z)
     found, _ = drawn(one_joint.draw, pairs, pin, z)
@@ -161,7 +161,7 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
 def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
     contact = {"D_H": "76 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"}
     fitting = joints.load("cirelli2021", {"contact": contact}, "test")
-    pairs = query.pairs(fitting, nominal_errors(1, OPERATION))
+    pairs = query.pairs(fitting, nominal_errors(1))
     assert one_joint.enlargement(pairs, 0.076, 0.022) == 1.0
     assert drawn(one_joint.draw, pairs, 0.076, 0.022)
 
@@ -274,14 +274,16 @@ def test_what_cannot_be_drawn_is_exit_code_2_and_writes_nothing(here, args, said
 def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
     with Reader.open(synthetic.store(tmp_path)) as store:
         view, asked = store.view(), Asked(store.path)
-        panels = section.legend(view, asked)
-        (part,) = section.sections(view, asked)
+        marked = section.worst(view, "fork2.T", asked)
+        part, joint = section.sections(view, asked)
         worst = {int(view.rows(int(np.argmax(LOADS[name].of(view.results))))) for name in view.leading}
     places = {name.partition(".")[0] for name in view.leading} - {"psi"}
+    assert (marked.key, marked.title) == ("joint-worst", "fork2: nearest to its limit")
+    assert "Marked: fork2." in marked.description
+    panels = joint.blocks[0].panels
+    assert [panel.key for panel in panels] == ["joint-front", "joint-side", "joint-pin", "error-kinds"]
     assert f"Marked: {', '.join(sorted(places))}." in panels[0].description
-    keys = [panel.key for panel in part.blocks[0].panels]
-    assert keys[-1] == "error-kinds"
-    assert set(keys[:-1]) == {f"drawn-{row}" for row in worst}
+    assert {panel.key for panel in part.blocks[0].panels} == {f"drawn-{row}" for row in worst}
     assert asked.notes == []
 
 
@@ -291,4 +293,4 @@ def test_figures_of_the_package(cirelli):
     figure = tolstat.draw_joint(cirelli, ALPHA)
     assert figure.texts[0].get_text() == cirelli.description
     assert tolstat.draw_errors is rendering.draw_errors
-    assert len(tolstat.draw_row(cirelli, nominal_errors(1, OPERATION), "one").axes) == 1
+    assert len(tolstat.draw_row(cirelli, nominal_errors(1), "one").axes) == 1

@@ -11,7 +11,7 @@ import pytest
 from tests.report.test_page import TEXT
 from tests.support import synthetic
 from tolstat.analysis import exceedance
-from tolstat.report import page
+from tolstat.report import html, page
 from tolstat.store import Reader
 
 BROWSER = next(
@@ -38,9 +38,14 @@ PROBE = """
   choose(part("slider"), 0, "input");
   found.first = said();
   found.cursors = [...document.querySelectorAll(".cursor")].filter((line) => line.style.display !== "none").length;
-  const svg = document.querySelector("figure[data-reads='cross1.F'] svg"), box = svg.getBoundingClientRect();
+  const svg = document.querySelector("figure[data-reads~='cross1.F'] svg"), box = svg.getBoundingClientRect();
   svg.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + 0.6 * box.width, clientY: box.top + 50 }));
   found.hovered = said();
+  found.kept = document.querySelector("#limits td").getBoundingClientRect().right;
+  const others = document.querySelector(".show-others"), line = document.querySelector(".others");
+  found.others = [getComputedStyle(line).display];
+  others.click();
+  found.others.push(getComputedStyle(line).display);
   parent.document.getElementById("probe").textContent = JSON.stringify(found);
 })();
 </script>
@@ -61,8 +66,14 @@ def dump(path, folder):
 
 
 def probe(text, asked, folder, width=1280):
-    """Put a page into a frame, since windows have a least width; what the probe found in it, and the console."""
-    inside = text.replace("</body>", PROBE.replace("ASKED", json.dumps(asked)) + "</body>")
+    """Put a page into a frame, since windows have a least width; what the probe found in it, and the console.
+
+    The page's policy is kept; it lets the probe run, too.
+    """
+    script = PROBE.replace("ASKED", json.dumps(asked))
+    own = escape(html.allowed(script.partition("<script>")[2].partition("</script>")[0]))
+    inside = text.replace("script-src ", f"script-src {own} ").replace("</body>", script + "</body>")
+    assert own in inside
     frame = f'<iframe style="border: 0; width: {width}px; height: 900px" srcdoc="{escape(inside)}"></iframe>'
     (folder / "frame.html").write_text(f'<meta charset="utf-8">{frame}<pre id="probe"></pre>', encoding="utf-8")
     document, console = dump(folder / "frame.html", folder / "profile")
@@ -88,6 +99,8 @@ def test_reader_reads_what_is_counted_and_the_page_keeps_its_width(made, tmp_pat
     assert console == []
     assert found["width"] == width
     assert found["page"] <= width
+    assert found["kept"] <= width
+    assert found["others"] == ["none", "inline"]
     status = view.status
     for name, wanted in asked:
         x, said = found["readings"][name]
@@ -100,9 +113,8 @@ def test_reader_reads_what_is_counted_and_the_page_keeps_its_width(made, tmp_pat
         assert f": {share.count} of {share.n - 27}." in said
         assert f"95 % interval {100 * share.lower:.3g} % to {100 * share.upper:.3g} %" in said
         assert f"below and above: {100 * share.outer_lower:.3g} % to {100 * share.outer_upper:.3g} %" in said
-    assert found["start"].startswith(
-        f"{100 * exceedance.exceedance(view.load('cross1.F').values, status, 700.0).estimate:.3g} %"
-    )
+    first = view.load(view.most_exceeded)
+    assert found["start"].startswith(f"{100 * first.above(first.limit).estimate:.3g} %")
     assert found["first"].startswith("100 % ")
     assert found["cursors"] == 1
     assert "on cross1.F" in found["hovered"]
@@ -124,3 +136,14 @@ def test_the_checks_see_a_page_that_is_too_wide_and_an_error(made, tmp_path):
     found, console = probe(text, [], tmp_path)
     assert found["page"] > found["width"]
     assert len(console) == 1
+    assert "Content Security Policy" in console[0]
+
+
+def test_names_with_markup_are_text_and_run_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
+    named = """<img src=x onerror="missing()"> '\u202e<script>missing();"""
+    path = synthetic.store(tmp_path, name=named)
+    page.write_page(path, tmp_path / "page.html", replay=0)
+    document, console = dump(tmp_path / "page.html", tmp_path / "profile")
+    assert console == []
+    assert re.search(r"<h1><bdi>(.*?)</bdi>", document)[1] == escape(named.replace("\u202e", "[U+202E]"), quote=False)

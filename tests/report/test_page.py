@@ -1,8 +1,11 @@
 """The report as one page: its figures against counts by hand, every state of a campaign, the same bytes each time."""
 
+import base64
+import hashlib
 import re
 from collections import Counter
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 from unittest import mock
 
@@ -16,14 +19,15 @@ from tolstat.cli import app
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
+from tolstat.display.blocks import Section
 from tolstat.questions.exceedance import query
 from tolstat.questions.joints import query as joints
 from tolstat.report import headline as verdict
 from tolstat.report import html as writer
 from tolstat.report import page
 from tolstat.store import Reader, revolutions
+from tolstat.store.first_pass import MAX_LISTED
 from tolstat.store.recall import recall
-from tolstat.store.view import MAX_LISTED
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
 TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
@@ -86,7 +90,21 @@ def test_page_is_well_formed_and_loads_nothing(html):
     assert {link[1:] for link in read.links if link.startswith("#")} <= set(read.names)
     assert not re.search(r"@import|url\((?!#)|fetch\(|XMLHttp", html)
     assert among(
-        read.sections, ["verdict", "exceedance", "capability", "causes", "worst", "modes", "failed", "provenance"]
+        read.sections,
+        [
+            "verdict",
+            "limits",
+            "exceedance",
+            "histograms",
+            "capability",
+            "causes",
+            "worst",
+            "drawn",
+            "joint",
+            "modes",
+            "failed",
+            "provenance",
+        ],
     )
 
 
@@ -99,7 +117,7 @@ def test_every_picture_has_a_title_and_a_description(html):
             assert re.search(rf'id="{name}">[^<]{{10,}}<', html), name
 
 
-@pytest.mark.parametrize("replay", [0, 100])
+@pytest.mark.parametrize("replay", [pytest.param(0, marks=pytest.mark.slow), 100])
 def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypatch, replay):
     """Reads of each dataset, in rows; joints that the page draws over the revolution are simulated again."""
     read, plain = Counter(), Reader.column
@@ -129,10 +147,61 @@ def drawn(store, slots, most_angles=60):
     return revolutions.Revolutions(angles, *moduli, "simulated again", 0.0)
 
 
+def test_colours_of_the_pictures_follow_the_scheme(html):
+    pictures = re.findall(r"<svg.*?</svg>", html, flags=re.DOTALL)
+    used = set(re.findall(r"var\(--(\w+)\)", "".join(pictures)))
+    assert used > {"ink", "line1", "grid"}
+    assert not [found for picture in pictures for found in re.findall(r"#[0-9a-fA-F]{6}", picture)]
+    light, dark = html.split("prefers-color-scheme: dark")[:2]
+    for name in used:
+        assert f"--{name}: #" in light
+        assert f"--{name}: #" in dark
+
+
+def test_other_bushings_and_the_band_of_the_whole_curve_are_drawn_on_switches(view, html):
+    drawn = re.search(r"<figure data-reads=\"cross1.F .*?</figure>", html, flags=re.DOTALL)[0]
+    for name, count in (("others", 7), ("curve-band", 2)):
+        assert re.search(rf'<input type="checkbox" class="show-{name}" id="([^"]+)"><label for="\1">', drawn)
+        assert drawn.count(f'class="{name}"') == count
+
+
+def test_a_section_that_leads_stands_below_the_verdict(path, monkeypatch):
+    found = [Section("one", "One"), Section("what-if", "What if", lead=True)]
+    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: found)
+    with Reader.open(path) as store:
+        made = page.compose(store.view(), Asked(path, 0.05))
+    assert [section.key for section in made.sections] == ["verdict", "what-if", "limits", "one", "provenance"]
+
+
 def test_text_of_the_study_is_shown_and_not_run(html):
     assert '<script>alert("no")' not in html
     assert "&lt;script&gt;alert(" in html
     assert "Question: how often is too much too much?<" in html
+
+
+def test_names_and_comments_are_escaped_and_unseen_characters_shown(tmp_path, monkeypatch):
+    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
+    text = "# Question: \u202ewhy</p><script>1</script>\n" + TEXT
+    path = synthetic.store(tmp_path, text, name="""a"b'<script>c&\u202d""")
+    page.write_page(path, tmp_path / "page.html", replay=0)
+    made = (tmp_path / "page.html").read_text(encoding="utf-8")
+    Reading(made)
+    assert "<h1><bdi>a&#34;b&#39;&lt;script&gt;c&amp;[U+202D]</bdi></h1>" in made
+    assert "Question: [U+202E]why&lt;/p&gt;&lt;script&gt;1&lt;/script&gt;<" in made
+    assert not {"\u202d", "\u202e"} & set(made)
+
+
+def test_only_the_script_of_the_page_may_run(html):
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', html)[1]
+    assert policy.startswith("default-src &#39;none&#39;; ")
+    (script,) = re.findall(r"<script>(.*?)</script>", html, flags=re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert unescape(policy).endswith(f"script-src 'sha256-{digest}'")
+
+
+def test_digits_are_grouped_in_whole_numbers_only():
+    assert writer.grouped("73310 of 999999 ppm") == "73\u202f310 of 999\u202f999 ppm"
+    assert writer.grouped("1234 0.12345 a12345 12345e3") == "1234 0.12345 a12345 12345e3"
 
 
 def test_same_file_same_bytes(path, tmp_path):
@@ -217,13 +286,16 @@ def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
     assert f"{60 - max(0, simulated - 1)} still pending" in said
     if not simulated:
         assert page.write_page(path, tmp_path / "page.html", replay=0) == tmp_path / "page.html"
-        assert said in (tmp_path / "page.html").read_text(encoding="utf-8")
+        text = (tmp_path / "page.html").read_text(encoding="utf-8")
+        assert said in text
+        with Reader.open(path) as store:
+            assert page.write_page(store.view(), tmp_path / "b.html", replay=0).read_text(encoding="utf-8") == text
 
 
 def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
     page.write_page(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, replay=0)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert Reading(text).sections == ["verdict", "failed", "provenance"]
+    assert Reading(text).sections == ["verdict", "limits", "histograms", "joint", "failed", "tolerances", "provenance"]
     assert text.count(">no verdict<") == 8
 
 
@@ -255,7 +327,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
     assert "wrote" in done.stderr
-    _, out, accepted, again, _ = calls[0]
+    _, out, accepted, again, _, _ = calls[0]
     assert (str(out), again) == (asked[0], asked[2])
     assert accepted == pytest.approx(asked[1])
 

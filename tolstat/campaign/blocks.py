@@ -48,7 +48,7 @@ class Stages(NamedTuple):
     dimensions : callable
         () -> dimension of the sampling sequence, by name of the error.
     perturb : callable
-        Joint, (m,) table ERROR -> (m,) table PARAM.
+        Joint, operating point, (m,) table ERROR -> (m,) table PARAM.
     history_specs : callable
         Options, kind of histories, number of harmonics -> HistorySpec by name of the history.
     simulate : callable
@@ -98,8 +98,9 @@ class Execution:
 
 
 class Block(NamedTuple):
-    """File slots that are simulated together, their parameters and their solver options."""
+    """File slots that are simulated together at an operating point, their parameters and their solver options."""
 
+    point: str
     slots: NDArray[np.intp]
     params: NDArray[np.void]
     options: Options
@@ -157,19 +158,26 @@ class Pace:
 
 
 class Finished(NamedTuple):
-    """File slots, their simulation, and why they were given up; empty if they were not."""
+    """Operating point, file slots, their simulation, and why they were given up; empty if they were not."""
 
+    point: str
     slots: NDArray[np.intp]
     simulation: Simulation
     trouble: str
 
 
-def pending(store: Reader, stop_slot: int) -> Iterator[NDArray[np.intp]]:
-    """Yield the pending file slots below `stop_slot`, in arrays as from `Reader.pending_blocks`."""
-    for slots in store.pending_blocks():
-        if slots[0] >= stop_slot:
-            return
-        yield slots[slots < stop_slot]
+def pending(store: Reader, stop_slot: int) -> Iterator[tuple[Reader, NDArray[np.intp]]]:
+    """Yield the pending file slots below `stop_slot` with the file at their operating point.
+
+    Of `MAX_BLOCK` rows at a time those of all points: after an interruption few joints are done at some points only.
+    """
+    each = store.each()
+    for first in range(0, stop_slot, MAX_BLOCK):
+        for one in each:
+            status = one.status(slice(first, min(first + MAX_BLOCK, stop_slot)))
+            slots = first + np.flatnonzero(status == Status.PENDING)
+            if slots.size:
+                yield one, slots
 
 
 def simulate_pending(
@@ -184,7 +192,7 @@ def simulate_pending(
     WorkerDied
         When worker processes die whichever block they work on.
     """
-    todo = sum(len(slots) for slots in pending(store, stop_slot))
+    todo = sum(len(slots) for _, slots in pending(store, stop_slot))
     workers = execution.workers or executors.available_workers()
     size = execution.block or default_block(todo, workers)
     if not todo:
@@ -213,11 +221,11 @@ def simulate_pending(
             if isinstance(result, Lost):
                 status = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
                 blank = without_simulation(len(block.slots), status, store.history_specs)
-                yield Finished(block.slots, blank, result.reason)
+                yield Finished(block.point, block.slots, blank, result.reason)
             else:
                 begin = time.perf_counter()
                 # the caller writes the block to the file before it asks for the next one
-                yield Finished(block.slots, result.simulation, "")
+                yield Finished(block.point, block.slots, result.simulation, "")
                 pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
 
 
@@ -251,13 +259,15 @@ def prepare(warm_up: Callable[[Options], object], options: Iterable[Options]) ->
 def _blocks(
     study: Study, store: Reader, stop_slot: int, pace: Pace, perturb: Callable[..., NDArray[np.void]]
 ) -> Iterator[Block]:
-    """Yield the pending file slots below `stop_slot` as blocks whose joints have the same solver options."""
+    """Yield the pending file slots below `stop_slot` as blocks whose joints have the same point and solver options."""
+    studies = {point: study.at(point) for point in store.points}
     variant_options = [settings(solver, store.fidelity) for solver in study.solvers]
     retry_options = [Options(**retry["options"]) for retry in store.retries]
     distinct = settings_in_use(study, store)
-    for slots in pending(store, stop_slot):
+    for one, slots in pending(store, stop_slot):
         read = slice(slots[0], slots[-1] + 1)
-        errors, attempt = store.errors(read), store.attempt(read)[slots - slots[0]]
+        errors, attempt = store.errors(read), one.attempt(read)[slots - slots[0]]
+        point = one.point or ""
         variant = variants(study, store.row(slots))
         options = [
             retry_options[k - 1] if k else variant_options[i]
@@ -268,8 +278,8 @@ def _blocks(
             left = slots[option == number]
             while left.size:
                 some, left = np.split(left, [pace.take(left.size)])
-                params = perturbed(study, store.row(some), errors[some - slots[0]], perturb)
-                yield Block(some, params, distinct[number])
+                params = perturbed(studies[point], store.row(some), errors[some - slots[0]], perturb)
+                yield Block(point, some, params, distinct[number])
 
 
 def _finite(params: NDArray[np.void]) -> NDArray[np.bool_]:
@@ -288,11 +298,11 @@ def _simulate(
 ) -> Timed:
     """Simulate a block and measure the time that it takes."""
     begin = time.perf_counter()
-    simulation = _simulate_finite(simulate, histories, n_harmonics, specs, block)
+    simulation = simulate_finite(simulate, histories, n_harmonics, specs, block)
     return Timed(simulation, time.perf_counter() - begin)
 
 
-def _simulate_finite(
+def simulate_finite(
     simulate: Callable[..., Simulation],
     histories: str,
     n_harmonics: int,

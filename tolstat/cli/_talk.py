@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import textwrap
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,8 @@ from tolstat.common.errors import Fault, InputError
 if TYPE_CHECKING:
     from tolstat.campaign.progress import Display
 
+WIDTH = 80
+"""Maximum length of a line of prose, characters."""
 LOG = logging.getLogger("tolstat.cli")
 LOG.propagate = False
 
@@ -33,7 +36,20 @@ class _Stderr(logging.Handler):
     """Prints messages on the standard error of the moment: above the bar while one is shown."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        print(record.getMessage(), file=sys.stderr, flush=True)
+        text = record.getMessage()
+        print(wrapped(text) if record.levelno == logging.INFO else text, file=sys.stderr, flush=True)
+
+
+def wrapped(text: str) -> str:
+    """Break lines of prose above `WIDTH` characters; those with a long path or a command to type stay whole."""
+    return "\n".join(_broken(line) if len(line) > WIDTH else line for line in text.split("\n"))
+
+
+def _broken(line: str) -> str:
+    if ": tolstat " in line or max(map(len, line.split())) > WIDTH // 2:
+        return line
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    return textwrap.fill(line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def say(text: str) -> None:

@@ -28,6 +28,13 @@ def reason(error: OSError) -> str:
     return own[1] if own else " ".join(str(error).split())
 
 
+def docs_dir() -> Path:
+    """Directory of the pages for users, as text: inside the package in an installed wheel, beside it in a checkout."""
+    package = Path(__file__).parent.parent
+    inside = package / "docs"
+    return inside if inside.is_dir() else package.parent / "docs"
+
+
 def check_target(path: Path, *inputs: Path) -> None:
     """Check that a result file can be written, before the work that produces the result.
 

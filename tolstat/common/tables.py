@@ -245,9 +245,9 @@ def _error_fields() -> tuple[Field, ...]:
             fields.append(Field(f"{feature}.tilt_{axis}", "rad", f"angular error of the {kind} axis about {axis}"))
         fields.append(Field(f"{feature}.diameter", "m", f"deviation of the {kind}'s diameter from nominal"))
     fields += [
-        Field("operation.alpha", "rad", "misalignment of the shafts"),
-        Field("operation.speed", "rad/s", "angular velocity of the input shaft"),
-        Field("operation.torque", "N*m", "resisting torque on the output shaft"),
+        Field("operation.alpha", "rad", "deviation of the shafts' misalignment from that of the operating point"),
+        Field("operation.speed", "rad/s", "deviation of the input shaft's angular velocity"),
+        Field("operation.torque", "N*m", "deviation of the resisting torque on the output shaft"),
         Field(
             "material.E_factor",
             "1",
@@ -259,7 +259,7 @@ def _error_fields() -> tuple[Field, ...]:
 
 
 ERROR_FIELDS = _error_fields()
-"""Manufacturing errors (deviations from nominal, zero for the nominal joint) and the operating point."""
+"""Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
 
 OVER = "over the revolutions that count"
 LOAD_KINDS = (

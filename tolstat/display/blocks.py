@@ -1,4 +1,4 @@
-"""Blocks that a report page is composed of: text, cards, tables, pictures."""
+"""Blocks that a report page is composed of: the decision, text, tables, pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Card:
-    """One number of the headline.
+    """One number of the first section.
 
     Attributes
     ----------
@@ -37,11 +37,26 @@ class Card:
 
 
 @dataclass(frozen=True)
-class Cards:
-    """The headline: the most important numbers of the page."""
+class Decision:
+    """The head of the page: what was asked, the verdict, numbers that it stands on, and a drawing beside them.
 
-    kind: ClassVar[str] = "cards"
+    Attributes
+    ----------
+    question : str
+        The question; empty if the study has none.
+    verdict : Card
+        The verdict in one sentence: its first words, the rest, causes and remedies.
+    cards : sequence of Card
+        Other numbers.
+    picture : Panel, optional
+        The drawing.
+    """
+
+    kind: ClassVar[str] = "decision"
+    question: str
+    verdict: Card
     cards: Sequence[Card]
+    picture: Panel | None = None
 
 
 @dataclass(frozen=True)
@@ -59,7 +74,8 @@ class Table:
     words : frozenset of int
         Indices of columns of words, which are aligned to the left.
     verdicts : sequence of str
-        Verdict of each row, ``yes``, ``no``, ``open`` or empty, which styles its last cell. Empty if nothing is judged.
+        Verdict of each row, ``yes``, ``no``, ``open`` or empty, which styles its second cell. Empty if nothing is
+        judged.
     """
 
     kind: ClassVar[str] = "table"
@@ -88,10 +104,15 @@ class Panel:
         Width and height in inches at its natural scale.
     left : float
         Room for the labels of the y axis, inches.
+    top : float
+        Room above the axes, inches.
     reads : tuple of str
         Loads whose exceedance the picture shows, for the cursor.
     bare : bool
         Whether the axes fill the picture: a drawing without scales beside it.
+    switches : sequence of (str, str)
+        Parts of the picture that are hidden until the reader asks for them: the name that `drawing.switched` gives
+        them, and the words beside the switch.
     """
 
     key: str
@@ -100,24 +121,37 @@ class Panel:
     draw: Callable[[Axes], None]
     size: tuple[float, float] = (5.0, 3.5)
     left: float = 0.72
+    top: float = 0.26
     reads: tuple[str, ...] = ()
     bare: bool = False
+    switches: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True)
 class Panels:
-    """Pictures side by side."""
+    """Pictures side by side: two in a row where there is room, `small` ones four; blocks `beside` a single one."""
 
     kind: ClassVar[str] = "panels"
     panels: Sequence[Panel]
+    small: bool = False
+    beside: Sequence[Table | Text] = ()
 
 
 @dataclass(frozen=True)
 class Reader:
-    """Interactive tool that shows the exceedance at a chosen load; `curves` as `loads.readings` returns them."""
+    """Interactive tool that shows the exceedance at a chosen load.
+
+    Attributes
+    ----------
+    curves : mapping
+        As `questions.exceedance.query.readings` returns them.
+    start : str
+        The load shown first; empty for the first of `curves`.
+    """
 
     kind: ClassVar[str] = "reader"
     curves: Mapping[str, Any]
+    start: str = ""
 
 
 @dataclass(frozen=True)
@@ -137,16 +171,17 @@ class Listing:
     text: str
 
 
-Block = Text | Cards | Table | Panels | Reader | Facts | Listing
+Block = Text | Decision | Table | Panels | Reader | Facts | Listing
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page with a heading."""
+    """A part of the page with a heading; one with `lead` stands directly below the verdict, before the contents."""
 
     key: str
     title: str
     blocks: Sequence[Block] = field(default_factory=tuple)
+    lead: bool = False
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,19 @@ from typing import Any, NamedTuple
 import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from tolstat.display import style
+from tolstat.display import schemes, style, text
 from tolstat.display.blocks import Panel
 
-BOTTOM, RIGHT, TOP = 0.5, 0.12, 0.26
-"""Margins around the axes, inches; `Panel.left` is the left margin."""
+BOTTOM, RIGHT = 0.5, 0.12
+"""Margins below and beside the axes, inches; `Panel.left` and `Panel.top` are the others."""
+WIDTH = 4.9
+"""Usual width of a panel, inches."""
+LETTER, KEY = 0.071, 0.5
+"""Width of a letter of a legend, and of the rest of an entry, inches."""
 GREY = "#B8B8B8"
 
 
@@ -65,7 +71,7 @@ def _place(panel: Panel) -> tuple[float, float, float, float]:
         panel.left / width,
         BOTTOM / height,
         1.0 - (panel.left + RIGHT) / width,
-        1.0 - (BOTTOM + TOP) / height,
+        1.0 - (BOTTOM + panel.top) / height,
     )
 
 
@@ -83,9 +89,20 @@ def svg(panel: Panel) -> tuple[str, Frame]:
     return _inline(buffer.getvalue(), panel), frame
 
 
-def _inline(text: str, panel: Panel) -> str:
-    body = text[text.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+def switched(artist: Artist, name: str) -> None:
+    """Let an artist be drawn only while a switch of its panel is on, see `blocks.Panel.switches`."""
+    artist.set_gid(f"switch-{name}")
+
+
+def _inline(drawn: str, panel: Panel) -> str:
+    """Body of an SVG file as an element of the page, whose style sheet has fonts, joins and colours of all pictures."""
+    body = schemes.with_variables(text.visible(drawn[drawn.index("<svg") :]))
+    body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
+    body = body.replace("font-family: 'DejaVu Sans'; ", "")
+    body = re.sub(r'<path d="[^"]*" style="fill: none"/>', "", body)  # background of figure and axes
+    body = re.sub(r' d="[^"]+"', lambda m: m[0].replace("\n", ""), body)
+    body = re.sub(r">\s+<", "><", body)
+    body = re.sub(r' id="switch-([^"]+)"', r' class="\1"', body)
     used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
     body = re.sub(r' id="([^"]+)"', lambda m: f' id="{panel.key}-{m[1]}"' if m[1] in used else "", body)
     body = re.sub(r'(href="#|url\(#)', rf"\1{panel.key}-", body)
@@ -94,8 +111,8 @@ def _inline(text: str, panel: Panel) -> str:
     assert box is not None
     spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     head = f'<svg {spaces} {box[0]} role="img" aria-labelledby="{panel.key}-title {panel.key}-desc">'
-    said = f'<title id="{panel.key}-title">{escape(panel.title)}</title>'
-    said += f'<desc id="{panel.key}-desc">{escape(panel.description)}</desc>'
+    title, description = (escape(text.visible(words)) for words in (panel.title, panel.description))
+    said = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
     return head + said + body[body.index(">") + 1 :].strip()
 
 
@@ -109,14 +126,49 @@ def rows(ax: Axes, labels: list[str]) -> None:
 
 
 def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    """Put a legend in one row above the axes, for panels without free space inside."""
+    """Put a legend above the axes, where it covers nothing; `legend_room` is the room that it takes."""
     where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0}
-    ax.legend(handles, labels, ncols=len(labels), handlelength=1.2, columnspacing=1.2, **where)
+    columns = _legend_columns(labels, ax.get_window_extent().width / ax.figure.dpi)
+    ax.legend(handles, labels, ncols=columns, handlelength=2.2, columnspacing=1.2, **where)
 
 
-def empty(ax: Axes, text: str) -> None:
+def legend_room(labels: Sequence[str], left: float = Panel.left) -> float:
+    """Room that a legend takes above the axes of a panel of usual width, inches; `left` as in `Panel`."""
+    return 0.08 + 0.2 * -(-len(labels) // _legend_columns(labels, WIDTH - left - RIGHT))
+
+
+def _legend_columns(labels: Sequence[str], width: float) -> int:
+    """Largest number of columns, filled one after the other, that fit a width, inches."""
+    for columns in range(len(labels), 1, -1):
+        rows = -(-len(labels) // columns)
+        letters = sum(max(map(len, labels[i : i + rows])) for i in range(0, len(labels), rows))
+        if LETTER * letters + KEY * columns <= width:
+            return columns
+    return 1
+
+
+def loads_axis(axis: Axis, typical: float, unit: str) -> str:
+    """Let an axis of loads show the multiple of their unit that a load has, see `text.multiple`; return its text."""
+    size, name = text.multiple(typical, unit)
+    if size != 1.0:
+        axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / size:g}"))
+    return name
+
+
+def log_loads(ax: Axes, low: float, high: float, typical: float, unit: str) -> str:
+    """Make the x axis logarithmic, over loads from `low` to `high`, SI; otherwise as `loads_axis`."""
+    size, name = text.multiple(typical, unit)
+    ax.set_xscale("log")
+    ax.set_xlim(low, high)
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / size:g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    return name
+
+
+def empty(ax: Axes, why: str) -> None:
     """Say in an empty panel why it is empty."""
-    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes)
+    ax.text(0.5, 0.5, why, ha="center", va="center", transform=ax.transAxes)
     ax.set(xticks=[], yticks=[])
 
 
@@ -127,4 +179,4 @@ def rows_left(labels: Sequence[str]) -> float:
 
 def rows_height(count: int) -> float:
     """Height of a panel of horizontal rows, inches."""
-    return 0.235 * count + BOTTOM + TOP + 0.1
+    return 0.235 * count + BOTTOM + 0.36

@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tolstat.common.files import atomic_write
 
@@ -25,6 +28,10 @@ DASHES: tuple[Dash, ...] = (
     (0.0, (1.2, 0.9)),
 )
 """Dashes of bushings 1 to 4: where curves coincide, the lower one shows through the gaps."""
+SHADES, DARK_SHADES = (
+    tuple(to_hex(colormaps["viridis"](x)) for x in np.linspace(*ends, 12)) for ends in ((0.0, 0.88), (1.0, 0.35))
+)
+"""Colours in order, which stay in order in grey and for colour-blind readers, on white and on dark paper."""
 INK, FAINT = "#222222", "#777777"
 
 _SETTINGS: Any = {
@@ -87,12 +94,17 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, str, Axes
     return figure, page
 
 
-def share_axis(ax: Axes, low: float, which: str = "y") -> None:
-    """Make an axis logarithmic, in per cent, from `low` to slightly above 100 % so that a curve at 100 % is visible."""
+def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> None:
+    """Make an axis logarithmic, in per cent, from `low` to slightly above `high` so that a curve there is visible.
+
+    An axis of less than two decades has marks at 1, 2 and 5.
+    """
     upright = which == "y"
     (ax.set_yscale if upright else ax.set_xscale)("log")
-    (ax.set_ylim if upright else ax.set_xlim)(low, low**-0.04)
+    (ax.set_ylim if upright else ax.set_xlim)(low, high * (high / low) ** 0.04)
     axis = ax.yaxis if upright else ax.xaxis
+    if high < 100.0 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
     axis.set_minor_formatter(NullFormatter())
 

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolstat.common.files import atomic_write
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, unit_text
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_UNSEEN = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff"
+    "\U000e0000-\U000e007f]"
+)
+"""Control characters but those that end lines, marks and overrides of the direction of text, tags, surrogates."""
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -22,6 +29,11 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
         return None if isinstance(x, float) and not math.isfinite(x) else x
 
     return [{str(k): plain_number(v) for k, v in row.items()} for row in table.to_dict("records")]
+
+
+def visible(words: str) -> str:
+    """Show characters that cannot be seen or change the direction of text by their code, ``[U+202E]``."""
+    return _UNSEEN.sub(lambda found: f"[U+{ord(found[0]):04X}]", words)
 
 
 def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
@@ -43,14 +55,23 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
     return "\n".join(lines)
 
 
+def multiple(largest: float, unit: str) -> tuple[float, str]:
+    """Multiple of a unit for values up to `largest`: its size and text; kN and kN m from 1e4 N and N m on."""
+    kilo = unit in ("N", "N*m") and abs(largest) >= 1e4
+    return (1e3, f"k{unit_text(unit)}") if kilo else (1.0, unit_text(unit))
+
+
 def value(x: float, unit: str) -> str:
     """Format a load with its unit, four digits; NaN gives a dash."""
-    return f"{number(x)} {unit_text(unit)}".strip() if not math.isnan(x) else "-"
+    if math.isnan(x):
+        return "-"
+    size, name = multiple(x, unit)
+    return f"{number(x / size)} {name}".strip()
 
 
 def limit(row: Mapping[Any, Any]) -> str:
-    """Words for a row with ``load``, ``level`` and ``unit``: ``cross1.F > 1500 N``."""
-    return f"{row['load']} > {value(row['level'], row['unit'])}"
+    """Words for a row with ``load``, ``level`` and ``unit``: ``cross1.F > 1500 N``, ``any limit``."""
+    return ANY_LIMIT if row["load"] == ALL_LIMITS else f"{row['load']} > {value(row['level'], row['unit'])}"
 
 
 def number(x: float) -> str:
@@ -63,7 +84,10 @@ def span_of(low: float, high: float, unit: str) -> str:
     """Format an interval of loads with its unit; NaN gives a dash."""
     if math.isnan(low):
         return "-"
-    return f"{number(low)} .. {'needs more joints' if math.isinf(high) else value(high, unit)}"
+    if math.isinf(high):
+        return f"{value(low, unit)} .. needs more joints"
+    size, name = multiple(high, unit)
+    return f"{number(low / size)} .. {number(high / size)} {name}".rstrip()
 
 
 def sentence(words: str) -> str:
@@ -80,6 +104,17 @@ def formed(x: float, form: str = ".3g") -> str:
 def ends(low: float, high: float, form: str) -> str:
     """Format both ends of an interval by a format specification; NaN gives a dash."""
     return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
+
+
+def ppm(share: float) -> str:
+    """Format a share in parts per million; NaN gives a dash."""
+    return "-" if math.isnan(share) else number(1e6 * share)
+
+
+def delivery(row: Mapping[Any, Any]) -> str:
+    """Prediction interval of a row with ``next_lower`` and ``next_upper``; NaN gives a dash."""
+    low, high = row["next_lower"], row["next_upper"]
+    return "-" if math.isnan(low) else f"{low:.0f} .. {high:.0f}"
 
 
 def percent(share: float) -> str:

@@ -86,10 +86,10 @@ class Material(Strict):
     """Material of all parts."""
 
     E: Annotated[Stress, Field(description="Young's modulus")]
-    G: Annotated[Stress, Field(description="shear modulus")]
     nu: Annotated[
         Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
     ]
+    G: Annotated[Stress, follows("material.G", "shear modulus")] = FOLLOWS
     rho: Annotated[Density, Field(description="density")]
 
 

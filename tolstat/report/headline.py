@@ -15,9 +15,16 @@ from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.joints import query as joints
+from tolstat.questions.what_if import rendering as what_if
 from tolstat.store.view import View
 
-WORDS = {"yes": "kept", "no": "not kept", "open": "open", "none": "no verdict"}
+WORDS = {
+    "yes": "kept",
+    "searched": "consistent with what was searched",
+    "no": "not kept",
+    "open": "open",
+    "none": "no verdict",
+}
 """Answers of `verdict` in words."""
 Row = Mapping[Any, Any]
 
@@ -28,17 +35,21 @@ class Headline(NamedTuple):
     Attributes
     ----------
     answer : str
-        ``yes``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share can be.
+        ``yes``, ``searched``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share
+        can be.
     value, words : str
         The answer or, without one, a share or its interval; the rest of the sentence.
     notes : tuple of str
         Causes, remedies, and what else restricts the verdict.
+    load : str
+        The load whose limit it is about: of several, that most joints exceed. Empty if there is no verdict.
     """
 
     answer: str
     value: str
     words: str
     notes: tuple[str, ...] = ()
+    load: str = ""
 
     @property
     def sentence(self) -> str:
@@ -72,7 +83,7 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limits(view).to_dict("records")
     found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
-    worst = max(records, key=lambda row: np.nan_to_num(row["estimate"], nan=-1.0))
+    worst = _worst(view, records)
     unresolved = _causes(view) if _matter(records if found.answer == "none" else [worst]) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
 
@@ -90,8 +101,9 @@ def verdict(row: Row, accepted: float) -> str:
     Returns
     -------
     str
-        ``yes`` (below), ``no`` (above), ``open`` (neither), ``none``: no interval, or joints without a valid load
-        decide, so that more joints do not help; empty without an accepted share.
+        ``yes`` (below), ``no`` (above), ``searched`` (below if the proposals of importance sampling reach every way to
+        the limit; whatever they miss, it may be above), ``open`` (neither), ``none``: no interval, or joints without a
+        valid load decide, so that more joints do not help; empty without an accepted share.
     """
     if np.isnan(accepted):
         return ""
@@ -99,7 +111,8 @@ def verdict(row: Row, accepted: float) -> str:
     if np.isnan(low):
         return "none"
     if high <= accepted or low > accepted:
-        return "yes" if high <= accepted else "no"
+        missed = row["unsearched_upper"] > accepted  # False for joints of equal weight
+        return "no" if low > accepted else "searched" if missed else "yes"
     undecided = row["bound_lower"] <= accepted < row["bound_upper"]
     return "none" if not row["n"] or (undecided and _matter([row])) else "open"
 
@@ -141,7 +154,7 @@ def _needed(row: Row, accepted: float) -> str:
 
 def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headline:
     answers = [verdict(row, accepted) for row in records]
-    answer = next(own for own in ("no", "none", "open", "yes") if own in answers)
+    answer = next(own for own in ("no", "none", "open", "searched", "yes") if own in answers)
     count, most = len(records), text.percent(accepted)
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
     notes: tuple[str, ...] = (f"of {count} limits: {numbers}",) if count > 1 else ()
@@ -150,39 +163,52 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
     concerned = [row for row, own in zip(records, answers, strict=True) if own == answer]
     if answer == "none":
         return Headline(answer, WORDS[answer], _reason(view, concerned), notes)
-    worst = max(concerned, key=lambda row: row["estimate"])
+    worst = _worst(view, concerned)
     limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
     interval = f"total interval {text.span(*ends(worst))}"
     if answer == "no":
         share = share_of(worst)
         interval = "total interval" if _matter([worst]) else interval
         said = f"{share} of the joints exceed {limit} ({interval}); {most} is accepted"
+        better = what_if.advice(view, worst["load"])
+        said += f". {better}" if better else ""
+    elif answer == "searched":
+        missed = text.percent(worst["unsearched_upper"])
+        said = (
+            f"at most {most} of the joints exceed {limit} if the proposals reach every way to it ({interval}); "
+            f"whatever they miss, at most {missed}"
+        )
     elif answer == "yes":
         which = limit if count == 1 else f"each of the {count} limits"
         said = f"at most {most} of the joints exceed {which} (largest share {share_of(worst)}, {interval})"
     else:
         which = limit if len(concerned) == 1 else f"{len(concerned)} limits, most of all {limit}"
         said = f"the joints that exceed {which} may be more or fewer than {most} ({interval})"
-    return Headline(answer, WORDS[answer], said, notes)
+    return Headline(answer, WORDS[answer], said, notes, worst["load"])
+
+
+def _worst(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
+    """Limit that the largest share of the joints exceeds; of equal shares that of a leading load."""
+    return max(records, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
 
 
 def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, of the worst limit."""
-    notes = () if view.iid else (without_interval(view.method),)
+    notes = () if view.has_intervals else (without_interval(view.method),)
     if view.weighted:
         known = [row for row in records if not np.isnan(row["estimate"])]
         if not known or _undecided(known):
             return Headline("none", WORDS["none"], _reason(view, records), notes)
-        worst = max(known, key=lambda row: row["estimate"])
+        worst = _worst(view, known)
         limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
         interval = "total interval" if _matter([worst]) else f"total interval {text.span(*ends(worst))}"
-        return Headline(
-            "", share_of(worst), f"of the joints exceed {limit}, the limit exceeded most ({interval})", notes
-        )
+        missed = f"whatever the proposals miss, at most {text.percent(worst['unsearched_upper'])}"
+        said = f"of the joints exceed {limit}, the limit exceeded most ({interval}; {missed})"
+        return Headline("", share_of(worst), said, notes, worst["load"])
     found = capabilities.together(capability.limits(view))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, records), notes)
-    return Headline("", found.value, found.words, notes)
+    return Headline("", found.value, found.words, notes, _worst(view, records)["load"])
 
 
 def _undecided(records: list[dict[Any, Any]]) -> bool:
@@ -197,11 +223,11 @@ def _reason(view: View, records: list[dict[Any, Any]]) -> str:
     if poor:
         trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
         limit = text.limit(poor[0]) + (f" (and {len(poor) - 1} more)" if len(poor) > 1 else "")
-        return f"too few effective joints are above {limit}: {trust.effective:.0f}"
+        return f"few joints have most of the weight above {limit} (Pareto k {trust.k:.2f}, 0.7 allowed)"
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
-    if not view.iid:
+    if not view.has_intervals:
         return without_interval(view.method)
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 

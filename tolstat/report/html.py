@@ -1,8 +1,11 @@
-"""The page as one self-contained HTML file: styles, pictures and script are embedded."""
+"""The page as one self-contained HTML file: styles, pictures and script are embedded, and no other script runs."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +13,14 @@ from markupsafe import Markup
 
 import tolstat
 from tolstat.common.files import atomic_write
-from tolstat.display import drawing
+from tolstat.display import drawing, schemes
 from tolstat.display.blocks import Page, Panel
 from tolstat.report import templates
+
+POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; script-src {}"
+)
+"""Content-Security-Policy: nothing is loaded or sent; pictures and page have styles of their own."""
 
 
 def write(page: Page, path: Path) -> None:
@@ -27,10 +35,27 @@ def write(page: Page, path: Path) -> None:
     """
     environment = templates.environment()
     environment.globals["figure"] = _figure
-    environment.filters["data"] = _data
-    text = environment.get_template("page.html.j2").render(page=page, version=tolstat.__version__)
+    environment.filters |= {"data": _data, "grouped": grouped}
+    script = (templates.FOLDER / "page.js").read_text(encoding="utf-8")
+    text = environment.get_template("page.html.j2").render(
+        page=page,
+        version=tolstat.__version__,
+        script=Markup(script),
+        schemes=Markup(schemes.style_sheet()),
+        policy=POLICY.format(allowed(script)),
+    )
     with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def allowed(script: str) -> str:
+    """Source of a Content-Security-Policy that lets one script run: its SHA-256."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def grouped(words: str) -> str:
+    """Group the digits of whole numbers from 10 000 on by narrow spaces."""
+    return re.sub(r"(?<![\w.])\d{5,}(?!\w)", lambda found: f"{int(found[0]):,}".replace(",", "\u202f"), words)
 
 
 def _figure(panel: Panel) -> dict[str, Any]:

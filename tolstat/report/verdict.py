@@ -1,4 +1,4 @@
-"""First section of the page: the question, and the verdict on each limit."""
+"""The verdict on the page: the decision with which it begins, and the share of the joints above each limit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Block, Card, Cards, Panel, Panels, Section, Text
+from tolstat.display.blocks import Card, Decision, Panel, Panels, Section, Text
 from tolstat.display.table import Column, as_block
 from tolstat.questions.accuracy import rendering as accuracy
 from tolstat.questions.capability import query as capability
@@ -21,27 +21,46 @@ from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.exceedance.rendering import LIMIT_DASH, LIMITS, above
 from tolstat.questions.show import section as show
 from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, verdict
-from tolstat.store.view import View
+from tolstat.store.view import METHODS, View
 
 
 def section(view: View, asked: Asked) -> Section:
-    """Question, headline, and each limit with its share of joints above it."""
-    question = question_of(view.store.study_text)
-    blocks: list[Block] = [Text(f"Question: {question}")] if question else []
-    joint = show.legend(view, asked)
+    """Decide on the limits: question, verdict, drawing with the worst bushing marked, numbers behind the verdict."""
     found = headline(view, asked.accepted)
-    if found is not None:
-        table = exceedance.limits(view)
-        verdicts = [verdict(row, asked.accepted) for row in table.to_dict("records")]
-        blocks.append(Cards([*_headline(view, found, table), *_basis(view)]))
-        blocks += _limits(view, asked, table, verdicts, joint)
-    else:
-        blocks.append(Cards(_basis(view)))
-        if view.sampled:
-            blocks.append(Text("The study sets no limits, so there is no verdict. Its loads are below."))
-        blocks += [Panels(joint), Text(show.LEGEND, small=True)] if joint else []
-    blocks += [Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes]
-    return Section("verdict", "Verdict", blocks)
+    load = found.load if found else next(iter(view.leading), "")
+    head = Decision(
+        question_of(view.store.study_text), _answer(view, found), _cards(view, found), show.worst(view, load, asked)
+    )
+    notes = (Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes)
+    return Section("verdict", "Verdict", [head, *notes], lead=True)
+
+
+def limits(view: View, asked: Asked) -> list[Section]:
+    """Share of the joints above each limit; none without limits, and for joints that are no sample of a production."""
+    if not (view.sampled and view.limits):
+        return []
+    table = exceedance.limits(view)
+    verdicts = [verdict(row, asked.accepted) for row in table.to_dict("records")]
+    words = dict(zip(table["load"], (WORDS.get(v, "") for v in verdicts), strict=True))
+    kept = Column("kept", lambda row: words[row["load"]], shown=lambda _: asked.judges)
+    block = as_block(
+        "Joints above each limit, in numbers", (LIMITS[0], kept, *LIMITS[1:]), table, verdicts if asked.judges else ()
+    )
+    said = (
+        f"{row['load']} above {text.value(row['level'], row['unit'])}: {text.percent(row['estimate'])}, "
+        f"95 % interval {text.span(row['lower'], row['upper'])}"
+        for row in table.to_dict("records")
+    )
+    panel = Panel(
+        "forest",
+        "Share of the joints above each limit",
+        "; ".join(said),
+        partial(_forest, table=table, accepted=asked.accepted),
+        (4.9, drawing.rows_height(len(table))),
+        max(1.4, drawing.rows_left(_above(table))),
+    )
+    how = [Text(line, small=True) for line in _how(view, asked)]
+    return [Section("limits", "Each limit", [Panels([panel], beside=how), block])]
 
 
 def question_of(text: str) -> str:
@@ -55,28 +74,27 @@ def question_of(text: str) -> str:
     return " ".join(found[1].split()) if found else ""
 
 
-def _headline(view: View, found: Headline, table: pd.DataFrame) -> list[Card]:
-    """The verdict; then, unless it is what the verdict says, the yield; the limit exceeded most."""
+def _answer(view: View, found: Headline | None) -> Card:
+    if found is None:
+        why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
+        return Card("", f"{why}, so there is no verdict.", "")
     note = " ".join(text.sentence(note) for note in found.notes)
-    cards = [
-        Card(
-            found.value,
-            found.words,
-            note,
-            "open" if found.answer == "none" else found.answer,
-        )
-    ]
-    if found.answer and not view.weighted and view.count(*VALID):
+    return Card(found.value, found.words, note, "open" if found.answer in ("none", "searched") else found.answer)
+
+
+def _cards(view: View, found: Headline | None) -> list[Card]:
+    """Unless the verdict says it, the yield and the limit exceeded most; number of joints, numerical error."""
+    cards = []
+    if found is not None and found.answer and not view.weighted and view.count(*VALID):
         together = capabilities.together(capability.limits(view))
         cards.append(Card(together.value, together.words, "Yield"))
-    first = table[table["load"].isin(view.leading)].sort_values("estimate", ascending=False, kind="stable")
-    if first["estimate"].notna().any() and first["load"].iloc[0] not in found.words:
-        worst = first.iloc[0].to_dict()
+    if found is not None and found.load and found.load not in found.words:
+        worst = next(row for row in exceedance.limits(view).to_dict("records") if row["load"] == found.load)
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"
         low, high = ends(worst)
         interval = "no interval" if np.isnan(low) else f"total interval {text.span(low, high)}"
         cards.append(Card(share_of(worst), label, f"{above(worst)} joints with a valid load; {interval}"))
-    return cards
+    return [*cards, *_basis(view)]
 
 
 def _basis(view: View) -> list[Card]:
@@ -89,71 +107,58 @@ def _basis(view: View) -> list[Card]:
     usual = {k: error for k, error in view.numerical_error.items() if k in kinds and not np.isnan(error)}
     if usual and view.verification:
         kind = max(usual, key=lambda name: usual[name])
-        label = f"numerical error of the largest loads ({kind}), relative"
-        cards.append(Card(f"{usual[kind]:.1e}", label, accuracy.basis(view.verification)))
+        label = f"numerical error of the largest loads ({kind})"
+        cards.append(Card(text.percent(usual[kind]), label, accuracy.basis(view.verification)))
     return cards
 
 
-def _limits(view: View, asked: Asked, table: pd.DataFrame, verdicts: list[str], joint: list[Panel]) -> list[Block]:
-    """Share above each limit, beside the drawings of the joint; the table of limits; notes."""
-    words = dict(zip(table["load"], (WORDS.get(v, "") for v in verdicts), strict=True))
-    kept = Column("kept", lambda row: words[row["load"]], shown=lambda _: asked.judges)
-    block = as_block("Limits", (*LIMITS, kept), table, verdicts if asked.judges else ())
-    said = (
-        f"{row['load']} above {text.value(row['level'], row['unit'])}: {text.percent(row['estimate'])}, "
-        f"95 % interval {text.span(row['lower'], row['upper'])}"
-        for row in table.to_dict("records")
-    )
-    panel = Panel(
-        "forest",
-        "Share of the joints above each limit",
-        "; ".join(said),
-        partial(_forest, table=table, accepted=asked.accepted),
-        (4.9, drawing.rows_height(len(table))),
-        1.4,
-    )
-    blocks: list[Block] = [Panels([panel, *joint])]
-    blocks += [Text(show.LEGEND, small=True)] if joint else []
-    blocks.append(block)
-    blocks.append(Text(_how(view, asked), small=True))
-    return blocks
-
-
-def _how(view: View, asked: Asked) -> str:
-    if not view.iid:
-        return (
-            "No intervals: Clopper–Pearson holds for independent samples only; replicates with other seeds show the "
-            "scatter. Failed and unsettled joints are counted below and above every limit."
-        )
+def _how(view: View, asked: Asked) -> list[str]:
+    """Paragraphs on what the picture shows, and what decides."""
+    if not view.has_intervals:
+        return [
+            "Points: share of the joints with a valid load. Grey: with failed and unsettled joints counted below and "
+            "above every limit.",
+            "No intervals: Clopper–Pearson holds for independent samples only; sampling.replicates gives intervals.",
+        ]
     said = "Joints are counted by their weights. " if view.weighted else ""
-    said += "Intervals are Clopper–Pearson's, 95 % for each limit by itself; failed and unsettled joints are counted "
-    said += "below the limit at the lower end and above it at the upper end of the total interval, which covers the "
-    said += "numerical error, too, where it is known."
+    paragraphs = [
+        f"{said}Points: share of the joints with a valid load. Blue: its interval ({view.interval_of}), 95 % "
+        "for each limit by itself.",
+        "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above "
+        "it at its upper end; it covers the numerical error, too, where it is known.",
+    ]
     if asked.judges:
-        said += f" A limit is kept if the widest interval lies below {text.percent(asked.accepted)}, not kept if it"
-        said += " lies above. It has no verdict where joints without a valid load decide, and is open otherwise."
-    return said
+        paragraphs.append(
+            f"A limit is kept if its total interval lies below {text.percent(asked.accepted)}, not kept if it lies "
+            "above. It has no verdict where joints without a valid load decide, and is open otherwise."
+        )
+    return paragraphs
+
+
+def _above(table: pd.DataFrame) -> list[str]:
+    """Each limit as a label: ``cross1.F > 1500 N``."""
+    return [f"{row['load']} > {text.value(row['level'], row['unit'])}" for row in table.to_dict("records")]
 
 
 def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
-    """Estimate, interval and outer interval of each limit on an axis of shares."""
-    known = table["estimate"][table["estimate"] > 0]
+    """Estimate, interval and total interval of each limit, on an axis from the least to the largest of them."""
+    rows = table.to_dict("records")
+    spans = [ends(row) if not np.isnan(ends(row)[0]) else (row["bound_lower"], row["bound_upper"]) for row in rows]
     n = max(int(table["n"].max()), 1)
-    floor = 0.5 * min(1.0 / n, known.min() if len(known) else 1.0)
-    units = [f"{row['load']} > {text.value(row['level'], row['unit'])}" for row in table.to_dict("records")]
-    drawing.rows(ax, units)
-    style.share_axis(ax, min(floor, 0.5 * accepted) if accepted > 0 else floor, "x")
-    for i, row in enumerate(table.to_dict("records")):
-        low, high = ends(row)
-        if np.isnan(low):
-            low, high = row["bound_lower"], row["bound_upper"]
-        ax.plot([max(low, 0.1 * floor), high], [i, i], color=drawing.GREY, lw=5.0, solid_capstyle="butt")
-        if not np.isnan(row["lower"]):
-            ax.plot([max(row["lower"], 0.1 * floor), row["upper"]], [i, i], color=style.COLOURS[0], lw=2.0)
-        if row["estimate"] > 0:
+    shown = np.array([*table["estimate"], *np.ravel(spans)], float)
+    shown = np.array([*shown[shown >= 0.5 / n], *([accepted] if accepted > 0 else ())])
+    high = min(1.4 * shown.max(initial=0.5 / n), 1.0)
+    drawing.rows(ax, _above(table))
+    style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
+    low = ax.get_xlim()[0]
+    for i, (row, span) in enumerate(zip(rows, spans, strict=True)):
+        ax.plot([max(span[0], 0.1 * low), span[1]], [i, i], color=drawing.GREY, lw=5.0, solid_capstyle="butt")
+        if not np.isnan(row["estimate"] + row["lower"]):
+            ax.plot([max(row["lower"], 0.1 * low), row["upper"]], [i, i], color=style.COLOURS[0], lw=2.0)
+        if row["estimate"] >= low:
             ax.plot(row["estimate"], i, "o", color=style.COLOURS[0], ms=5.5)
-        elif row["estimate"] == 0:
-            ax.plot(ax.get_xlim()[0], i, "<", color=style.COLOURS[0], ms=6, clip_on=False)
+        elif row["estimate"] >= 0:
+            ax.plot(low, i, "<", color=style.COLOURS[0], ms=6, clip_on=False)
     if accepted > 0:
         ax.axvline(accepted, color=style.INK, lw=1.4, ls=LIMIT_DASH)
         ax.text(accepted, -0.75, f"accepted: {text.percent(accepted)}", ha="center", va="bottom")

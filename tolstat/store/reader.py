@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from copy import copy
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -21,14 +23,26 @@ from tolstat.store import checks, integrity
 from tolstat.store.checked_tables import CheckedTables
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
-from tolstat.store.histories import HistoryParts
+from tolstat.store.histories import HistoryParts, parts_folder
 from tolstat.store.named_loads import NamedLoads
-from tolstat.store.result_file import BLOCK, RUN_AGAIN, campaign_digest, is_locked, open_hdf5, store_error, text
+from tolstat.store.result_file import (
+    BLOCK,
+    RUN_AGAIN,
+    Handle,
+    campaign_digest,
+    is_locked,
+    open_hdf5,
+    store_error,
+    text,
+)
 from tolstat.store.view import View
+from tolstat.study.points import only_one
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
+
+    from tolstat.joint import Operation
 
 
 class Session(NamedTuple):
@@ -60,8 +74,13 @@ class Reader(CheckedTables):
         Columns of the results that the campaign keeps, in the order of the table.
     joint, options, sampling, versions : dict
         Nominal joint with all values resolved, solver options, sampling (with ``dimensions``), software versions.
+    points : dict of str to Point
+        Operating points by name; one without a name unless the study has several.
+    point : str or None
+        Operating point whose results are read; None where there are several and none is chosen, see `at`.
     limits : dict of str to float
-        Limits of the study in SI units, ``{"cross1.F": 700.0}``.
+        Limits of the study in SI units, ``{"cross1.F": 700.0}``; those of some operating points only are named
+        ``cross1.F at cruise``.
     case_names : tuple of str
         Cases of a study that lists its joints, ``"ideal"`` first; empty for other methods.
     variants : tuple of Variant
@@ -116,7 +135,7 @@ class Reader(CheckedTables):
 
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
-        self._file = file
+        self._handle = Handle(file)
         attrs = file.attrs
         checks.check_schema(path, file)
         self._read_study_attributes()
@@ -141,12 +160,56 @@ class Reader(CheckedTables):
         if self.rows.stop > self.campaign_rows:
             raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
         checks.check_histories(file, self.history_specs, self.n)
-        self._parts = HistoryParts(parts_folder(path), self.n, self.history_specs, campaign_digest(file))
+        self.point = next(iter(self.points)) if len(self.points) == 1 else None
+        self._campaign = campaign_digest(file)
+
+    @property
+    def _file(self) -> h5py.File:
+        return self._handle.file
+
+    @cached_property
+    def _parts(self) -> HistoryParts:
+        self._held()
+        folder = parts_folder(self.path) / (self.point or "")
+        return HistoryParts(folder, self.n, self.history_specs, self._campaign)
+
+    def at(self, point: str) -> Self:
+        """Return the file at one of its operating points; both are closed together.
+
+        Raises
+        ------
+        InputError
+            When there is no such point.
+        """
+        only_one(point, list(self.points), str(self.path))
+        found = copy(self)
+        for kept in ("_parts", "loads"):
+            found.__dict__.pop(kept, None)
+        found.point = point
+        return found
+
+    def each(self) -> list[Self]:
+        """Return the file at each of its operating points, or at the one that it is at."""
+        return [self.at(name) for name in (self.points if self.point is None else [self.point])]
+
+    @property
+    def operation(self) -> Operation:
+        """Operating point whose results are read, without the deviations of the joints.
+
+        Raises
+        ------
+        StoreError
+            When the file has several and none is chosen.
+        """
+        self._held()
+        return self.points[self.point or ""].operation
 
     def __repr__(self) -> str:
         if not self._file:
             return f"<result file {self.path.name!r}, closed>"
-        return f"<result file {self.path.name!r}: {self.n - self.first_sample} joints ({self._progress()})>"
+        joints = f"{self.n - self.first_sample} joints"
+        progress = [f"{one.point}: {one._progress()}" if one.point else one._progress() for one in self.each()]
+        return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
 
     def _repr_html_(self) -> str:
         entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
@@ -193,14 +256,19 @@ class Reader(CheckedTables):
         return NamedLoads(self.view())
 
     @property
+    def heaviest(self) -> float:
+        """Largest weight that a joint of importance sampling can have: one over the share of the tolerances, else 1."""
+        return 1.0 / (1.0 - math.fsum(share for share, _ in self.identity.get("proposal", ())))
+
+    @property
     def nominal(self) -> pd.Series[float]:
         """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
         return self.loads.nominal()
 
     @property
     def complete(self) -> bool:
-        """Whether no row is pending."""
-        return next(self.pending_blocks(), None) is None
+        """Whether no row is pending, at any operating point."""
+        return all(next(one.pending_blocks(), None) is None for one in self.each())
 
     @property
     def whole(self) -> bool:
@@ -208,10 +276,12 @@ class Reader(CheckedTables):
         return self.rows == range(self.campaign_rows)
 
     def counts(self) -> Counts:
-        """Count the joints of the file by status."""
-        counts = Counts(self.n, 0, 0, 0)
-        for first in range(0, self.n, BLOCK):
-            counts = counts.after(self.status(slice(first, first + BLOCK)))
+        """Count the joints of the file by status; each at every operating point."""
+        each = self.each()
+        counts = Counts(self.n * len(each), 0, 0, 0)
+        for one in each:
+            for first in range(0, self.n, BLOCK):
+                counts = counts.after(one.status(slice(first, first + BLOCK)))
         return counts
 
     def session(self) -> Session | None:
@@ -246,7 +316,7 @@ class Reader(CheckedTables):
             remedy = f'write histories = "full" or "harmonics" in [output] of the study, and {RUN_AGAIN}'
             raise store_error(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
         slots = np.arange(self.n) if slots is None else np.asarray(slots, dtype=np.intp)
-        if "histories" not in self._file:
+        if "histories" not in self._held():
             done = self.status()[slots] != Status.PENDING  # read first: histories are written before the status
             try:
                 values = self._parts.read(name, slots, done)
@@ -305,6 +375,7 @@ class Reader(CheckedTables):
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
         self.limits: dict[str, float] = json.loads(text(attrs, "limits"))
+        self.points = checks.points(self._file)
         self.joint = checks.mapping(self._file, "joint")
 
     def _reopen(self) -> bool:
@@ -312,11 +383,11 @@ class Reader(CheckedTables):
         if self._file.mode != "r":
             return False
         file = open_hdf5(self.path, "r")
-        if "histories" not in file or campaign_digest(file) != self._parts.campaign:
+        if "histories" not in file[self._held().name] or campaign_digest(file) != self._campaign:
             file.close()
             return False
         self._file.close()
-        self._file = file
+        self._handle.file = file
         return True
 
     def _check_history(self, name: str, slots: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
@@ -326,8 +397,3 @@ class Reader(CheckedTables):
             row = self.rows[slots[done][np.argmax(wrong)]]
             found = f"is damaged: the history {name} of row {row} does not match its checksum"
             raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
-
-
-def parts_folder(path: Path) -> Path:
-    """Folder of the histories of a campaign that is not complete yet."""
-    return path.with_name(path.name + ".parts")

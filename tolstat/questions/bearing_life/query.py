@@ -122,6 +122,8 @@ def _with_error(rate: SampleLoad, error: float) -> tuple[SampleLoad, SampleLoad]
 def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
     """Share of the joints in which a bearing is mostly loaded at one end, at opposite ends, or along its length.
 
+    Of several operating points it counts if a joint is loaded so at one of them.
+
     Returns
     -------
     DataFrame
@@ -131,7 +133,7 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
     """
     if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
         return pd.DataFrame()
-    spent = view.read_results(("mode_share",))["mode_share"]
+    spent = np.maximum.reduce([part.read_results(("mode_share",))["mode_share"] for part in view.parts])
     rows = []
     for place in (*PINS, ANY):
         own = spent[:, [PINS.index(place)]] if place in PINS else spent

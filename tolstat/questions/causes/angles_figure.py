@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 LINES = 4
 """Number of errors whose share is drawn."""
+LOADS = ("5 to 95 % of the joints", "median", "without errors")
+"""Labels of the lines of a load."""
 LONG = 16
 """Names with more letters do not fit side by side."""
 ORIGIN = {
@@ -68,9 +70,18 @@ def save(found: AgainstAngle, log: bool, path: Path) -> list[Path]:
         upper, lower = figure.subplots(2, 1)
         upper.set_title(f"{found.load} over the revolution, {found.joints} joints")
         loads(upper, found)
+        _inside(upper, 3)
         lower.set_title(f"Share of the variance of {'log ' if log else ''}{found.load} that each error explains alone")
         shares(lower, found)
+        _inside(lower, 1 if any(len(name) > LONG for name in found.names[:LINES]) else 2)
     return style.save(figure, path.with_suffix(""), (path.suffix,))
+
+
+def _inside(ax: Axes, columns: int) -> None:
+    """Put a legend into the axes, above what is drawn."""
+    rows = -(-len(ax.get_legend_handles_labels()[1]) // columns)
+    ax.set_ylim(0.0, (1.0 + 0.14 * rows) * ax.get_ylim()[1])
+    ax.legend(loc="upper right", ncols=columns, columnspacing=1.2)
 
 
 def closed(values: FloatArray) -> FloatArray:
@@ -88,13 +99,12 @@ def loads(ax: Axes, angle: AgainstAngle) -> None:
     """Draw a load over the revolution: nominal joint, median and 5 to 95 % band of the others."""
     theta = theta_axis(ax, angle.angles)
     low, middle, high = closed(angle.spread)
-    ax.fill_between(theta, low, high, color=style.COLOURS[0], alpha=0.2, lw=0, label="5 to 95 % of the joints")
-    ax.plot(theta, middle, color=style.COLOURS[0], label="median")
+    ax.fill_between(theta, low, high, color=style.COLOURS[0], alpha=0.2, lw=0, label=LOADS[0])
+    ax.plot(theta, middle, color=style.COLOURS[0], label=LOADS[1])
     if np.isfinite(angle.nominal).all():
-        ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label="without errors")
+        ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
     ax.set_ylabel(f"|{angle.load}| [{unit_text(angle.unit)}]")
-    ax.set_ylim(0.0, 1.28 * max(high.max(), np.nan_to_num(angle.nominal).max()))
-    ax.legend(loc="upper right", ncols=3, columnspacing=1.2, handlelength=1.8)
+    ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(angle.nominal).max()))
 
 
 def shares(ax: Axes, angle: AgainstAngle) -> None:
@@ -107,6 +117,4 @@ def shares(ax: Axes, angle: AgainstAngle) -> None:
             ax.fill_between(theta, low, high, color=style.COLOURS[i], alpha=0.15, lw=0)
         ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
         ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(high), high, share), initial=0.0)))
-    long = any(len(name) > LONG for name in angle.names[:LINES])
-    ax.set(ylim=(0.0, (1.6 if long else 1.3) * max(ceiling, 1.0)), ylabel="share of the variance [%]")
-    ax.legend(loc="upper right", ncols=1 if long else 2, columnspacing=1.2, handlelength=2.6)
+    ax.set(ylim=(0.0, 1.05 * max(ceiling, 1.0)), ylabel="share of the variance [%]")

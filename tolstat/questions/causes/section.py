@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from functools import partial
 
 import numpy as np
@@ -16,7 +16,7 @@ from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.display.table import as_block
-from tolstat.questions.causes import angles_figure, rendering, tail_section
+from tolstat.questions.causes import angles_figure, pairs_section, rendering, tail_section
 from tolstat.questions.causes.angles import AgainstAngle, against_angle
 from tolstat.questions.causes.query import Causes, causes_of
 from tolstat.store.view import View
@@ -25,17 +25,18 @@ JOINTS = 20_000
 """Maximum number of joints (the first ones) used for causes: more add little and take memory."""
 SHOWN = 10
 """Number of errors shown for each load."""
+ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)"
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
-    """Sections ``causes`` and ``worst`` of the leading loads; none for a sweep or without a valid joint.
+    """Sections ``pairs``, ``causes`` and ``worst`` of the leading loads; none for a sweep or without a valid joint.
 
     The causes of a load with a long tail are those of its logarithm. What cannot be evaluated is left out, and a note
     says why.
     """
     if view.method == "sweep" or not view.count(*VALID):
         return []
-    made: list[Section] = []
+    made = pairs_section.sections(view, asked)
     with asked.noting("causes and worst joints are left out"):
         logarithmic = frozenset(load.name for load in view.loads(view.leading) if load.long_tailed)
         is_design = bool(view.study.groups)
@@ -116,7 +117,8 @@ def _tornado_panel(causes: Causes, quantity: str) -> Panel:
         f"Largest first-order indices: {top}; all errors alone {100 * causes.additive:.0f} %",
         partial(_tornado, causes=causes, quantity=quantity),
         (4.9, drawing.rows_height(len(part)) + 0.25),
-        drawing.rows_left(list(part["error"])),
+        left := drawing.rows_left(list(part["error"])),
+        drawing.legend_room([ALONE, *([IN_ALL] if _has_narrow_bounds(causes) else [])], left),
     )
 
 
@@ -127,12 +129,12 @@ def _tornado(ax: Axes, causes: Causes, quantity: str) -> None:
     first = 100.0 * part["first"].clip(lower=0.0).to_numpy()
     ax.barh(place, first, height=0.5, color=style.COLOURS[0], zorder=2)
     handles: list[Patch | Line2D] = [Patch(color=style.COLOURS[0])]
-    labels = ["alone (first order), 95 %"]
+    labels = [ALONE]
     if _has_narrow_bounds(causes):
         low, high = (100.0 * part[f"total_{end}"].to_numpy() for end in ("lower", "upper"))
         ax.barh(place, high - low, left=low, height=0.74, color=drawing.GREY, alpha=0.45, zorder=1)
         handles.append(Patch(color=drawing.GREY, alpha=0.45))
-        labels.append("in all (bounds of the total index)")
+        labels.append(IN_ALL)
     if part["first_lower"].notna().any():
         low, high = (100.0 * part[f"first_{end}"].to_numpy() for end in ("lower", "upper"))
         ax.hlines(place, low, high, color=style.INK, lw=1.2, zorder=3)
@@ -149,8 +151,9 @@ def _angle_panels(angle: AgainstAngle, quantity: str) -> list[Panel]:
         f"{angle.load} over the revolution",
         f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the shaft angle; "
         f"95 % of the joints stay below {angle.spread[2].max():.4g} {unit} everywhere",
-        partial(angles_figure.loads, angle=angle),
+        partial(_with_legend, draw=angles_figure.loads, angle=angle),
         (4.9, 3.1),
+        top=drawing.legend_room(angles_figure.LOADS),
     )
     estimates = list(zip(angle.names, angle.overall.estimate, strict=True))
     top = ", ".join(f"{name} {100 * share:.1f} %" for name, share in estimates[: angles_figure.LINES])
@@ -158,10 +161,16 @@ def _angle_panels(angle: AgainstAngle, quantity: str) -> list[Panel]:
         f"angle-shares-{key}",
         f"{quantity}: share of the variance against the shaft angle",
         f"Over the whole revolution: {top}",
-        partial(angles_figure.shares, angle=angle),
+        partial(_with_legend, draw=angles_figure.shares, angle=angle),
         (4.9, 3.1),
+        top=drawing.legend_room(angle.names[: angles_figure.LINES]),
     )
     return [loads, shares]
+
+
+def _with_legend(ax: Axes, draw: Callable[[Axes, AgainstAngle], None], angle: AgainstAngle) -> None:
+    draw(ax, angle)
+    drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
 
 def _angle_table(against: Sequence[AgainstAngle]) -> Table:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.loads import BUSHING_LOADS, unit_text
-from tolstat.display import style, text
+from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.questions.causes import angles_figure
 from tolstat.questions.causes.angles import AgainstAngle, modulus
@@ -23,6 +23,8 @@ JOINTS, DRAWN = 8, 3
 """Numbers of worst joints listed and drawn for each load."""
 ANGLES = 180
 """Number of input angles drawn, if the histories have as many samples."""
+SPREAD = "5 to 95 %"
+"""Label of the loads of all joints."""
 ERRORS = 4
 """Number of errors listed for each joint."""
 
@@ -79,9 +81,11 @@ def _table(tail: Tail) -> Table:
     rows = []
     for joint in tail.joints:
         errors = ",  ".join(f"{name} {z:+.1f} σ" for name, z in list(joint.scores.items())[:ERRORS])
-        rows.append([str(joint.row), text.value(joint.value, tail.unit), joint.status.label, errors])
-    head = ["row", tail.by, "status", "largest errors, in standard deviations"]
-    return Table(f"Largest {tail.by}", head, rows, frozenset({0, 2, 3}))
+        point = [joint.point] if joint.point else []
+        rows.append([str(joint.row), text.value(joint.value, tail.unit), *point, joint.status.label, errors])
+    at = ["at"] if any(joint.point for joint in tail.joints) else []
+    head = ["row", tail.by, *at, "status", "largest errors, in standard deviations"]
+    return Table(f"Largest {tail.by}", head, rows, frozenset({0, *range(2, len(head))}))
 
 
 def _histories(view: View, tail: Tail, against: Sequence[AgainstAngle]) -> _Histories:
@@ -100,6 +104,7 @@ def _history_panel(found: _Histories) -> Panel:
         f"Histories of the worst joints: {rows}",
         partial(_draw, found=found),
         (4.9, 3.3),
+        top=drawing.legend_room([*(f"row {joint.row}" for joint in tail.joints[:DRAWN]), SPREAD, "limit"]),
     )
 
 
@@ -112,9 +117,9 @@ def _draw(ax: Axes, found: _Histories) -> None:
     if found.all_joints is not None:
         low, _, high = angles_figure.closed(found.all_joints.spread)
         around = angles_figure.theta_axis(ax, found.all_joints.angles)
-        ax.fill_between(around, low, high, color=style.FAINT, alpha=0.25, lw=0, label="5 to 95 %")
+        ax.fill_between(around, low, high, color=style.FAINT, alpha=0.25, lw=0, label=SPREAD)
     if found.limit is not None:
         ax.axhline(found.limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
     unit = unit_text(tail.unit)
-    ax.set(ylabel=f"|{tail.by}| [{unit}]", ylim=(0.0, 1.3 * np.nanmax([*found.loads.flat, found.limit or 0.0])))
-    ax.legend(loc="upper right", ncols=3, columnspacing=1.2, handlelength=2.0)
+    ax.set(ylabel=f"|{tail.by}| [{unit}]", ylim=(0.0, 1.05 * np.nanmax([*found.loads.flat, found.limit or 0.0])))
+    drawing.legend_above(ax, *ax.get_legend_handles_labels())

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import load_of, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
@@ -46,8 +46,9 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
-        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
-        `_error_budget`. Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
+        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
+        `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
+        Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `SampleLoad.supports`.
     """
     rows = []
@@ -56,8 +57,31 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         head = {"load": name, "unit": load.unit, "nominal": load.nominal}
         budget = _error_budget(view, load, level, confidence)
         row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
+        # the load with its numerical error, where that is known
+        top = (error_budget.shifted(view, load) or (load, load))[1]
+        row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
         rows.append(row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan))
     return pd.DataFrame(rows)
+
+
+def at_points(view: View) -> pd.DataFrame:
+    """Share of the joints above each limit at each of the operating points that it holds at.
+
+    Returns
+    -------
+    DataFrame
+        One row per limit that holds at several points, in the study's order: ``load``, ``unit``, ``level``, and under
+        the name of each point of the view the share there; NaN where the limit does not hold, or weighted joints do not
+        support it. No rows for a view of one point.
+    """
+    rows = []
+    for name, level in view.limits.items():
+        at, plain = view.narrowed(name)
+        if len(at.points) > 1:
+            loads = {part.points[0]: part.load(plain) for part in at.parts}
+            shares = {p: own.above(level).estimate if own.supports(level) else np.nan for p, own in loads.items()}
+            rows.append({"load": name, "unit": load_of(name).unit, "level": level} | shares)
+    return pd.DataFrame(rows, columns=["load", "unit", "level", *view.points])
 
 
 def _error_budget(view: View, load: SampleLoad, level: float, confidence: float) -> dict[str, float]:
@@ -93,13 +117,6 @@ def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
         for share in SHARES:
             rows.append({**head, **load.quantile(share, confidence)._asdict(), "confidence": confidence})
     return pd.DataFrame(rows)
-
-
-def most_exceeded(view: View) -> str:
-    """Name of the load whose limit the largest share of the joints exceeds; without limits see `View.leading`."""
-    shares = {load.name: load.above(load.limit).estimate for load in view.loads(list(view.limits)) if load.limit}
-    known = {name: share for name, share in shares.items() if share == share}
-    return max(known, key=lambda name: known[name]) if known else next(iter((*view.leading, "cross1.F")))
 
 
 def tolerance_limits(view: View) -> dict[str, float]:
@@ -153,7 +170,7 @@ def readings(view: View) -> dict[str, Any]:
         ``bound_upper``.
     """
     found = {}
-    ends = ("lower", "upper", "outer_lower", "outer_upper") if view.iid else ("bound_lower", "bound_upper")
+    ends = ("lower", "upper", "outer_lower", "outer_upper") if view.has_intervals else ("bound_lower", "bound_upper")
     for load in view.loads(view.shown_loads):
         if not load.valid.size:
             continue
@@ -184,8 +201,9 @@ def _round_levels(low: float, high: float, limit: float | None) -> NDArray[np.fl
 
 
 def summary(view: View, confidence: float) -> dict[str, Any]:
-    """JSON values: ``limits`` and ``quantiles``, the rows of the tables of these names."""
+    """JSON values: ``limits``, ``at_points`` and ``quantiles``, the rows of the tables of these names."""
     return {
         "limits": text.records(limits(view, confidence)) if view.limits else [],
+        "at_points": text.records(at_points(view)),
         "quantiles": text.records(quantiles(view, confidence)) if view.shown_loads else [],
     }

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
 from tolstat.common.tables import VALID, Status
-from tolstat.display import style, text
+from tolstat.display import drawing, style, text
 from tolstat.display.table import Column, Row
 from tolstat.questions.exceedance.query import SHARES, curve
 from tolstat.store.view import View
@@ -39,6 +39,14 @@ def _outer(row: Row) -> str:
     return text.span(row[f"{kind}_lower"], row[f"{kind}_upper"])
 
 
+def _is_weighted(table: pd.DataFrame) -> bool:
+    return bool(table["unsearched_upper"].notna().any())
+
+
+def _unsearched(row: Row) -> str:
+    return text.percent(row["unsearched_upper"])
+
+
 def above(row: Row) -> str:
     """Joints above a limit, and of how many with a valid load."""
     return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
@@ -53,9 +61,24 @@ LIMITS = (
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
     Column("with unresolved joints", _outer, shown=_has_unresolved, rank=2),
     Column("total interval", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=_has_error, rank=3),
+    Column("at most, if ways are missed", _unsearched, shown=_is_weighted),
 )
 """Columns of the table `query.limits`. Joints above are counted among the valid ones, as the share is; the last two
 columns count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""
+
+
+def at_points(view: View) -> tuple[Column, ...]:
+    """Columns of the table `query.at_points`: the share above each limit at each operating point."""
+
+    def share(point: str) -> Column:
+        return Column(point, lambda row: text.percent(row[point]))
+
+    head = (Column("load", lambda row: str(row["load"])), Column("limit", lambda r: text.value(r["level"], r["unit"])))
+    return (*head, *map(share, view.points))
+
+
+AT_POINTS = "share of the joints above each limit at each operating point"
+"""Title of the table `query.at_points`."""
 
 
 def _numerical(row: Row) -> str:
@@ -82,7 +105,9 @@ def quantile_columns(tolerance: dict[str, float] | None = None) -> tuple[Column,
     def quantile(share: float) -> Column:
         def cell(row: Row) -> str:
             own, lower, upper = row[share]
-            ends = f" ({text.number(lower)} .. {text.number(upper)})" if tolerance and not math.isnan(lower) else ""
+            size = text.multiple(own, row["unit"])[0]
+            ends = f" ({text.number(lower / size)} .. {text.number(upper / size)})"
+            ends = ends if tolerance and not math.isnan(lower) else ""
             return text.value(own, row["unit"]) + ends
 
         rank = {SHARES[-1]: 0, SHARES[0]: 0}.get(share, 3)
@@ -90,7 +115,7 @@ def quantile_columns(tolerance: dict[str, float] | None = None) -> tuple[Column,
 
     def interval(row: Row) -> str:
         _, lower, upper = row[SHARES[-1]]
-        return "-" if math.isnan(lower) else f"{lower:.4g} .. {text.value(upper, row['unit'])}"
+        return text.span_of(lower, upper, row["unit"])
 
     head = (
         Column("load", lambda row: str(row["load"])),
@@ -115,8 +140,11 @@ def note(view: View) -> str:
     if view.weighted:
         text = (
             "joints counted by their weights; bands: pointwise 95 % Clopper–Pearson intervals of as many equal joints "
-            f"as would be as sure{_distrust(view)}"
+            f"as would be as sure{_distrust(view)}; intervals hold if the proposals reach every way to the limit, the "
+            "last column, from the joints of the tolerances alone, whatever they miss"
         )
+    elif view.replicates > 1:
+        text = f"bands: pointwise 95 % intervals of the settled joints, {view.interval_of}"
     elif view.iid:
         text = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
     else:
@@ -127,7 +155,7 @@ def note(view: View) -> str:
 
 
 def _distrust(view: View) -> str:
-    """Words on limits without a share, because too few effective joints are above them."""
+    """Words on limits without a share, because few joints have most of the weight above them."""
     poor = []
     for name, level in view.limits.items():
         load = view.load(name)
@@ -171,8 +199,7 @@ def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.9
         else np.empty(0, exceedance.CURVE)
         for name in names
     ]
-    unit = "N" if letter == "F" else "N m"
-    ax.set_xlabel(f"x: largest |{letter}| over the revolution [{unit}]")
+    unit = "N" if letter == "F" else "N*m"
     if letter == "F":
         ax.set_ylabel("share of joints above x")
     levels = np.concatenate([table["level"] for table in tables])
@@ -185,6 +212,8 @@ def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.9
     marked = _limit_levels(view, group, letter)
     low, high = axis_range(levels, list(marked))
     ax.set_xlim(low, high)
+    shown = drawing.loads_axis(ax.xaxis, max(marked, default=high), unit)
+    ax.set_xlabel(f"x: largest |{letter}| over the revolution [{shown}]")
     floor = 0.5 * min(least(view, table) for table in tables if table.size)
     style.share_axis(ax, floor)
     for i, table in enumerate(tables):
@@ -193,7 +222,7 @@ def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.9
             nominal = view.load(names[i]).nominal
             if low <= nominal <= high:
                 style.mark(ax, nominal, 1.0, style.COLOURS[i])
-    if view.iid:
+    if view.has_intervals:
         ends = [table["outer_upper"][-1] for table in tables if table.size]
         ax.axhline(max(ends), color=style.FAINT, lw=1.1, ls=ZERO_DASH, zorder=1.5)
     limit_lines(ax, marked, unit)
@@ -206,13 +235,13 @@ def least(view: View, table: NDArray[np.void]) -> float:
 
 
 def axis_range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, float]:
-    """Range of the x axis: the loads, and the limits unless they lie far off."""
+    """Range of the x axis: the loads, which are not negative, and the limits unless they lie far off."""
     low, high = float(levels.min()), float(levels.max())
     reach = max(high - low, 0.02 * abs(high), 1e-12)
     near = [x for x in marked if low - 0.8 * reach <= x <= high + 0.8 * reach]
     low, high = min([low, *near]), max([high, *near])
     margin = 0.05 * max(high - low, reach)
-    return low - margin, high + margin
+    return max(low - margin, min(low, 0.0)), high + margin
 
 
 def steps(ax: Axes, table: NDArray[np.void], i: int, low: float, floor: float) -> None:
@@ -248,24 +277,24 @@ def _limit_levels(view: View, group: str, letter: str) -> dict[float, list[int]]
 
 
 def limit_lines(ax: Axes, marked: dict[float, list[int]], unit: str) -> None:
-    """Mark limits by vertical lines, labelled above the panel; an arrow stands for one out of range."""
+    """Mark limits by vertical lines, labelled above the panel; an arrow stands for one out of range. SI `unit`."""
     labels: list[tuple[float, str, str]] = []
     low, high = ax.get_xlim()
     for level, numbers in marked.items():
-        text = f"limit {level:g} {unit}" + ("" if len(numbers) == 4 else f" ({', '.join(map(str, numbers))})")
+        words = f"limit {text.value(level, unit)}" + ("" if len(numbers) == 4 else f" ({', '.join(map(str, numbers))})")
         colour = style.COLOURS[numbers[0] - 1] if len(numbers) == 1 else style.INK
         if low <= level <= high:
             ax.axvline(level, color=colour, lw=1.4, ls=LIMIT_DASH, zorder=2)
         else:
-            text = f"{text} →" if level > high else f"← {text}"
+            words = f"{words} →" if level > high else f"← {words}"
         place = float(np.clip((level - low) / (high - low), 0.0, 1.0))
-        labels = _without_overlap(labels, (place, text, colour))
-    for place, text, colour in labels:
+        labels = _without_overlap(labels, (place, words, colour))
+    for place, words, colour in labels:
         side = "left" if place < 0.12 else "right" if place > 0.88 else "center"
         ax.text(
             place,
             1.015,
-            text,
+            words,
             transform=ax.transAxes,
             ha=side,
             va="bottom",
@@ -290,7 +319,7 @@ def _legend(page: Figure, view: View) -> None:
         Line2D([], [], color=c, ls=dash) for c, dash in zip(style.COLOURS, style.DASHES, strict=True)
     ]
     labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
-    if view.iid:
+    if view.has_intervals:
         handles += [Patch(color=style.FAINT, alpha=0.4, lw=0)]
         handles += [Line2D([], [], color=style.FAINT, lw=1.1, ls=ZERO_DASH)]
         labels += ["95 % band", "upper end where none exceeds x"]

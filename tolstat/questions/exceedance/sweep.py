@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -15,7 +13,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, Status
-from tolstat.display import style
+from tolstat.display import style, text
 from tolstat.questions.exceedance.swept_axes import Axis, swept_axes
 from tolstat.store.view import View
 
@@ -105,8 +103,8 @@ def _note(axes: list[Axis]) -> str:
     if len(axes) < 2:
         return "largest modulus over the last revolution of each joint"
     others = ", ".join(axis.label for axis in axes[2:])
-    text = f"largest of the four bushings, coloured by {_head(axes[1])}"
-    return text + (f"; one line for each {others}" if others else "")
+    said = f"largest of the four bushings, coloured by {_head(axes[1])}"
+    return said + (f"; one line for each {others}" if others else "")
 
 
 def _lines(ax: Axes, view: View, axes: list[Axis], group: str, letter: str) -> None:
@@ -132,8 +130,7 @@ def _lines(ax: Axes, view: View, axes: list[Axis], group: str, letter: str) -> N
     for limit in sorted(limits):
         if limit < top + 0.5 * (top - bottom):
             ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)))
-            text = f"limit {limit:g} {'N' if letter == 'F' else 'N m'}"
-            style.note(ax, text, limit)
+            style.note(ax, f"limit {text.value(limit, 'N' if letter == 'F' else 'N*m')}", limit)
 
 
 def _line(
@@ -166,8 +163,8 @@ def _combinations(axes: list[Axis]) -> list[tuple[str, Mask]]:
 
 
 def _shades(count: int) -> list[str]:
-    """Colours in order from dark to light that stay in order in grey and for colour-blind readers."""
-    return [to_hex(colormaps["viridis"](x)) for x in np.linspace(0.0, 0.88, count)]
+    """Colours of `style.SHADES` for so many values, in order."""
+    return [style.SHADES[i] for i in np.linspace(0, len(style.SHADES) - 1, count).round().astype(int)]
 
 
 def key(view: View) -> tuple[list[Artist], list[str]]:

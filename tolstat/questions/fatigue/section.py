@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from tolstat.common.tables import Status
-from tolstat.display import text
+from tolstat.display import drawing, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Text
 from tolstat.display.table import as_block
@@ -76,9 +76,10 @@ def _panel(loading: Loading, channel: str) -> Panel:
         f"Ranges of {channel} that so many cycles a revolution reach, for half, 90 and 99 % of the joints",
         partial(_draw, spectrum=spectrum, revolutions=loading.settings.revolutions),
         (4.9, 3.5),
+        top=drawing.legend_room(rendering.key()[1]),
     )
 
 
 def _draw(ax: Axes, spectrum: pd.DataFrame, revolutions: float) -> None:
     rendering.panel(ax, spectrum, revolutions)
-    ax.legend(*rendering.key(), loc="upper right")
+    drawing.legend_above(ax, *rendering.key())

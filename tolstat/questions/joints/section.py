@@ -12,18 +12,22 @@ from tolstat.common.tables import FAILED, PINS, STATUS_TEXT, UNSETTLED, VALID, M
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
-from tolstat.questions.joints import query
+from tolstat.questions.joints import query, tolerances
 from tolstat.store.view import View
 
 SIGNIFICANT = 0.05
+PARTS = ("larger", "farther from the middle")
 MODE_COLOURS = ("#E6E6E6", style.COLOURS[3], style.COLOURS[1], style.COLOURS[0])
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
-    """Contact modes if the study keeps them, and joints without a valid load once any joint has been simulated."""
+    """Contact modes if the study keeps them, joints without a valid load once any is simulated, tolerances if drawn."""
     found = [_modes_section(view)] if np.isfinite(view.mode_share).any() else []
     if view.count(*VALID, *FAILED, *UNSETTLED):
         found.append(_status_section(view, asked))
+    if view.sampled:
+        with asked.noting("the meaning of the tolerances is not shown"):
+            found.append(tolerances.section(view))
     return found
 
 
@@ -32,11 +36,11 @@ def _modes_section(view: View) -> Section:
     words = [mode.name.lower().replace("_", " ") for mode in Mode]
     rows = [[pin, *(text.percent(share) for share in line)] for pin, line in zip(PINS, view.mode_share, strict=True)]
     said = "; ".join(f"{row[0]}: " + ", ".join(f"{w} {v}" for w, v in zip(words, row[1:], strict=True)) for row in rows)
-    panel = Panel("modes", "Contact modes", said, partial(_modes, view=view, words=words), (4.9, 2.0), 0.6)
+    panel = Panel("modes", "Contact modes", said, partial(_modes, view=view, words=words), (4.9, 2.0), 0.6, 0.28)
     note = "Share of the revolution that each pin spends in each mode, mean of the settled joints. None: the pin "
     note += "touches nothing; one point: one end; two point: both ends, on opposite sides; uniform: along the hole."
     table = Table("Mean share of the revolution", ["pin", *words], rows)
-    return Section("modes", "How the pins touch", [Panels([panel]), table, Text(note, small=True)])
+    return Section("modes", "How the pins touch", [Panels([panel], beside=[table]), Text(note, small=True)])
 
 
 def _modes(ax: Axes, view: View, words: list[str]) -> None:
@@ -66,7 +70,7 @@ def _status_section(view: View, asked: Asked) -> Section:
         with asked.noting("errors of failed and unsettled joints are not compared"):
             table = query.their_errors(view)
     if table is not None:
-        blocks += [Panels([_errors_panel(table)]), Text(_errors_note(table), small=True)]
+        blocks.append(Panels([_errors_panel(table)], beside=[Text(_errors_note(table), small=True)]))
     else:
         said = "Their errors are not compared with those of the others, which takes ten joints or more on either side, "
         blocks.append(Text(said + "drawn from the tolerances with equal weight."))
@@ -87,14 +91,15 @@ def _errors_panel(table: pd.DataFrame) -> Panel:
         f"Probability that a joint without a valid result has the larger error than a settled one. {said}",
         partial(_errors, table=table),
         (4.9, drawing.rows_height(len(top)) + 0.2),
-        drawing.rows_left(list(top["error"])),
+        left := drawing.rows_left(list(top["error"])),
+        drawing.legend_room(PARTS, left),
     )
 
 
 def _errors(ax: Axes, table: pd.DataFrame) -> None:
     top = table.head(10)
     drawing.rows(ax, list(top["error"]))
-    for shift, key, label in ((-0.16, "direction", "larger"), (0.16, "size", "farther from the middle")):
+    for shift, key, label in ((-0.16, "direction", PARTS[0]), (0.16, "size", PARTS[1])):
         colour = style.COLOURS[0 if key == "direction" else 1]
         place = np.arange(len(top)) + shift
         if top[f"{key}_lower"].notna().any():

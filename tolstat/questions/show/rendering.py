@@ -65,7 +65,7 @@ def draw_row(joint: Joint, errors: NDArray[np.void], title: str = "") -> Figure:
     title : str
         Headline.
     """
-    d = query.dimensions(joint, float(errors["operation.alpha"][0]))
+    d = query.dimensions(joint, 0.0)
     panel = sheets.one(query.pairs(joint, errors), d, "Seen along z and along t of each pin", "row")
     return sheets.figure([panel], title or "Errors of one joint")
 

@@ -1,10 +1,13 @@
-"""The joint on the page: a legend of the loads that the verdict names, and the errors of the worst joints, drawn."""
+"""The joint on the page: with the place of a load marked, from all sides, and the errors of the worst joints, drawn."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import replace
+
 import numpy as np
 
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import split
 from tolstat.common.tables import SIMULATED
 from tolstat.display import text
 from tolstat.display.asked import Asked
@@ -18,44 +21,69 @@ LEGEND = (
     "The joint from its own dimensions. Marked: the bushings and pins of the leading loads. Loads of cross1–4 act on "
     "the pins, those of fork1–4 on the arms; their components are along and about the axes e, t, z of each."
 )
-"""Text below the drawings of `legend`."""
+"""Text below the drawings of the joint."""
+WORST = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
+"""Text below the drawings of the worst joints."""
 
 
-def legend(view: View, asked: Asked) -> list[Panel]:
-    """Drawings of the joint in which bushings and pins of the leading loads stand out; empty if it cannot be read."""
+def worst(view: View, load: str, asked: Asked) -> Panel | None:
+    """Drawing of the joint in the view that shows the place of a load, which is marked; None if it cannot be read.
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+    load : str
+        The load; empty for the front view without a mark.
+    asked : Asked
+        Takes a note if there is no drawing.
+    """
     with asked.noting("the joint is not drawn"):
-        alpha = float(view.store.identity["operation.alpha"])
-        marked = sorted({name.rpartition(".")[0] for name in view.leading} - {""})
-        return list(sheets.joint(query.dimensions(joint_of(view.store, 0), alpha), marked))
-    return []
+        place = split(load)[0].rpartition(".")[0]
+        front, side, _ = _joint(view, [place] if place else [])
+        title = "The joint"
+        if place:
+            own = view.load(load)
+            exceeded = own.limit is not None and own.above(own.limit).count
+            title = f"{place}: {'most often above its limit' if exceeded else 'nearest to its limit'}"
+            title = title if own.limit is not None else f"{place}: the largest loads"
+        return replace(side if place.startswith("fork") else front, key="joint-worst", title=title)
+    return None
+
+
+def _joint(view: View, marked: Collection[str]) -> tuple[Panel, Panel, Panel]:
+    alpha = view.parts[0].store.operation.alpha
+    return sheets.joint(query.dimensions(joint_of(view.store, 0), alpha), marked)
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
-    """Errors of the joints with the largest leading loads, enlarged; none for a sweep or without such joints."""
-    if view.method == "sweep":
-        return []
-    with asked.noting("the worst joints are not drawn"):
-        panels = _worst(view)
-        if not panels:
-            return []
+    """Errors of the joints with the largest leading loads, enlarged; the joint from all sides, and its errors."""
+    found = []
+    if view.method != "sweep":
+        with asked.noting("the worst joints are not drawn"):
+            panels = _worst(view)
+            if panels:
+                found.append(Section("drawn", "The worst joints, drawn", [Panels(panels), Text(WORST, small=True)]))
+    with asked.noting("the joint and its errors are not drawn"):
+        marked = sorted({name.rpartition(".")[0] for name in view.leading} - {""})
         joint = joint_of(view.store, 0)
         kinds = sheets.errors(query.positive(joint), query.dimensions(joint, 0.0))
-        said = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
-        return [Section("drawn", "The worst joints, drawn", [Panels([*panels, kinds]), Text(said, small=True)])]
-    return []
+        found.append(Section("joint", "The joint", [Panels([*_joint(view, marked), kinds]), Text(LEGEND, small=True)]))
+    return found
 
 
 def _worst(view: View) -> list[Panel]:
     """One drawing for each joint that has the largest of a leading load."""
     loads: dict[int, list[str]] = {}
     for name in view.leading:
-        values = np.where(np.isin(view.status, SIMULATED), LOADS[name].of(view.results), np.nan)
+        load = view.load(name)
+        values = np.where(np.isin(load.status, SIMULATED), load.values, np.nan)
         sample = int(np.nanargmax(values))
-        loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), LOADS[name].unit)}")
+        loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), load.unit)}")
     panels = []
     for sample, said in loads.items():
         joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
         errors = view.errors(np.array([sample]))
-        d = query.dimensions(joint, float(errors["operation.alpha"][0]))
+        d = query.dimensions(joint, 0.0)
         panels.append(sheets.one(query.pairs(joint, errors), d, f"Row {row}: {', '.join(said)}", f"drawn-{row}"))
     return panels

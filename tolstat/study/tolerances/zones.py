@@ -12,9 +12,10 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
-from tolstat.common import json_schema, units
+from tolstat.common import json_schema, notation, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import dotted, refuse
 from tolstat.study import axes
@@ -47,13 +48,26 @@ MARKS = ("Ⓜ", "(M)")
 """Sign of the maximum material requirement behind the size of a zone."""
 
 
-def _read(value: object) -> Zone:
+def _read(value: object, info: ValidationInfo) -> Zone:
+    written = notation.read(value) if isinstance(value, str) else None
+    if written is not None and written.mark == notation.PLUS_MINUS:
+        raise _band(written, (info.context or {})["site"].name)
     mark = next((mark for mark in MARKS if isinstance(value, str) and value.rstrip().endswith(mark)), None)
     if mark is not None:
         value = str(value).rstrip().removesuffix(mark)
     round_ = units.is_diameter(value)
     size = units.diameter(value) if round_ else units.to_si(value, "m")
     return Zone(units.positive(size), round_, mark is not None)
+
+
+def _band(written: notation.Written, name: str) -> PydanticCustomError:
+    """Fault of a half width in place of a zone."""
+    size = f"{written.number:g} {written.unit}"
+    of, sign, errors = "width", "", "tilt_t and tilt_z"
+    if not name.endswith(ORIENTATIONS):
+        of, sign, errors = "diameter", notation.DIAMETER, "offset_t and offset_z"
+    remedy = f'write the {of} of the zone: "{sign}{size}", or give {errors} with plus_minus in place of a zone'
+    return refuse(f"{{input}} is a band, and a zone has a {of}", remedy)
 
 
 class ZoneEntry(ToleranceEntry):
@@ -63,7 +77,10 @@ class ZoneEntry(ToleranceEntry):
         Zone,
         BeforeValidator(_read),
         WithJsonSchema(json_schema.quantity("m", "⌀0.1 mm")),
-        Field(description="size of the zone; ⌀ or dia before the number say that it is a diameter"),
+        Field(
+            description="size of the zone; ⌀ or dia before the number say that it is a diameter",
+            examples=["⌀0.1 mm"],
+        ),
     ]
     over: Annotated[
         PositiveLength, Field(description="length of the pin or hole that the drawing tolerances", examples=["22 mm"])

@@ -1,0 +1,34 @@
+"""Numbers, units and names as people read them."""
+
+import math
+
+import pytest
+
+from tolstat.display import text
+
+
+@pytest.mark.parametrize(
+    ("x", "unit", "shown"),
+    [
+        (9999.0, "N", "9999 N"),
+        (13200.0, "N", "13.2 kN"),
+        (-2e4, "N*m", "-20 kN m"),
+        (2e4, "1", "20000"),
+        (math.nan, "N", "-"),
+    ],
+)
+def test_large_loads_are_shown_in_multiples_of_their_unit(x, unit, shown):
+    assert text.value(x, unit) == shown
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "shown"),
+    [(7776.0, 36310.0, "7.776 .. 36.31 kN"), (1.0, 2.0, "1 .. 2 N"), (20000.0, math.inf, "20 kN .. needs more joints")],
+)
+def test_both_ends_of_an_interval_have_one_unit(low, high, shown):
+    assert text.span_of(low, high, "N") == shown
+
+
+def test_characters_that_cannot_be_seen_are_shown_by_their_code():
+    assert text.visible("a\u202eb\x00\x1b[31m\u2066") == "a[U+202E]b[U+0000][U+001B][31m[U+2066]"
+    assert text.visible("Übermaß –\tΔ\nعربي") == "Übermaß –\tΔ\nعربي"

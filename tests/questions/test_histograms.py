@@ -1,0 +1,63 @@
+"""Histograms against counts by hand: errors of each entry with their band, loads in linear and logarithmic bins."""
+
+import numpy as np
+import pytest
+
+from tests.support import synthetic
+from tests.support.views import view
+from tolstat.questions.histograms import query
+from tolstat.store import Reader
+
+TOLERANCES = """
+"pin[12].offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 0.5 }
+"hole*.diameter" = { lower = "0 mm", upper = "0.03 mm", distribution = "uniform" }
+"pin3.position" = { zone = "⌀0.1 mm", over = "20 mm", distribution = "uniform" }
+"""
+
+
+def drawn(folder, change=lambda text: text):
+    text = synthetic.STUDY.replace(
+        '"pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }\n', ""
+    )
+    text = change(text.replace("[tolerances]", f"[tolerances]{TOLERANCES}"))
+    with Reader.open(synthetic.store(folder, text)) as store:
+        made = store.view()
+        return query.drawn(made), made.errors(np.arange(made.n)), made.weights
+
+
+def test_errors_of_an_entry_are_counted_together_against_their_band(tmp_path):
+    found, errors, _ = drawn(tmp_path)
+    assert [own.entry for own in found] == ["pin[12].offset_t", "hole*.diameter", "pin3.position", "pin3.position"]
+    offsets = np.concatenate([errors["pin1.offset_t"], errors["pin2.offset_t"]])
+    first, holes, *zones = found
+    assert first.band == pytest.approx((-1e-4, 1e-4))
+    assert first.outside == np.mean(np.abs(offsets) > 1e-4) > 0.05
+    assert first.histogram.share == pytest.approx(np.histogram(offsets, first.histogram.edges)[0] / offsets.size)
+    assert holes.errors == tuple(f"hole{k}.diameter" for k in (1, 2, 3, 4))
+    assert holes.outside == 0.0
+    assert holes.histogram.edges[[0, -1]] == pytest.approx([0.0, 3e-5])
+    assert [(own.band, own.unit) for own in zones] == [(None, "m"), (None, "rad")]
+    assert all(own.histogram.share.sum() == pytest.approx(1.0) for own in found)
+
+
+def test_joints_are_counted_by_weight(tmp_path):
+    proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
+    (first, *_), errors, weights = drawn(
+        tmp_path, lambda text: text.replace("n = 60", 'n = 60\nmethod = "importance"') + proposal
+    )
+    beyond = sum(weights[np.abs(errors[f"pin{k}.offset_t"]) > 1e-4].sum() for k in (1, 2))
+    assert first.outside == pytest.approx(beyond / weights.sum() / 2)
+    assert first.outside != np.mean(np.abs(errors["pin1.offset_t"]) > 1e-4)
+
+
+@pytest.mark.parametrize(("factor", "logarithmic"), [(1.0, False), (9.0, True)])
+def test_loads_with_a_long_tail_have_bins_of_equal_ratio(factor, logarithmic):
+    def change(results):
+        results["F_max"][0] *= factor
+
+    load = view(failed=5, change=change).load("cross1.F")
+    found = query.of_load(load)
+    steps = np.diff(np.log(found.edges) if logarithmic else found.edges)
+    assert steps == pytest.approx(steps[0])
+    assert found.share == pytest.approx(np.histogram(load.valid, found.edges)[0] / load.valid.size)
+    assert found.share.sum() == pytest.approx(1.0)

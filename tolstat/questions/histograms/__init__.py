@@ -1,0 +1,1 @@
+"""What was drawn, and which loads came of it: histograms."""

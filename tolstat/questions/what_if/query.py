@@ -1,0 +1,321 @@
+"""Share of the joints above a limit if a line of the drawing had another width, from joints with the same seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from tolstat.analysis import difference, exceedance, pick_freeze
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.campaign import what_if as sets
+from tolstat.campaign.what_if import EXCHANGE, WIDTH
+from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.shown import shown
+from tolstat.common.strict import did_you_mean
+from tolstat.common.tables import Status
+from tolstat.store import what_if as kept
+from tolstat.store.sample_load import SampleLoad
+from tolstat.store.view import View
+from tolstat.store.what_if import Altered
+from tolstat.study import widths
+from tolstat.study.widths import EXACT, HALF, Line
+
+NEGLIGIBLE = 0.1
+"""Difference of two lines that does not matter for their order, relative to the share of the joints as drawn."""
+TAIL_STARTS_AT = 0.9
+"""Quantile of the load that takes the place of a limit where the study sets none."""
+
+
+@shown
+class WhatIf(NamedTuple):
+    """Share of the joints above a limit with other widths.
+
+    Attributes
+    ----------
+    load, unit : str
+        The load, and its SI unit.
+    level : float
+        The limit; without one, the 90 % quantile of the load.
+    n : int
+        Number of joints as drawn.
+    share, lower, upper : float
+        Share of these above the level, and its interval with failed and unsettled joints.
+    table : DataFrame
+        One row per line and step, lines in the order of their share if half as wide: ``line``, ``size``, ``step``,
+        ``words``, ``factor`` (NaN if it differs within the line), ``n``, ``share`` with ``_lower`` and ``_upper``, and
+        ``change``, the paired difference to the joints as drawn, with ends.
+    indices : DataFrame
+        One row per line: ``line``, ``pairs``; ``alone`` and ``in_all`` with ends, the closed and total Sobol' index of
+        the load, or of its logarithm; ``above_alone`` and ``above_in_all``, those of the event that it is above the
+        level. NaN for correlated lines.
+    logarithmic : bool
+        Whether the logarithm of the load is decomposed.
+    missing : tuple of str
+        Entries of ``[tolerances]`` without joints in the file.
+    settled : bool
+        Whether the order of the lines is settled: neighbours differ, or by less than `NEGLIGIBLE` of the share.
+    """
+
+    load: str
+    unit: str
+    level: float
+    n: int
+    share: float
+    lower: float
+    upper: float
+    table: pd.DataFrame
+    indices: pd.DataFrame
+    logarithmic: bool
+    missing: tuple[str, ...]
+    settled: bool
+
+
+def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
+    """Evaluate the joints with other widths that a file holds.
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances.
+    by : str
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
+    confidence : float
+        Confidence level of all intervals.
+
+    Returns
+    -------
+    WhatIf or None
+        None where the file holds no such joints (`run.simulate` adds them).
+
+    Raises
+    ------
+    InputError
+        When there is no such load, or the study does not keep it.
+    StoreError
+        When the joints are not drawn from tolerances, or differ in weight.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as store:  # doctest: +SKIP
+    ...     found = tolstat.what_if(store.view(), "fork1.F")
+    """
+    check(view)
+    load = view.load(by)
+    held = [one for one in view.altered.values() if one.about["kind"] == WIDTH and by in one.names]
+    base = as_drawn(view, by, view.altered)
+    if not held or not np.isfinite(base).any():
+        return None
+    level = level_of(load)
+    study_lines = widths.lines(view.study)
+    rows = [_row(view, one, base, by, level, confidence) for one in held]
+    table = pd.DataFrame([row for row in rows if row is not None])
+    if table.empty:
+        return None
+    order = _order(table)
+    table = table.sort_values(["line", "step"], key=lambda c: c.map(order | _STEPS), kind="stable", ignore_index=True)
+    above = exceedance.exceedance(base, _states(base), level, confidence)
+    return WhatIf(
+        load=by,
+        unit=load.unit,
+        level=level,
+        n=len(base),
+        share=above.estimate,
+        lower=above.outer_lower,
+        upper=above.outer_upper,
+        table=table,
+        indices=_indices(view, base, load, level, confidence, list(order)),
+        logarithmic=load.long_tailed,
+        missing=tuple(line.label for line in study_lines if line.label not in order),
+        settled=is_settled(halves(view.altered, study_lines, by), base, level, confidence),
+    )
+
+
+def check(view: View) -> None:
+    """Refuse a file whose joints are not drawn from tolerances, differ in weight, or are a part of the campaign's.
+
+    Raises
+    ------
+    StoreError
+        The hint names what can be used.
+    """
+    view.check_drawn()
+    view.check_sample(allow_weights=False)
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
+    if len(view.store.points) > 1:
+        remedy = "run the study with one of its points in [operation]"
+        raise StoreError(str(Fault(str(view.path), "has several operating points", remedy)))
+    if not view.store.whole:
+        remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
+        raise StoreError(str(Fault(str(view.path), "holds a part of the campaign only", remedy)))
+
+
+def level_of(load: SampleLoad) -> float:
+    """Limit of a load; without one, the 90 % quantile of the joints."""
+    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
+
+
+def own_joints(view: View) -> int:
+    """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
+    if view.method != "random":
+        return 0
+    waiting = np.flatnonzero(view.status == Status.PENDING)
+    return int(waiting[0]) if waiting.size else view.n
+
+
+def as_drawn(view: View, load: str, held: Mapping[str, Altered]) -> FloatArray:
+    """Load of the joints as drawn, from sample 0 on, NaN without a valid one, (n,): the campaign's, then fresh ones."""
+    own = own_joints(view)
+    values = view.load(load).valid_or_nan[:own]
+    more = held.get(kept.key(sets.as_drawn(view.study).about))
+    if more is None or load not in more.names or not more.first <= own < more.end:
+        return values
+    return np.concatenate([values, more.valid(load)[own - more.first :]])
+
+
+def halves(held: Mapping[str, Altered], lines: list[Line], load: str) -> list[FloatArray]:
+    """Load of the joints of each line that is half as wide; of those lines that the file has."""
+    by_label = {
+        one.about["label"]: one.valid(load)
+        for one in held.values()
+        if one.about["kind"] == WIDTH and one.about["step"] == HALF and load in one.names
+    }
+    return [by_label[line.label] for line in lines if line.label in by_label]
+
+
+def is_settled(values: list[FloatArray], base: FloatArray, level: float, confidence: float = 0.95) -> bool:
+    """Whether the order of lines by their shares above a level is settled.
+
+    Neighbours in the order are compared joint by joint. Their difference has an interval, at a confidence level that
+    holds for all of them together (Bonferroni); it excludes zero, or lies within `NEGLIGIBLE` of the share as drawn.
+    """
+    if len(values) < 2:
+        return True
+    n = min(len(base), *map(len, values))
+    ranked = sorted(values, key=lambda own: float(np.mean(own[:n] > level)))
+    drawn = float(np.mean(base[:n] > level))
+    own = 1.0 - (1.0 - confidence) / (len(values) - 1)
+    for one, other in pairwise(ranked):
+        found = difference.shares(one[:n], other[:n], [level], paired=True, confidence=own)
+        low, high = float(found.lower[0]), float(found.upper[0])
+        if low <= 0.0 <= high and max(-low, high) > NEGLIGIBLE * drawn:
+            return False
+    return True
+
+
+def best(found: WhatIf) -> Mapping[Any, Any] | None:
+    """Row of the line that lowers the share most if half as wide; None if none surely lowers it."""
+    rows = [row for row in found.table.to_dict("records") if row["step"] == HALF and row["change_upper"] < 0.0]
+    return min(rows, key=lambda row: float(row["share"]), default=None)
+
+
+_STEPS = {step: number for number, step in enumerate(widths.STEPS)}
+
+
+def _order(table: pd.DataFrame) -> dict[str, int]:
+    """Place of each line: by its share if half as wide, then if exact; lines without these behind."""
+    by: dict[str, tuple[int, float]] = {}
+    for row in table.to_dict("records"):
+        rank = {HALF: 0, EXACT: 1}.get(row["step"], 2)
+        by[row["line"]] = min(by.get(row["line"], (3, 0.0)), (rank, row["share"]))
+    return {line: place for place, line in enumerate(sorted(by, key=lambda line: by[line]))}
+
+
+def _row(
+    view: View, one: Altered, base: FloatArray, load: str, level: float, confidence: float
+) -> dict[str, object] | None:
+    n = min(len(base), one.end)
+    if one.first or not n:
+        return None
+    values = one.valid(load)[:n]
+    if not np.isfinite(values).any() or not np.isfinite(values + base[:n]).any():
+        return None
+    own = exceedance.exceedance(values, one.status[:n], level, confidence)
+    pair = difference.shares(base[:n], values, [level], paired=True, confidence=confidence)
+    factors = {own["factor"] for own in one.about["tolerances"].values()}
+    factor = factors.pop() if len(factors) == 1 else np.nan
+    line = Line(one.about["label"], tuple(one.about["tolerances"]))
+    return {
+        "line": line.label,
+        "names": line.names,
+        "size": widths.size(view.study, line),
+        "step": one.about["step"],
+        "words": one.about["words"],
+        "factor": factor,
+        "n": n,
+        "share": own.estimate,
+        "share_lower": own.outer_lower,
+        "share_upper": own.outer_upper,
+        "change": float(pair.estimate[0]),
+        "change_lower": float(pair.outer_lower[0]),
+        "change_upper": float(pair.outer_upper[0]),
+    }
+
+
+def _states(values: FloatArray) -> NDArray[np.uint8]:
+    """Status of joints as drawn: valid, or failed where they have no valid load."""
+    return np.where(np.isfinite(values), Status.OK, Status.NEWTON_FAILED).astype(np.uint8)
+
+
+def _indices(
+    view: View, base: FloatArray, load: SampleLoad, level: float, confidence: float, order: list[str]
+) -> pd.DataFrame:
+    held = {one.about["label"]: one for one in view.altered.values() if one.about["kind"] == EXCHANGE}
+    rows = []
+    for label in order:
+        one = held.get(label)
+        n = 0 if one is None else min(one.end, len(base) // 2)
+        if one is None or one.first or n < pick_freeze.FEWEST or load.name not in one.names:
+            continue
+        a, b, ab = base[: 2 * n : 2], base[1 : 2 * n : 2], one.valid(load.name)[:n]
+        row: dict[str, object] = {"line": label, "pairs": n}
+        for name, parts in (("", _decomposed(a, b, ab, load.long_tailed)), ("above_", _event(a, b, ab, level))):
+            try:
+                found = pick_freeze.indices(parts[0], parts[1], parts[2][:, None], confidence)
+            except ValueError:  # too few joints with a load, or none, or all of them, above the level
+                continue
+            for word, index in (("alone", found.first), ("in_all", found.total)):
+                for end, value in zip(("", "_lower", "_upper"), index, strict=True):
+                    row[f"{name}{word}{end}"] = float(value[0])
+        rows.append(row)
+    words = [f"{name}{word}{end}" for name in ("", "above_") for word in ("alone", "in_all") for end in _ENDS]
+    return pd.DataFrame(rows, columns=["line", "pairs", *words])
+
+
+_ENDS = ("", "_lower", "_upper")
+
+
+def _decomposed(a: FloatArray, b: FloatArray, ab: FloatArray, log: bool) -> tuple[FloatArray, ...]:
+    return tuple(np.log(values) if log else values for values in (a, b, ab))
+
+
+def _event(a: FloatArray, b: FloatArray, ab: FloatArray, level: float) -> tuple[FloatArray, ...]:
+    return tuple(np.where(np.isfinite(values), values > level, np.nan) for values in (a, b, ab))
+
+
+def find_lines(view: View, each: str, groups: list[str]) -> list[Line]:
+    """Lines to change: the entries of the study, or its features or single errors; and the groups that a user names.
+
+    Raises
+    ------
+    InputError
+        With every fault of the groups; `each` is none of ``entry``, ``feature``, ``error``.
+    """
+    kinds = {"entry": widths.lines, "feature": widths.features, "error": widths.errors}
+    if each not in kinds:
+        raise InputError([Fault("--each", f"{each!r} is not allowed", did_you_mean(each, list(kinds)))])
+    return [*kinds[each](view.study), *widths.named(view.study, groups)]
+
+
+def independent(view: View, line: Line) -> bool:
+    """Whether no error of a line is correlated with one of another line, so that it can be exchanged."""
+    copula = view.study.copula
+    own = [k for k, name in enumerate(copula.names) if name in line.names]
+    others = [k for k, name in enumerate(copula.names) if name not in line.names]
+    return not np.any(copula.matrix[np.ix_(own, others)]) if own and others else True

@@ -104,13 +104,16 @@ def map_in_processes(
 def kept_workers() -> Iterator[None]:
     """Keep workers that have nothing left to do for the next map inside that does the same work."""
     global _kept
-    before, _kept = _kept, []
+    if _kept is not None:  # somebody above keeps them
+        yield
+        return
+    _kept = []
     try:
         yield
     finally:
         for worker in _kept:
             _end_worker(worker)
-        _kept = before
+        _kept = None
 
 
 class _Task(NamedTuple, Generic[BlockT]):

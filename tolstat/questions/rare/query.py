@@ -286,11 +286,12 @@ def repeated(
     `run`.
     """
     found = []
-    for k in range(repeats):
-        own = replace(plan, sampling=plan.sampling.model_copy(update={"seed": plan.sampling.seed + k}))
-        path = out.with_name(f"{out.stem}_{k + 1}{out.suffix}") if k else out
-        tell(f"seed {own.sampling.seed}: {path}")
-        found.append(run(own, path, workers, tell, progress))
+    with kept_workers():
+        for k in range(repeats):
+            own = replace(plan, sampling=plan.sampling.model_copy(update={"seed": plan.sampling.seed + k}))
+            path = out.with_name(f"{out.stem}_{k + 1}{out.suffix}") if k else out
+            tell(f"seed {own.sampling.seed}: {path}")
+            found.append(run(own, path, workers, tell, progress))
     return found
 
 

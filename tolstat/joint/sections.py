@@ -99,8 +99,8 @@ class Pin(Strict):
     l: Annotated[  # noqa: E741
         Length,
         Field(
-            description="length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque of the "
-            "bushing is the force times l, or up to l + z/2"
+            description="length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque "
+            "of the bushing is the force times l, or up to l + z/2"
         ),
     ]
     d: Annotated[Diameter, Field(description="diameter of the beam")]

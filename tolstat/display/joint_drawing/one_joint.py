@@ -128,7 +128,7 @@ def _numbers(ax: Axes, pair: Pair) -> None:
 
 def _written(kind: str, value: float) -> str:
     if kind.startswith("tilt"):
-        number = f"{np.degrees(value):.2f}"
+        number = f"{np.degrees(value):.4f}"
     else:
         number = f"{1e6 * value:.{0 if abs(value) >= 1e-4 else 1}f}"
     return number.replace("-", "−") if float(number) else "0"

@@ -121,7 +121,11 @@ def test_a_finer_fit_keeps_the_limit_at_the_basic_size(tmp_path):
     holes = '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }'
     plan = loaded(tmp_path, TEXT.replace(holes, fit))
     hole, pin = line(plan, "hole*.diameter"), line(plan, "pin*.diameter")
-    assert [widths.words(plan, own, FINER) for own in (hole, pin)] == ["H6", "f6"]
+    assert [widths.words(plan, own, FINER) for own in (hole, pin)] == [
+        "H6 (mean clearance −2.75 µm)",  # radial: half of 9.5 - 15 um
+        "f6 (mean clearance −2.75 µm)",
+    ]
+    assert widths.words(plan, pin, COARSER) == "f8 (mean clearance +4 µm)"
     ends = np.array([0.0, 1.0])
     middle = 15e-6  # of H7, which the nominal diameter is
     found = widths.changed(plan, hole, FINER)["hole1.diameter"].ppf(ends) + middle
@@ -307,12 +311,13 @@ def test_command_and_page(path, monkeypatch):
     assert "--run" in shown.stderr
     with Reader.open(path) as store:
         (section,) = sections(store.view(), Asked(path))
-    assert f"tolstat causes {path.name} --run" in section.blocks[0].text
+    assert f"tolstat causes {path.name} --run; then this page again: tolstat report" in section.blocks[0].text
     monkeypatch.setattr(runner, "available_workers", lambda: 1)
     shown = run("--run", "--budget", "1 min", "--top", "2", "--workers", "1")
     assert shown.exit_code == 0, shown.output
     assert "lines, 400 joints of each change" in shown.stderr
     assert shown.stdout.startswith("cross1.F > 700 N: ")
+    assert "\n\nscatter of cross1.F over all joints, not of exceeding the limit; by error:\nerror " in shown.stdout
     assert max(map(len, shown.stdout.splitlines())) <= 80
     told = json.loads(run("--json").stdout)["what_if"]
     assert told["load"] == "cross1.F"

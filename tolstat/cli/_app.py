@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from tolstat.display.table import Column
     from tolstat.joint import Joint
     from tolstat.report import Report
-    from tolstat.study.model import Sampling
+    from tolstat.study import Study
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load."
 EPILOG = (
@@ -225,11 +225,15 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
-def warn_without_interval(sampling: Sampling) -> None:
-    """Print a warning if shares of a study's sampling have no interval."""
+def print_study_warnings(path: Path, study: Study) -> None:
+    """Print the warnings of a study: of its joints, common axes that are too short, shares without an interval."""
     from tolstat.campaign.remedy import without_interval
+    from tolstat.study.tolerances import zones
 
-    if said := without_interval(sampling.method, sampling.replicates):
+    print_warnings(path, study.joints, study.variants)
+    for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):
+        warn(f"warning: {study.fault(key, found, remedy)}")
+    if said := without_interval(study.sampling.method, study.sampling.replicates):
         warn(f"warning: {said}")
 
 

@@ -154,7 +154,7 @@ def causes(
         typer.echo(whatifs.heading(lines))
         print_table(whatifs.columns(lines), whatifs.rows(lines), wide)
         say(whatifs.note(lines))
-        typer.echo()
+        typer.echo(f"\n{rendering.heading(found)}")
     elif not found.from_design:
         say(f"which line of the drawing to change: tolstat causes {file} --run")
     print_table(rendering.columns(found), rendering.largest(found, top), wide)

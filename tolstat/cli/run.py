@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Wide, Workers, announce_compilation, print_warnings, tell, warn_without_interval, width_of
+from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_warnings, tell, width_of
 from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
@@ -123,8 +123,7 @@ def run(
         again = None if retry is None else parse(retry, settings or (), plan)
     if faults:
         raise InputError(faults)
-    print_warnings(study_file, plan.joints, plan.variants)
-    warn_without_interval(plan.sampling)
+    print_study_warnings(study_file, plan)
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:
         simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)

@@ -194,12 +194,13 @@ class Page:
 
     Attributes
     ----------
-    title, subtitle : str
-        Name of the study, and a sentence on the number of joints.
+    title, description, subtitle : str
+        Name of the study, text about its joint, and a sentence on the number of joints.
     sections : sequence of Section
         In reading order; none is empty.
     """
 
     title: str
+    description: str
     subtitle: str
     sections: Sequence[Section]

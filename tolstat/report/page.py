@@ -18,6 +18,7 @@ from tolstat.report import html, joint_values, verdict
 from tolstat.solver import fidelity
 from tolstat.store import viewed
 from tolstat.store.integrity import DIGEST
+from tolstat.store.recorded import joint_of
 from tolstat.store.result_file import BLOCK
 from tolstat.store.worst import point_of
 
@@ -99,7 +100,8 @@ def compose(view: View, asked: Asked) -> Page:
     provenance = Section("provenance", "Provenance", [facts, joint_values.listing(view.store), text])
     lead = [section for section in sections if section.lead]
     rest = [section for section in sections if not section.lead]
-    return Page(view.name, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
+    described = joint_of(view.store, 0).description
+    return Page(view.name, described, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
 
 
 def _stopped(view: View) -> str:

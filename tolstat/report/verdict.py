@@ -137,7 +137,7 @@ def _basis(view: View) -> list[Card]:
     if usual and view.verification:
         kind = max(usual, key=lambda name: usual[name])
         label = f"numerical error of the largest loads ({kind})"
-        cards.append(Card(text.percent(usual[kind]), label, accuracy.basis(view.verification)))
+        cards.append(Card(accuracy.in_percent(usual[kind]), label, accuracy.basis(view.verification)))
     return cards
 
 

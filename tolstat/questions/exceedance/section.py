@@ -15,6 +15,7 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Reader, Section, Table, Text
 from tolstat.display.table import as_block
 from tolstat.questions.exceedance import query, rendering, sweep
+from tolstat.store.recorded import joint_of
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
@@ -42,11 +43,23 @@ def sections(view: View, asked: Asked) -> list[Section]:
 def _note(view: View) -> str:
     said = text.sentence(rendering.note(view))
     if len(view.nominal):
-        said += " Triangle: the joint without errors."
+        said += f" Triangle: the joint without errors.{_beyond(view)}"
     if len(view.points) > 1:
         said += " Loads are the largest over all operating points, unless they name some."
     missing = view.missing()
     return f"{said} {text.sentence(missing)}" if missing else said
+
+
+def _beyond(view: View) -> str:
+    """Why the force without errors is smaller than T/(2 R); empty where it is not, or at several operating points."""
+    forces = [view.load(name).nominal for name in ("cross1.F", "cross2.F") if name in view.bushing_loads]
+    if not forces or len(view.points) > 1:
+        return ""
+    torque, radius = abs(view.store.operation.torque), joint_of(view.store, 0).cross.R
+    if not max(forces) < torque / (2.0 * radius):
+        return ""
+    at_middle = text.value(torque / (2.0 * radius), "N")
+    return f" Its force on the cross is below T/(2 R) = {at_middle}: without errors pins bear at their outer ends."
 
 
 def _described(load: SampleLoad) -> str:

@@ -33,7 +33,8 @@ def _missing(asked: Asked) -> list[Block]:
     said = (
         "Not in the file yet. To simulate the same joints with each tolerance half as wide, exact, finer and coarser: "
     )
-    return [Text(f"{said}tolstat causes {asked.path.name} --run")]
+    again = f"then this page again: tolstat report {asked.path.name} --out PAGE.html"
+    return [Text(f"{said}tolstat causes {asked.path.name} --run; {again}")]
 
 
 def _blocks(found: query.WhatIf, asked: Asked) -> list[Block]:

@@ -58,16 +58,22 @@ def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=Non
     if alpha is not None:
         errors["operation.alpha"] = alpha - OPERATION.alpha
     made = View(FakeStore(method, limits, errors, results, columns=columns, joint=joint))
-    made.verification, made.altered = None, {}
+    made.verification, made.near, made.altered = None, None, {}
     return made
 
 
-def at_points(results, limits=None, method="random"):
-    """View of the same joints at several operating points, from their tables of results by name of the point."""
+def at_points(results, limits=None, method="random", joint=None, points=()):
+    """View of the same joints at several operating points, from their tables of results by name of the point.
+
+    `joint` holds the sections of a joint file; `points` take the place of those with equal operation and share.
+    """
     n = len(next(iter(results.values())))
-    made = View(FakeStore(method, limits or {}, synthetic.errors(n), results))
+    store = FakeStore(method, limits or {}, synthetic.errors(n), results, joint=joint)
+    store.points |= {point.name: point for point in points}
+    made = View(store)
     for part in made.parts:
         part.verification = None
+    made.altered = {}
     return made
 
 
@@ -83,5 +89,5 @@ def swept(second=1, limits=None, named=True, columns=RESULT_COLUMNS, change=None
         change(results[1:])
     keys = '[sweep]\n"pin*.diameter" = { from = "-0.1 mm" }\npin1.tilt_z = { from = "0.5 deg" }\n' if named else ""
     made = View(FakeStore("sweep", limits or {}, errors, results, keys, columns))
-    made.verification, made.altered = None, {}
+    made.verification, made.near, made.altered = None, None, {}
     return made

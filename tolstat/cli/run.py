@@ -57,9 +57,9 @@ def run(
         typer.Option(
             "--joint-timeout",
             metavar="TIME",
-            help="Time limit of a joint, with unit s, min or h; if exceeded twice, its status is timeout.",
+            help="Processor time without progress, with unit s, min or h; a joint that exceeds it twice is a timeout.",
         ),
-    ] = "300 s",
+    ] = "60 s",
     retry: Annotated[
         str | None,
         typer.Option(
@@ -83,7 +83,7 @@ def run(
         typer.Option(
             "--until",
             metavar="RULE",
-            help='Stop when a 95 % interval is narrow enough: "P(cross1.F > 700 N) width < 0.01".',
+            help='Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".',
         ),
     ] = None,
     verify: Annotated[
@@ -105,6 +105,7 @@ def run(
     from tolstat import study
     from tolstat.campaign.blocks import Execution
     from tolstat.campaign.retry import parse
+    from tolstat.common.files import check_target
 
     limit, part, again = 0.0, None, None
     faults = _cannot_be_combined(rows, until, retry, settings)
@@ -114,6 +115,9 @@ def run(
         limit = parse_time(joint_timeout)
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
+    path = out if out is not None else Path(f"{study_file.stem}.h5")
+    with gather(faults):
+        check_target(path)  # now, not when the pictures of the report are written
     with gather(faults):
         plan = study.load(study_file, n=n)
         again = None if retry is None else parse(retry, settings or (), plan)
@@ -121,7 +125,6 @@ def run(
         raise InputError(faults)
     print_warnings(study_file, plan.joints, plan.variants)
     warn_without_interval(plan.sampling)
-    path = out if out is not None else Path(f"{study_file.stem}.h5")
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:
         simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
@@ -239,18 +242,17 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
     from tolstat.campaign import stop_rule
     from tolstat.store import Reader
 
-    rule = stop_rule.parse(text)
+    rule = stop_rule.parse(text, plan.limits)
     with progress() as shown:
         run = partial(campaign.run, plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
         outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
     look = outcome.look
-    n_looks = len(outcome.looks)
     say(
         f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
         f"{look.above} above, {look.n_unresolved} failed or not settled\n"
-        f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f} "
-        "(failed and unsettled joints: below at its lower end, above at its upper end), "
-        f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; the intervals in the report are not corrected"
+        f"share above {look.estimate:.5f}, corrected for the stop; {100 * stop_rule.CONFIDENCE:.0f} % interval "
+        f"{look.lower:.5f} to {look.upper:.5f} (failed and unsettled joints: below at its lower end, above at its "
+        "upper end), valid after any number of looks; shares and intervals in the report are not corrected"
     )
     with Reader.open(path) as store:
         return store.counts()

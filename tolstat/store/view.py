@@ -130,6 +130,11 @@ class View:
         return verification.read(self.store)
 
     @cached_property
+    def near(self) -> Verification | None:
+        """The verification of joints near limits that the file holds, if any."""
+        return verification.read(self.store, verification.NEAR)
+
+    @cached_property
     def altered(self) -> dict[str, Altered]:
         """Loads of joints with other tolerances that the file holds, by the digest of the change."""
         return what_if.read(self.store)
@@ -192,6 +197,8 @@ class View:
     def load(self, name: str) -> SampleLoad:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
 
+        Its limit is the one of that name or, without it, the one that holds at these points.
+
         Raises
         ------
         InputError
@@ -203,19 +210,21 @@ class View:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
             view, plain = self.narrowed(name)
             if view is not self:
-                self._loads[name] = replace(view.load(plain), name=name, limit=self.limits.get(name))
+                own = view.load(plain)
+                self._loads[name] = replace(own, name=name, limit=self.limits.get(name, own.limit))
                 return self._loads[name]
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
             if not selected_results.holds(self.columns, name):
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
-            load = LOADS[name]
+            load, skip = LOADS[name], self.store.first_sample
+            drawn = None if self.weights is None else frozen(self.store.origin()["component"][skip:] == 0)
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
             values, _, (lower, upper) = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = SampleLoad(
                 name, load.unit, self.limits.get(name), nominal, frozen(values), (frozen(lower), frozen(upper)),
-                self.status, self.weights, self.iid, self.store.heaviest, self.replicates,
+                self.status, self.weights, self.iid, self.store.heaviest, self.replicates, drawn,
             )  # fmt: skip
         return self._loads[name]
 
@@ -384,7 +393,8 @@ class View:
         pending = self.counts.total - self.counts.done
         text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)})"
         if all(self.points):
-            text += f" at {self.points[0]}" if len(self.points) == 1 else f", the worst of {', '.join(self.points)}"
+            *others, last = self.points
+            text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"
         text += f", {self.counts.shortfall}"
         return text + (f", {pending} still pending" if pending else "")
 

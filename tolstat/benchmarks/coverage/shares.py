@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import capability, cycles, damage, exceedance, quantile, replicates, strength
+from tolstat.analysis import capability, cycles, damage, exceedance, quantile, replicates, sequential, strength
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.benchmarks.coverage.laws import Law, fresh_share, laws
 from tolstat.benchmarks.coverage.trial import Asked, Experiment, Found
-from tolstat.campaign import stop_rule
 from tolstat.common.tables import Status
 from tolstat.questions.capability.query import NOT_NORMAL
 
@@ -200,15 +199,14 @@ def _replicated(method: str, dimensions: int, share: float, n: int = 1024, parts
 
 def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
     """A campaign that looks at its interval until it is narrow."""
-    looks = stop_rule.looks(width, most)
+    scheme = sequential.scheme(width, sequential.looks(width, most))
 
     def once(rng: Rng) -> list[Found]:
-        above, joints, ends = 0, 0, (0.0, 1.0)
-        for look in looks:
+        above, joints, number = 0, 0, 0
+        for number, look in enumerate(scheme.looks):
             above, joints = above + int(rng.binomial(look - joints, share)), look
-            ends = stop_rule.interval(above, 0, joints, len(looks))
-            if ends[1] - ends[0] < width:
+            if scheme.narrow(number, above):
                 break
-        return [Found(*ends, share)]
+        return [Found(*scheme.interval(number, above), share)]
 
     return Experiment((Asked("share at a stop", f"any law, {share:g}, narrower than {width:g}", most),), once)

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import load_of, unit_text
+from tolstat.common.loads import load_of, split, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
@@ -46,8 +46,9 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
-        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
-        `_error_budget`. Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
+        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
+        `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
+        Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `SampleLoad.supports`.
     """
     rows = []
@@ -56,6 +57,9 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         head = {"load": name, "unit": load.unit, "nominal": load.nominal}
         budget = _error_budget(view, load, level, confidence)
         row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
+        # the load with its numerical error, where that is known
+        top = (error_budget.shifted(view, load) or (load, load))[1]
+        row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
         rows.append(row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan))
     return pd.DataFrame(rows)
 
@@ -160,14 +164,15 @@ def readings(view: View) -> dict[str, Any]:
     Returns
     -------
     dict
-        By load: ``unit``; ``n``, ``failed``, ``unsettled``; ``start``, index of the level shown first (nearest to the
-        limit or, without one, to the 90 % quantile); lists of equal length ``x``, ``count``, ``share`` and, for
-        independent samples, ``lower``, ``upper``, ``outer_lower``, ``outer_upper``, otherwise ``bound_lower``,
-        ``bound_upper``.
+        By load, and by load at the operating points that a limit names: ``unit``; ``n``, ``failed``, ``unsettled``;
+        ``start``, index of the level shown first (nearest to the limit or, without one, to the 90 % quantile); lists of
+        equal length ``x``, ``count``, ``share`` and, for independent samples, ``lower``, ``upper``, ``outer_lower``,
+        ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``.
     """
     found = {}
     ends = ("lower", "upper", "outer_lower", "outer_upper") if view.has_intervals else ("bound_lower", "bound_upper")
-    for load in view.loads(view.shown_loads):
+    named = [name for name in view.limits if split(name)[1]]
+    for load in view.loads([*view.shown_loads, *named]):
         if not load.valid.size:
             continue
         x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)

@@ -7,7 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import capability, cycles, damage, exceedance, quantile, replicates, sequential, strength
+from tolstat.analysis import (
+    capability,
+    cycles,
+    damage,
+    exceedance,
+    prediction,
+    quantile,
+    replicates,
+    sequential,
+    strength,
+)
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.benchmarks.coverage.laws import Law, fresh_share, laws
 from tolstat.benchmarks.coverage.trial import Asked, Experiment, Found
@@ -41,8 +51,10 @@ def experiments() -> Iterator[Experiment]:
         for dimensions in (3, 10):
             for share in (0.5, 0.05, 0.005):
                 yield _replicated(method, dimensions, share)
-    for share in (0.5, 0.05, 0.002):
+    for share in SHARES:
         yield _until(share)
+        for n in (100, 1024):
+            yield _delivered(share, n)
 
 
 def ok(n: int) -> FloatArray:
@@ -195,6 +207,20 @@ def _replicated(method: str, dimensions: int, share: float, n: int = 1024, parts
         return [Found(row["lower"], row["upper"], share), Found(own.lower, own.upper, level)]
 
     return Experiment(asked, once)
+
+
+def _delivered(share: float, n: int) -> Experiment:
+    """Joints above a limit in the next delivery, a random number itself."""
+    number = prediction.DELIVERY
+    case = f"any law, {share:g}, {number} joints delivered"
+
+    def once(rng: Rng) -> list[Found]:
+        above, truth = int(rng.binomial(n, share)), float(rng.binomial(number, share))
+        lower, upper = exceedance.clopper_pearson(above, n, prediction.half(0.95))
+        ends = prediction.of_counts(above, above, n, number), prediction.of_share(float(lower), float(upper), number)
+        return [Found(*own, truth) for own in ends]
+
+    return Experiment((Asked("next delivery", case, n), Asked("next delivery, from a share", case, n)), once)
 
 
 def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:

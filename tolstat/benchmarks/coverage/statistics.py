@@ -36,6 +36,8 @@ STATISTICS = {
     "mean time above": Statistic("`time-above`", ABOUT),
     "share of failed parts": Statistic("`fatigue`", LEAST),
     "yield and ppm": Statistic("`capability`", LEAST),
+    "next delivery": Statistic("`report`, `capability`", LEAST),
+    "next delivery, from a share": Statistic("`reweight`, `fatigue`, `rare`", LEAST, "as the share"),
     "Cpk, normal": Statistic("`capability`", ABOUT, "loads that are not normal (p < 0.01)"),
     "Cpk from quantiles": Statistic("`capability`", LEAST, "few joints: the lower end is at most 0"),
     "share at a stop": Statistic("`run --until`", LEAST, "Sobol' points, Latin hypercubes"),

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from tolstat.analysis.exceedance import clopper_pearson
 
 FloatArray = NDArray[np.float64]
+SURE = 0.9999
+"""Confidence level at which an interval is said to miss: hundreds of cases are judged, by both sides."""
 
 
 class Asked(NamedTuple):
@@ -131,5 +133,5 @@ class Row(NamedTuple):
         return hits / self.given, float(lower), float(upper)
 
     def misses_surely(self, most: float) -> bool:
-        """Whether the interval of the share of misses on one side lies above `most`."""
-        return bool(max(clopper_pearson([self.above, self.below], self.given)[0]) > most)
+        """Whether the interval of the share of misses on one side lies above `most`, with the confidence `SURE`."""
+        return bool(max(clopper_pearson([self.above, self.below], self.given, SURE)[0]) > most)

@@ -49,7 +49,8 @@ def of_unit(own: Mapping[str, Any]) -> str:
 
 
 def _first(own: Mapping[str, Any]) -> Mapping[str, Any]:
-    return (own.get("prefixItems") or [{}])[0]  # type: ignore[no-any-return]
+    items: list[Mapping[str, Any]] = own.get("prefixItems") or [{}]
+    return items[0]
 
 
 def kind(own: Mapping[str, Any]) -> str:

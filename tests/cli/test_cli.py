@@ -23,6 +23,7 @@ from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
 from tolstat.display import text
+from tolstat.questions import QUESTIONS
 from tolstat.store import Reader
 
 COMMANDS = (
@@ -94,6 +95,13 @@ def test_help_lists_the_commands_in_order_each_with_its_whole_summary():
     assert headings == [*cli.COMMANDS, "Measure tolstat itself"]
     assert max(map(len, shown.splitlines())) <= 80
     assert "..." not in groups
+
+
+def test_commands_of_questions_stand_under_their_headings_once():
+    listed = [(heading, name) for heading, names in cli.COMMANDS.items() for name in names]
+    assert len(set(listed)) == len(listed)
+    assert {(question.heading, name) for question in QUESTIONS for name in question.commands} <= set(listed)
+    assert [question.name for question in QUESTIONS if bool(question.heading) != bool(question.commands)] == []
 
 
 def test_a_file_may_be_named_like_an_instrument(tmp_path, monkeypatch):

@@ -70,7 +70,7 @@ def test_default_joint_holds_the_printed_numbers(joint):
 
 
 def test_stiffness_coefficients_and_damping_can_follow_from_geometry():
-    j = joints.load("cirelli2021", {"material": {"E": "105 GPa"}}, "case.toml")
+    j = joints.load("cirelli2021", {"material": {"E": "105 GPa", "G": "79 GPa"}}, "case.toml")
     assert_allclose(j.k_cross, [3.27e9, 2.21e9, 2.21e9, 4.44e5, 2.95e5, 2.95e5], rtol=4e-3)
     assert_allclose(j.k_fork, [2.14e9, 2.14e9, 3.41e9, 0.955e6, 1.16e5, 8.08e5], rtol=4e-3)
     k1u, k2u, k1p, k2p = j.contact.coefficients()

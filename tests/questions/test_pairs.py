@@ -7,6 +7,7 @@ import pytest
 
 import tolstat
 from tests.support import synthetic
+from tests.support.views import OPERATION
 from tolstat import sampling, study
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import ERROR, PINS, Simulation
@@ -41,7 +42,7 @@ def path(tmp_path):
     plan = study.load(source)
     errors = sampling.draw(plan)
     results = synthetic.results(plan.rows)
-    use = combinations(errors, perturb(plan.joint, errors))[MISSED]
+    use = combinations(errors, perturb(plan.joint, plan.operation, errors))[MISSED]
     results["F_max"][:, 0] = 640.0 + 800.0 * use + np.random.default_rng(1).normal(0.0, 5.0, plan.rows)
     with ResultStore.create(tmp_path / "made.h5", plan, errors) as store:
         store.write(np.arange(plan.rows), Simulation(results, None))
@@ -65,9 +66,9 @@ def test_motions_of_the_cross_use_no_clearance():
     for pin, own in shifts.items():
         errors[f"{pin}.offset_z"] = 1e-5 * np.array(own)
     joint = load("cirelli2021", {}, "test")
-    np.testing.assert_allclose(combinations(errors, perturb(joint, errors))[MISSED], 0.0, atol=1e-12)
+    np.testing.assert_allclose(combinations(errors, perturb(joint, OPERATION, errors))[MISSED], 0.0, atol=1e-12)
     errors["pin1.offset_z"] += 4e-5
-    np.testing.assert_allclose(combinations(errors, perturb(joint, errors))[MISSED], 4e-5 / 4e-4, rtol=1e-9)
+    np.testing.assert_allclose(combinations(errors, perturb(joint, OPERATION, errors))[MISSED], 4e-5 / 4e-4, rtol=1e-9)
 
 
 def test_equal_tilts_of_pin_and_hole_use_no_clearance():
@@ -77,7 +78,7 @@ def test_equal_tilts_of_pin_and_hole_use_no_clearance():
         errors[f"{pin}.tilt_t"] = errors[f"{HOLE_OF_PIN[pin]}.tilt_t"] = 1e-3
     errors["pin2.tilt_t"][1] = -1e-3
     joint = load("cirelli2021", {}, "test")
-    found = combinations(errors, perturb(joint, errors))
+    found = combinations(errors, perturb(joint, OPERATION, errors))
     reach = np.abs(joint.contact.springs().s).max()
     np.testing.assert_allclose(found["tilt of pin2 against hole3 about t"], [0.0, 2e-3 * reach / 1e-4], rtol=1e-9)
     assert found["largest tilt of a pin against its hole about t"][0] == 0.0

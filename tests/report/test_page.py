@@ -117,7 +117,7 @@ def test_every_picture_has_a_title_and_a_description(html):
             assert re.search(rf'id="{name}">[^<]{{10,}}<', html), name
 
 
-@pytest.mark.parametrize("replay", [0, 100])
+@pytest.mark.parametrize("replay", [pytest.param(0, marks=pytest.mark.slow), 100])
 def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypatch, replay):
     """Reads of each dataset, in rows; joints that the page draws over the revolution are simulated again."""
     read, plain = Counter(), Reader.column
@@ -295,7 +295,7 @@ def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
 def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
     page.write_page(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, replay=0)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert Reading(text).sections == ["verdict", "limits", "histograms", "tolerances", "joint", "failed", "provenance"]
+    assert Reading(text).sections == ["verdict", "limits", "histograms", "joint", "failed", "tolerances", "provenance"]
     assert text.count(">no verdict<") == 8
 
 

@@ -239,6 +239,7 @@ def test_report_of_a_sweep_into_another_folder(tmp_path):
     assert table["pin*.diameter [mm]"].iloc[[0, -1]].tolist() == pytest.approx([-0.1, 0.1])
 
 
+@pytest.mark.slow
 def test_same_file_same_bytes(tmp_path):
     path = synthetic.store(tmp_path)
     first = [file.read_bytes() for file in report.write_report(path)]

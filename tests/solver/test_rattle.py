@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -72,10 +73,10 @@ def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order() -> None:
     params = np.concatenate([joints(15, 3000, 100, [0, 7, 10, 13, 19]), joints(30, 1500, 100, [10, 13])])
     options = FOLLOWING._replace(max_revs=24)
 
-    def run(how: object, these: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def run(how: Callable[..., Iterable[object]], these: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         results = np.zeros(len(these), RESULT).view(np.recarray)
         blocks = np.zeros((len(these), options.max_revs), RESULT).view(np.recarray)
-        list(how(these, options, False, results, blocks))  # type: ignore[operator]
+        list(how(these, options, False, results, blocks))
         return results.view(np.ndarray), blocks.view(np.ndarray)
 
     together, blocks = run(simulation._together, params)

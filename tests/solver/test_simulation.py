@@ -236,7 +236,7 @@ def test_any_clearance_starts(params, clearance):
         {"pin2__diameter": 3e-4},
         {"operation__alpha": np.pi / 2},
         {"operation__alpha": 2.0},
-        {"operation__speed": 0.0},
+        {"speed": 0.0},
         {"operation__torque": np.nan},
         {"material__E_factor": 0.0},
         {"material__E_factor": -0.5},
@@ -316,7 +316,7 @@ from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.revolution import simulate
 from tolstat.common.tables import KERNEL_RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
-par = joint.perturb(joint.load("cirelli2021", {}, "test", None), joint.nominal_errors(1))
+par = joint.perturb(joint.load("cirelli2021", {}, "test", None), operation, joint.nominal_errors(1))
 par = par.view(np.recarray)
 """
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import signals, verify
-from tolstat.campaign.blocks import Execution, Stages, pending, simulate_pending
+from tolstat.campaign.blocks import Execution, Finished, Stages, pending, simulate_pending
 from tolstat.campaign.executors import WorkerDied
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
@@ -134,19 +134,9 @@ def run(
                 stages.warm_up()
                 store.begin_session(counts.done)
             stage(JOINTS)
-            if progress:
-                progress(counts)
             finished = simulate_pending(study, store, last, stages, execution, stop)
             with stop.deferred(), closing(finished):
-                for done in finished:
-                    store.at(done.point).write(done.slots, done.simulation)
-                    counts = counts.after(done.simulation.results["status"])
-                    if done.trouble:
-                        status = Status(done.simulation.results["status"][0])
-                        place = f"row {store.rows[done.slots[0]]}" + (f" at {done.point}" if done.point else "")
-                        tell(f"{place}: {status.label}: {done.trouble}")
-                    if progress:
-                        progress(counts)
+                counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
                 stage("check of the numerical error")
                 for one in store.each():
@@ -157,11 +147,30 @@ def run(
             store.end_session()
             raise Interrupted(path, store.counts(), stop.number) from None
         except WorkerDied as error:
-            kept = f"{path} holds the results of {counts.done} of {counts.total} joints"
+            held = store.counts()
+            kept = f"{path} holds the results of {held.done} of {held.total} joints"
             raise WorkerDied(f"{error}\n  {kept}; to resume, run the same command again") from error
         if next(pending(store, last), None) is not None:
             raise Interrupted(path, counts, stop.number)
         return counts
+
+
+def _write_blocks(
+    store: ResultStore, finished: Iterable[Finished], counts: Counts, progress: Reporter | None, tell: Tell
+) -> Counts:
+    """Write blocks to the file as they are finished; return the numbers of joints by status after the last one."""
+    if progress:
+        progress(counts)
+    for done in finished:
+        store.at(done.point).write(done.slots, done.simulation)
+        counts = counts.after(done.simulation.results["status"])
+        if done.trouble:
+            status = Status(done.simulation.results["status"][0])
+            place = f"row {store.rows[done.slots[0]]}" + (f" at {done.point}" if done.point else "")
+            tell(f"{place}: {status.label}: {done.trouble}")
+        if progress:
+            progress(counts)
+    return counts
 
 
 def _own_stages() -> Stages:

@@ -2,20 +2,22 @@
 
 from importlib import import_module
 
+from tolstat import questions
 from tolstat.cli import bench
 from tolstat.cli._app import GROUPS, OneCommand, app, command, main
 
 __all__ = ["COMMANDS", "app", "main"]
 
 COMMANDS = {
-    "Plan": ("new", "schema", "show", "simulate", "plan"),
+    "Plan": ("new", "schema", *questions.commands("Plan"), "simulate", "plan"),
     "Run": ("run", "extend", "merge", "status", "verify", "replay"),
-    "Read": ("report", "capability", "worst", "causes", "fatigue", "bearing_life", "time_above"),
-    "Decide": ("reweight", "allocate", "compare", "rare", "multifidelity"),
+    "Read": ("report", *questions.commands("Read")),
+    "Decide": questions.commands("Decide"),
     "Share": ("export", "docs"),
 }
 """Headings of ``tolstat --help`` in the order of the work, and under each the files of this package with the commands,
-each with a function of the same name; on the command line ``-`` stands for ``_``."""
+each with a function of the same name; on the command line ``-`` stands for ``_``. Commands of questions come from their
+registry."""
 
 for heading, names in COMMANDS.items():
     for name in names:

@@ -130,6 +130,16 @@ Accept = Annotated[
         help='Accepted share of joints above a limit, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
     ),
 ]
+Delivery = Annotated[
+    int,
+    typer.Option(
+        "--delivery",
+        metavar="N",
+        min=1,
+        max=10**9,
+        help="Number of joints of the next delivery, for the prediction interval of those above a limit.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
 StudyOption = Annotated[
     Path | None,
@@ -186,8 +196,10 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
         for name, annotation, default in added
     ]
-    run.__signature__ = own.replace(parameters=[*own.parameters.values(), *parameters])  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
+    signature = own.replace(parameters=[*own.parameters.values(), *parameters])
+    decorated: Any = run
+    decorated.__signature__ = signature
+    decorated.__annotations__ = {p.name: p.annotation for p in signature.parameters.values()}
     return run
 
 

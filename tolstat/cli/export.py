@@ -85,23 +85,10 @@ def export(
     from tolstat.store import Reader
 
     given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--xlsx": workbook, "--statistics": statistics}
-    targets = [target for target in given.values() if target is not None]
-    if not targets or len(set(targets)) < len(targets):
-        raise typer.BadParameter(
-            "give one or more of --csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
-        )
-    if by and statistics is None:
-        raise typer.BadParameter("--by is used with --statistics only: add --statistics OUT")
-    if accept is not None and statistics is None:
-        raise typer.BadParameter("--accept is used with --statistics only: add --statistics OUT")
+    targets = {option: target for option, target in given.items() if target is not None}
+    _check_options(targets, bool(by), accept is not None, nominal)
     accepted = math.nan if accept is None else parse_share(accept)
-    if nominal and (out, parquet, workbook, cycles) == (None, None, None, None):
-        raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
-    if parquet is not None and find_spec("pyarrow") is None:
-        raise InputError(
-            [Fault("--parquet", "pyarrow is not installed", "install it with: pip install pyarrow, or use --csv OUT")]
-        )
-    for target in targets:
+    for target in targets.values():
         if target != "-":
             check_target(Path(target), file)
     with progress("reading the file"), Reader.open(file) as opened:
@@ -125,6 +112,23 @@ def export(
     if parquet is not None:
         _write_parquet(frame, Path(parquet))
         say(f"wrote {parquet}: {len(frame)} joints")
+
+
+def _check_options(targets: dict[str, str], by: bool, accept: bool, nominal: bool) -> None:
+    """Refuse options that do not go together; `targets` are the files to write, by option."""
+    if not targets or len(set(targets.values())) < len(targets):
+        raise typer.BadParameter(
+            "give one or more of --csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
+        )
+    for option, used in (("--by", by), ("--accept", accept)):
+        if used and "--statistics" not in targets:
+            raise typer.BadParameter(f"{option} is used with --statistics only: add --statistics OUT")
+    if nominal and targets.keys() == {"--statistics"}:
+        raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
+    if "--parquet" in targets and find_spec("pyarrow") is None:
+        raise InputError(
+            [Fault("--parquet", "pyarrow is not installed", "install it with: pip install pyarrow, or use --csv OUT")]
+        )
 
 
 def _write(out: str, write: Callable[[TextIO], object], what: str) -> None:

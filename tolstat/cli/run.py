@@ -83,7 +83,7 @@ def run(
         typer.Option(
             "--until",
             metavar="RULE",
-            help='Stop when a 95 % interval is narrow enough: "P(cross1.F > 700 N) width < 0.01".',
+            help='Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".',
         ),
     ] = None,
     verify: Annotated[
@@ -106,20 +106,14 @@ def run(
     from tolstat.campaign.blocks import Execution
     from tolstat.campaign.retry import parse
 
-    faults: list[Fault] = []
     limit, part, again = 0.0, None, None
+    faults = _cannot_be_combined(rows, until, retry, settings)
+    if scheduler is not None and executor is not Executor.DASK:
+        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     with gather(faults):
         limit = parse_time(joint_timeout)
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
-    if rows is not None and until is not None:
-        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
-    if until is not None and retry is not None:
-        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
-    if scheduler is not None and executor is not Executor.DASK:
-        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
-    if settings and retry is None:
-        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
     with gather(faults):
         plan = study.load(study_file, n=n)
         again = None if retry is None else parse(retry, settings or (), plan)
@@ -134,6 +128,19 @@ def run(
     else:
         simulate(plan, path, until, execution=execution, check=verify)
     conclude(path, report, wide, str(study_file))
+
+
+def _cannot_be_combined(
+    rows: str | None, until: str | None, retry: str | None, settings: list[str] | None
+) -> list[Fault]:
+    faults = []
+    if rows is not None and until is not None:
+        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
+    if until is not None and retry is not None:
+        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
+    if settings and retry is None:
+        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
+    return faults
 
 
 def parse_time(text: str, option: str = "--joint-timeout") -> float:
@@ -232,18 +239,17 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
     from tolstat.campaign import stop_rule
     from tolstat.store import Reader
 
-    rule = stop_rule.parse(text)
+    rule = stop_rule.parse(text, plan.limits)
     with progress() as shown:
         run = partial(campaign.run, plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
         outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
     look = outcome.look
-    n_looks = len(outcome.looks)
     say(
         f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
         f"{look.above} above, {look.n_unresolved} failed or not settled\n"
-        f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f} "
-        "(failed and unsettled joints: below at its lower end, above at its upper end), "
-        f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; the intervals in the report are not corrected"
+        f"share above {look.estimate:.5f}, corrected for the stop; {100 * stop_rule.CONFIDENCE:.0f} % interval "
+        f"{look.lower:.5f} to {look.upper:.5f} (failed and unsettled joints: below at its lower end, above at its "
+        "upper end), valid after any number of looks; shares and intervals in the report are not corrected"
     )
     with Reader.open(path) as store:
         return store.counts()

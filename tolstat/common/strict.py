@@ -208,14 +208,14 @@ def _fault(
 
 def _written(data: object, location: Sequence[int | str], key: Sequence[str]) -> str:
     """Value of a key as it is written, from the innermost table around a place that has the key."""
-    tables = [data]
+    tables: list[Any] = [data]
     for part in location:
         try:
-            tables.append(tables[-1][part])  # type: ignore[index]
+            tables.append(tables[-1][part])
         except (LookupError, TypeError):
             break
     for table in reversed(tables):
-        value: Any = table
+        value = table
         for part in key:
             value = value.get(part) if isinstance(value, Mapping) else None
         if value is not None:

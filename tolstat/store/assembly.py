@@ -13,9 +13,16 @@ from numpy.typing import NDArray
 from tolstat.common.files import atomic_write
 from tolstat.common.tables import Status
 from tolstat.store.axes import attach_scales
-from tolstat.store.histories import HISTORY_BYTES, HistoryParts, create_dataset, create_group, rows_per_chunk
+from tolstat.store.histories import (
+    HISTORY_BYTES,
+    HistoryParts,
+    create_dataset,
+    create_group,
+    parts_folder,
+    rows_per_chunk,
+)
 from tolstat.store.new_file import fill
-from tolstat.store.reader import Reader, parts_folder
+from tolstat.store.reader import Reader
 from tolstat.store.result_file import BLOCK, LINKED, campaign_digest, store_error
 
 

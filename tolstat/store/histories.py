@@ -242,3 +242,8 @@ class HistoryParts:
             above = self.folder.parent
             if above.suffix == PARTS and not any(above.iterdir()):
                 above.rmdir()
+
+
+def parts_folder(path: Path) -> Path:
+    """Folder of the histories of a campaign that is not complete yet."""
+    return path.with_name(path.name + PARTS)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from copy import copy
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +23,7 @@ from tolstat.store import checks, integrity
 from tolstat.store.checked_tables import CheckedTables
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
-from tolstat.store.histories import PARTS, HistoryParts
+from tolstat.store.histories import HistoryParts, parts_folder
 from tolstat.store.named_loads import NamedLoads
 from tolstat.store.result_file import (
     BLOCK,
@@ -399,20 +397,3 @@ class Reader(CheckedTables):
             row = self.rows[slots[done][np.argmax(wrong)]]
             found = f"is damaged: the history {name} of row {row} does not match its checksum"
             raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
-
-
-def parts_folder(path: Path) -> Path:
-    """Folder of the histories of a campaign that is not complete yet."""
-    return path.with_name(path.name + PARTS)
-
-
-@contextmanager
-def viewed(source: str | Path | Reader | View) -> Iterator[View]:
-    """View of a result file: of its path, which is opened and closed, or of the open file; a view stays as it is."""
-    if isinstance(source, View):
-        yield source
-    elif isinstance(source, Reader):
-        yield source.view()
-    else:
-        with Reader.open(source) as store:
-            yield store.view()

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from tolstat.common import selected_results
 from tolstat.common.files import atomic_write, check_disk_space, make_parent
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
-from tolstat.store.histories import HISTORY_BYTES
+from tolstat.store.histories import HISTORY_BYTES, parts_folder
 from tolstat.store.integrity import history_checks, results_hash
 from tolstat.store.new_file import attributes, fill, size_of_new, study_attributes
-from tolstat.store.reader import Reader, parts_folder
+from tolstat.store.reader import Reader
 from tolstat.store.result_file import copy_open, get, is_at, put, put_attributes, replace, store_error, text
 
 if TYPE_CHECKING:

@@ -130,6 +130,11 @@ class View:
         return verification.read(self.store)
 
     @cached_property
+    def near(self) -> Verification | None:
+        """The verification of joints near limits that the file holds, if any."""
+        return verification.read(self.store, verification.NEAR)
+
+    @cached_property
     def altered(self) -> dict[str, Altered]:
         """Loads of joints with other tolerances that the file holds, by the digest of the change."""
         return what_if.read(self.store)
@@ -213,12 +218,13 @@ class View:
             if not selected_results.holds(self.columns, name):
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
-            load = LOADS[name]
+            load, skip = LOADS[name], self.store.first_sample
+            drawn = None if self.weights is None else frozen(self.store.origin()["component"][skip:] == 0)
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
             values, _, (lower, upper) = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = SampleLoad(
                 name, load.unit, self.limits.get(name), nominal, frozen(values), (frozen(lower), frozen(upper)),
-                self.status, self.weights, self.iid, self.store.heaviest, self.replicates,
+                self.status, self.weights, self.iid, self.store.heaviest, self.replicates, drawn,
             )  # fmt: skip
         return self._loads[name]
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import KINDS, LOAD_FIELDS, FloatArray, Load
+from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
 from tolstat.store.verification import Verification
 
@@ -104,12 +104,30 @@ def point_of(view: View, name: str) -> str:
 
     def rank(part: View) -> tuple[float, float]:
         load = part.load(plain)
-        share = 0.0 if limit is None else load.above(limit).estimate
-        return float(np.nan_to_num(share)), float(
-            load.valid[int(0.99 * (load.valid.size - 1))]
-        ) if load.valid.size else 0.0
+        share = 0.0 if limit is None else float(np.nan_to_num(load.above(limit).estimate))
+        return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) if load.valid.size else 0.0
 
     return max(at.parts, key=rank).points[0]
+
+
+def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
+    """Load of a limit, whose names may have operating points, over these: values, (n,), and the status of each joint.
+
+    Parameters
+    ----------
+    parts : mapping of str to (n,) tables
+        Results by operating point, with `LOAD_FIELDS` at least.
+    limit : Limit
+        The limit; its level is compared with the values.
+    """
+    found, states = [], []
+    for name, level in zip(limit.loads, limit.levels, strict=True):
+        where = split(name)[1]
+        chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
+        values, status, _ = load_of(chosen, LOADS[split(name)[0]])
+        found.append(values if limit.has_one_level else values / level)
+        states.append(status)
+    return np.maximum.reduce(found), np.choose(deciding(states), states)
 
 
 def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:

@@ -14,7 +14,7 @@ from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revo
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import LIFE_EXPONENT, PINS, VALID
-from tolstat.joint import Bearing, nominal_errors, operating
+from tolstat.joint import Bearing, operating
 from tolstat.store.recorded import joint_of
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -141,13 +141,12 @@ def lives_of(view: View) -> Lives:
         for part in view.parts
     ]
     loads, hours = _lives(duty, [_loads(part.read_results(FIELDS)) for part in view.parts], operation, bearing)
+    unrated = np.isin(view.status, VALID) & _unrated(operation, bearing)
     nominal_loads, nominal_hours = np.full(len(PINS), np.nan), np.full(len(PLACES), np.nan)
     if len(view.nominal):
-        zero = nominal_errors(1)
-        operation_of = [operating(part.store.operation, zero) for part in view.parts]
-        found = _lives(duty, [_loads(part.nominal) for part in view.parts], operation_of, bearing)
+        operation = [operating(part.store.operation, part.store.errors(slice(0, 1))) for part in view.parts]
+        found = _lives(duty, [_loads(part.nominal) for part in view.parts], operation, bearing)
         nominal_loads, nominal_hours = found[0][0], found[1][0]
-    unrated = np.isin(view.status, VALID) & _unrated(operation, bearing)
     return Lives(
         name=view.name,
         bearing=bearing,

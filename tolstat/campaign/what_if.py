@@ -164,7 +164,7 @@ def simulate(
     names = asked.names(study)
     todo = [(one.change, numbers) for one in wanted if (numbers := missing(held, one, names))]
     table = _Table(todo, asked, names)
-    work: Work[Block, NDArray[np.void] | Lost] = Work(_solve, Block.split, warm_up, JOINT_TIMEOUT_S)
+    work: Work[Block, NDArray[np.void] | Lost] = Work(_solve, Block.split, Block.size, warm_up, JOINT_TIMEOUT_S)
     blocks = _blocks(study, options_of(study, store), todo, asked.points)
     done: Generator[tuple[Block, NDArray[np.void] | Lost], None, None]
     parallel = workers > 1 and table.status.size > BLOCK

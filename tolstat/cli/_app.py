@@ -19,6 +19,7 @@ import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from tolstat import __version__
+from tolstat.cli._shortage import shortage
 from tolstat.cli._talk import LogFile, Quiet, Verbose, fail, say, session, warn
 from tolstat.common.errors import Fault, InputError, TolstatError
 
@@ -183,6 +184,12 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
                 except TolstatError as error:
                     fail(f"error: {error}")
                     raise typer.Exit(2) from error
+                except (MemoryError, OSError, ImportError) as error:
+                    fault = shortage(error)
+                    if fault is None:
+                        raise
+                    fail(f"error: {fault}")
+                    raise typer.Exit(2) from error
                 except KeyboardInterrupt as error:
                     fail("interrupted")
                     raise typer.Exit(130) from error
@@ -302,7 +309,7 @@ def output_file(path: Path) -> Iterator[Path]:
         with files.atomic_write(path) as temporary:
             yield temporary
     except OSError as error:
-        found = f"cannot be written: {error.strerror or error}"
+        found = f"cannot be written: {files.reason(error)}"
         raise InputError(
             [Fault(str(path), found, "check that the folder is writable and the disk has space")]
         ) from error

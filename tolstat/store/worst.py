@@ -84,6 +84,26 @@ def load_of(
     return values, np.choose(deciding(status), status), (lower, upper)
 
 
+def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
+    """Load of a limit, whose names may have operating points, over these: values, (n,), and the status of each joint.
+
+    Parameters
+    ----------
+    parts : mapping of str to (n,) tables
+        Results by operating point, with `LOAD_FIELDS` at least.
+    limit : Limit
+        The limit; its level is compared with the values.
+    """
+    found, states = [], []
+    for name, level in zip(limit.loads, limit.levels, strict=True):
+        where = split(name)[1]
+        chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
+        values, status, _ = load_of(chosen, LOADS[split(name)[0]])
+        found.append(values if limit.has_one_level else values / level)
+        states.append(status)
+    return np.maximum.reduce(found), np.choose(deciding(states), states)
+
+
 def point_of(view: View, name: str) -> str:
     """Operating point at which a load matters most: where most joints exceed its limit, else where it is largest.
 
@@ -108,26 +128,6 @@ def point_of(view: View, name: str) -> str:
         return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) if load.valid.size else 0.0
 
     return max(at.parts, key=rank).points[0]
-
-
-def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
-    """Load of a limit, whose names may have operating points, over these: values, (n,), and the status of each joint.
-
-    Parameters
-    ----------
-    parts : mapping of str to (n,) tables
-        Results by operating point, with `LOAD_FIELDS` at least.
-    limit : Limit
-        The limit; its level is compared with the values.
-    """
-    found, states = [], []
-    for name, level in zip(limit.loads, limit.levels, strict=True):
-        where = split(name)[1]
-        chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
-        values, status, _ = load_of(chosen, LOADS[split(name)[0]])
-        found.append(values if limit.has_one_level else values / level)
-        states.append(status)
-    return np.maximum.reduce(found), np.choose(deciding(states), states)
 
 
 def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:

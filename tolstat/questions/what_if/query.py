@@ -299,9 +299,10 @@ def _indices(
             continue
         a, b, ab = base[: 2 * n : 2], base[1 : 2 * n : 2], one.valid(names)[:n]
         row: dict[str, object] = {"line": label, "pairs": n}
-        for name, parts in (("", _decomposed(a, b, ab, load.long_tailed)), ("above_", _event(a, b, ab, level))):
+        of_load, of_event = _decomposed(a, b, ab, load.long_tailed), _event(a, b, ab, level)
+        for name, parts, estimate in (("", of_load, pick_freeze.indices), ("above_", of_event, pick_freeze.of_event)):
             try:
-                found = pick_freeze.indices(parts[0], parts[1], parts[2][:, None], confidence)
+                found = estimate(parts[0], parts[1], parts[2][:, None], confidence)
             except ValueError:  # too few joints with a load, or none, or all of them, above the level
                 continue
             for word, index in (("alone", found.first), ("in_all", found.total)):

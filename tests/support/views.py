@@ -72,7 +72,7 @@ def at_points(results, limits=None, method="random", joint=None, points=()):
     store.points |= {point.name: point for point in points}
     made = View(store)
     for part in made.parts:
-        part.verification = None
+        part.verification = part.near = None
     made.altered = {}
     return made
 

@@ -124,10 +124,8 @@ def point_of(view: View, name: str) -> str:
 
     def rank(part: View) -> tuple[float, float]:
         load = part.load(plain)
-        share = 0.0 if limit is None else load.above(limit).estimate
-        return float(np.nan_to_num(share)), float(
-            load.valid[int(0.99 * (load.valid.size - 1))]
-        ) if load.valid.size else 0.0
+        share = 0.0 if limit is None else float(np.nan_to_num(load.above(limit).estimate))
+        return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) if load.valid.size else 0.0
 
     return max(at.parts, key=rank).points[0]
 

@@ -58,7 +58,7 @@ def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=Non
     if alpha is not None:
         errors["operation.alpha"] = alpha - OPERATION.alpha
     made = View(FakeStore(method, limits, errors, results, columns=columns, joint=joint))
-    made.verification, made.altered = None, {}
+    made.verification, made.near, made.altered = None, None, {}
     return made
 
 
@@ -83,5 +83,5 @@ def swept(second=1, limits=None, named=True, columns=RESULT_COLUMNS, change=None
         change(results[1:])
     keys = '[sweep]\n"pin*.diameter" = { from = "-0.1 mm" }\npin1.tilt_z = { from = "0.5 deg" }\n' if named else ""
     made = View(FakeStore("sweep", limits or {}, errors, results, keys, columns))
-    made.verification, made.altered = None, {}
+    made.verification, made.near, made.altered = None, None, {}
     return made

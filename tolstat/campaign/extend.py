@@ -115,7 +115,8 @@ def grow(
     changed = {"identity": study.identity(), "sampling": sampling}
     attrs = store.attributes() | {name: json.dumps(value, allow_nan=False) for name, value in changed.items()}
     attrs["campaign_rows"] = study.rows
-    attrs.pop("stop", None)
+    if store.stop:  # the looks of a stop rule stay looks
+        attrs["stop"] = json.dumps({"reached": False, "looks": store.stop["looks"]})
     drawn = None if origin is None else chain(_blocks(store, store.origin), origin)
     whole = chain(_blocks(store, store.errors), errors)
     assemble(store.path, attrs, study.rows, [store], whole, overwrite=True, origin=drawn)

@@ -208,6 +208,20 @@ def check_campaign(
     slots = choose(settled, joints, seed)
     if not slots.size:
         return None
+    return check_slots(store, parameters, slots, names, seed, simulate, workers, progress)
+
+
+def check_slots(
+    store: Reader,
+    parameters: Callable[[NDArray[np.intp]], NDArray[np.void]],
+    slots: NDArray[np.intp],
+    names: Iterable[str],
+    seed: int = 0,
+    simulate: Simulate | None = None,
+    workers: int = 1,
+    progress: Progress = no_progress,
+) -> Verification:
+    """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
     options = [recorded.options_of(store, slot) for slot in slots.tolist()]
     checks = run_checks(parameters(slots), options, names, simulate, workers, progress)
     for check in checks.values():
@@ -296,9 +310,7 @@ def check_file(
     """
     number = parse_joints(joints)
     with ResultStore.open_to_write(path) as store:
-        if differing_code(store.versions):
-            remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
-            raise StoreError(str(Fault(str(path), "was made by another version of the code", remedy)))
+        check_version(store)
         seed = int(store.sampling["seed"]) if seed is None else seed
         if not any((one.status() == Status.OK).any() for one in store.each()):
             remedy = f"run the campaign first: tolstat run STUDY --out {path}"
@@ -312,6 +324,19 @@ def check_file(
         checked = worst.checks([one for one in map(verification.read, store.each()) if one is not None])
         assert checked is not None
     return checked
+
+
+def check_version(store: Reader) -> None:
+    """Refuse a file that other code made.
+
+    Raises
+    ------
+    StoreError
+        The hint says what to do.
+    """
+    if differing_code(store.versions):
+        remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
+        raise StoreError(str(Fault(str(store.path), "was made by another version of the code", remedy)))
 
 
 def check_study(

@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, AtPoints, ResultFile, StudyOption, Wide, as_text, output_file, print_table
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import (
+    AsJson,
+    AtPoints,
+    Delivery,
+    ResultFile,
+    StudyOption,
+    Wide,
+    as_text,
+    output_file,
+    print_table,
+)
 from tolstat.cli._talk import progress, say
 
 
@@ -43,6 +54,7 @@ def allocate(
         typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the proposed tolerances."),
     ] = None,
     point: AtPoints = None,
+    delivery: Delivery = DELIVERY,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -62,13 +74,15 @@ def allocate(
     from tolstat.display import text
     from tolstat.questions.allocate import rendering
     from tolstat.questions.allocate.query import allocated
-    from tolstat.store import Reader
+    from tolstat.store import Reader, error_budget
     from tolstat.study.scaling import line
 
     if out is not None:
         check_target(out, file)
     with progress("search for the cheapest tolerances"), Reader.open(file) as store:
-        found = allocated(store.view(study_file).at(point or ""), target, costs, keep or ())
+        view = store.view(study_file).at(point or "")
+        found = allocated(view, target, costs, keep or (), delivery=delivery)
+        unknown = "" if found.limits["numerical"].all() else error_budget.command(file)
     if out is not None:
         content = found.text
         with output_file(out) as temporary:
@@ -86,5 +100,7 @@ def allocate(
         typer.echo("\n[tolerances]\n" + "\n".join(line(*item) for item in found.entries.items()))
     before, after = found.tolerances["cost_before"].sum(), found.tolerances["cost"].sum()
     say(f"total cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)\n{found.verdict}")
+    if unknown:
+        say(unknown)
     if out is not None:
         say(f"wrote {out}\nnext: tolstat run {out}")

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Wide, announce_compilation, as_text, output_file, print_table
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import AsJson, Delivery, Wide, announce_compilation, as_text, output_file, print_table
 from tolstat.cli._talk import progress, say
 
 
@@ -47,6 +48,7 @@ def fatigue(
             "--point", metavar="POINT", help="Operating point of FILE, such as cruise; default: all, by their shares."
         ),
     ] = None,
+    delivery: Delivery = DELIVERY,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
@@ -84,7 +86,7 @@ def fatigue(
                 announce_compilation()
             with progress("stresses of the parts"):
                 stressed = load_stresses(views, share or None, joints)
-                failures = parts.part_failures(stressed)
+                failures = parts.part_failures(stressed, delivery=delivery)
         if (
             all(part.store.history_specs for view in views for part in view.parts)
             or names
@@ -93,7 +95,7 @@ def fatigue(
         ):
             with progress("counting cycles"):
                 loading = query.load_cycles(views, share or None, names, joints)
-                loads, damages = query.equivalent_loads(loading), query.damages(loading)
+                loads, damages = query.equivalent_loads(loading), query.damages(loading, delivery=delivery)
     if loading is not None and out is not None:
         with output_file(out) as temporary:
             loads.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")

@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import AsJson, AtOne, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import (
+    AsJson,
+    AtOne,
+    Delivery,
+    StudyOption,
+    Wide,
+    Workers,
+    announce_compilation,
+    as_text,
+    print_table,
+)
 from tolstat.cli._talk import fail, progress, say, wrapped
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import ANY_LIMIT
 
 if TYPE_CHECKING:
     from tolstat.questions.rare.query import RareEvent
     from tolstat.study import Study
+
+
+REPEATS = 4
+"""Seeds of a simulation, unless another number is given."""
 
 
 class Side(StrEnum):
@@ -31,7 +48,11 @@ def rare(
     ],
     limit: Annotated[
         str | None,
-        typer.Option("--limit", metavar="LIMIT", help='Load and level: "cross1.F > 900 N"; required with STUDY.'),
+        typer.Option(
+            "--limit",
+            metavar="LIMIT",
+            help='"cross1.F > 900 N", "cross*.F > 900 N" or "any limit"; required with STUDY.',
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -55,6 +76,13 @@ def rare(
         ),
     ] = None,
     point: AtOne = None,
+    repeats: Annotated[
+        int | None,
+        typer.Option(
+            "--repeats", metavar="K", min=1, help="Number of seeds, each with a result file of its own; default: 4."
+        ),
+    ] = None,
+    delivery: Delivery = DELIVERY,
     study_file: StudyOption = None,
     workers: Workers = None,
     wide: Wide = False,
@@ -65,8 +93,10 @@ def rare(
     Estimates P(load > level) down to 1e-9. Each level of the simulation starts from the joints of the previous level
     with the largest loads. What the interval does not cover: tolstat docs rare
 
-    Prints threshold and share of each level, and the probability with its 95 % interval. Writes all joints to a result
-    file. To resume after an interruption, run the same command again.
+    Repeats the simulation with 4 seeds. Prints threshold and share of each level (of the first seed), the probability
+    with its 95 % interval from all seeds, whether they agree, and from how many joints of level 0 the joints above the
+    limit descend: few of these, or seeds that disagree, tell of ways to the limit that were missed. Writes the joints
+    of each seed to a result file. To resume after an interruption, run the same command again.
 
     Example: tolstat rare studies/iso2768_f.toml --limit "cross1.F > 5 kN"
     """
@@ -81,25 +111,29 @@ def rare(
     if source.suffix == ".toml":
         plan, path = _read_study(source, limit, point, given), out or Path(f"{source.stem}_rare.h5")
     else:
-        plan, path = _recall(source, study_file, [limit, out, point, *given.values()]), source
+        given_too = [limit, out, point, repeats, *given.values()]
+        plan, path, repeats = _recall(source, study_file, given_too), source, 1
     announce_compilation()
     try:
         with progress("levels of the subset simulation") as shown:
-            found = simulation.run(plan, path, workers, shown.note, shown)
+            found = simulation.repeated(plan, path, repeats or REPEATS, workers, shown.note, shown)
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
     except WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
-    sampling = found.sampling
-    levels = tables.table(found.levels, sampling.load)
+    levels = [tables.table(one.levels, one.sampling.limit) for one in found]
     if as_json:
-        typer.echo(as_text(_summary(found) | {"levels": text.records(levels)}))
+        estimate, agree = tables.together([one.estimate for one in found])
+        numbers = {name: value if math.isfinite(value) else None for name, value in estimate._asdict().items()}
+        seeds = [_summary(one, delivery) | {"levels": text.records(t)} for one, t in zip(found, levels, strict=True)]
+        typer.echo(as_text(numbers | {"agree": agree, "seeds": seeds}))
     else:
-        print_table(tables.LEVELS, levels, wide)
-        typer.echo(wrapped(tables.sentence(found.estimate, sampling.load, sampling.above)))
-    _print_messages(found, path)
+        print_table(tables.LEVELS, levels[0], wide)
+        typer.echo("\n".join(wrapped(line) for line in tables.of_seeds(found, delivery).splitlines()))
+    for k, one in enumerate(found):
+        _print_messages(one, path.with_name(f"{path.stem}_{k + 1}{path.suffix}") if k else path)
 
 
 def _read_study(source: Path, limit: str | None, point: str | None, given: dict[str, Any]) -> Study:
@@ -110,8 +144,9 @@ def _read_study(source: Path, limit: str | None, point: str | None, given: dict[
     if limit is None:
         faults.append(Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"'))
     else:
-        with gather(faults):
-            parse_limit(limit)
+        if limit.split() != ANY_LIMIT.split():
+            with gather(faults):
+                parse_limit(limit, {})
     with gather(faults):
         plan = study.load(source).at(point or "")
     if faults or limit is None:
@@ -134,16 +169,19 @@ def _recall(source: Path, study_file: Path | None, given: list[Any]) -> Study:
         return store.view(study_file).study
 
 
-def _summary(found: RareEvent) -> dict[str, Any]:
-    import math
-
+def _summary(found: RareEvent, delivery: int) -> dict[str, Any]:
     numbers = found.estimate._asdict() | {"as_sure_as": found.as_sure_as, "upper_if_above": found.upper_if_above}
     plain = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
-    head = {"load": found.sampling.load, "above": found.sampling.above, "reached": found.reached}
-    return head | plain | {"joints": found.joints, "unresolved": found.unresolved}
+    head = {"load": found.sampling.load, "above": found.sampling.limit.level, "reached": found.reached}
+    counts = {"joints": found.joints, "unresolved": found.unresolved, "ancestors": found.ancestors}
+    return head | plain | counts | {"numerical": found.numerical, "delivery": found.delivery(delivery)}
 
 
 def _print_messages(found: RareEvent, path: Path) -> None:
+    from tolstat.store.error_budget import command
+
+    if found.numerical is None:
+        say(command(path, str(found.sampling.limit)))
     say(f"{path}: {found.joints} joints, {found.unresolved} of them failed or not settled")
     if found.reached:
         say(f"the estimate is as precise as that from {found.as_sure_as:.2g} random joints")

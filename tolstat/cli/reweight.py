@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, AtPoints, ResultFile, StudyOption, Wide, as_text, output_file, print_table
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import (
+    AsJson,
+    AtPoints,
+    Delivery,
+    ResultFile,
+    StudyOption,
+    Wide,
+    as_text,
+    output_file,
+    print_table,
+)
 from tolstat.cli._talk import progress, say
 
 
@@ -24,6 +35,7 @@ def reweight(
         typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the changed tolerances."),
     ] = None,
     point: AtPoints = None,
+    delivery: Delivery = DELIVERY,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -33,9 +45,9 @@ def reweight(
     Simulates nothing: each joint in FILE gets a weight, the density of its errors under the changed tolerances over
     that under the tolerances of the campaign (likelihood ratio).
 
-    Prints the share of joints above each limit with its 95 % interval, and a verdict. Where the joints do not support a
-    share, none is given; the verdict is then "needs new runs" and names the commands. With --out, writes the study with
-    the changed tolerances and the same seed.
+    Prints the share of joints above each limit, and above any limit, with its 95 % interval, and a verdict. Where the
+    joints do not support a share, none is given; the verdict is then "needs new runs" and names the commands. With
+    --out, writes the study with the changed tolerances and the same seed.
 
     Example: tolstat reweight iso2768_f.h5 --set "pin*.offset_t.plus_minus=0.1 mm"
     """
@@ -43,12 +55,14 @@ def reweight(
     from tolstat.display import text
     from tolstat.questions.reweight import rendering
     from tolstat.questions.reweight.query import reweighted
-    from tolstat.store import Reader
+    from tolstat.store import Reader, error_budget
 
     if out is not None:
         check_target(out, file)
     with progress("reweighting"), Reader.open(file) as store:
-        found = reweighted(store.view(study_file).at(point or ""), settings)
+        view = store.view(study_file).at(point or "")
+        found = reweighted(view, settings, delivery=delivery)
+        unknown = error_budget.unknown(view)
     if out is not None:
         with output_file(out) as temporary:
             temporary.write_text(found.text, encoding="utf-8")
@@ -59,6 +73,8 @@ def reweight(
     else:
         print_table(rendering.columns(found.table), found.table, wide)
         say(f"{len(found.changed)} errors changed; {found.verdict}")
+        if unknown:
+            say(unknown)
     if out is not None:
         say(f"wrote {out}\nnext: tolstat run {out}")
     elif not found.usable:

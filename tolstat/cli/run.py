@@ -83,7 +83,7 @@ def run(
         typer.Option(
             "--until",
             metavar="RULE",
-            help='Stop when a 95 % interval is narrow enough: "P(cross1.F > 700 N) width < 0.01".',
+            help='Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".',
         ),
     ] = None,
     verify: Annotated[
@@ -239,18 +239,17 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
     from tolstat.campaign import stop_rule
     from tolstat.store import Reader
 
-    rule = stop_rule.parse(text)
+    rule = stop_rule.parse(text, plan.limits)
     with progress() as shown:
         run = partial(campaign.run, plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
         outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
     look = outcome.look
-    n_looks = len(outcome.looks)
     say(
         f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
         f"{look.above} above, {look.n_unresolved} failed or not settled\n"
-        f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f} "
-        "(failed and unsettled joints: below at its lower end, above at its upper end), "
-        f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; the intervals in the report are not corrected"
+        f"share above {look.estimate:.5f}, corrected for the stop; {100 * stop_rule.CONFIDENCE:.0f} % interval "
+        f"{look.lower:.5f} to {look.upper:.5f} (failed and unsettled joints: below at its lower end, above at its "
+        "upper end), valid after any number of looks; shares and intervals in the report are not corrected"
     )
     with Reader.open(path) as store:
         return store.counts()

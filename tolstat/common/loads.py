@@ -64,6 +64,50 @@ def load_of(name: str) -> Load:
     return LOADS[split(name)[0]]
 
 
+class Limit(NamedTuple):
+    """Levels that loads may not exceed: of one load, of the largest of several, or all limits of a study together.
+
+    Attributes
+    ----------
+    name : str
+        ``cross1.F``, the pattern ``cross*.F``, or `ALL_LIMITS`.
+    loads : tuple of str
+        Names of the loads; a joint is above the limit if any of them is above its level.
+    levels : tuple of float
+        Level of each load, SI.
+    """
+
+    name: str
+    loads: tuple[str, ...]
+    levels: tuple[float, ...]
+
+    @property
+    def has_one_level(self) -> bool:
+        """Whether all loads have the same level, of the same kind."""
+        return self.name != ALL_LIMITS and len(set(self.levels)) == 1
+
+    @property
+    def level(self) -> float:
+        """Level of `of`: that of all loads, SI; 1 if they differ, and `of` is the largest ratio of load to level."""
+        return self.levels[0] if self.has_one_level else 1.0
+
+    @property
+    def unit(self) -> str:
+        """SI unit of `level`."""
+        return load_of(self.loads[0]).unit if self.has_one_level else "1"
+
+    def __str__(self) -> str:
+        """``cross*.F > 700 N``, or `ANY_LIMIT`."""
+        return f"{self.name} > {self.level:g} {unit_text(self.unit)}".rstrip() if self.has_one_level else ANY_LIMIT
+
+    def of(self, results: NDArray[np.void]) -> FloatArray:
+        """Largest of the loads in each joint, (n,), to be compared with `level`; NaN if any of them is."""
+        parts = [LOADS[name].of(results) for name in self.loads]
+        if not self.has_one_level:
+            parts = [part / level for part, level in zip(parts, self.levels, strict=True)]
+        return np.asarray(np.maximum.reduce(parts))
+
+
 def of_kind(results: NDArray[np.void], kind: str) -> FloatArray:
     """All loads of a kind, (n, m), SI: of a pin's contact forces the largest."""
     values: FloatArray = results[f"{kind}_max"]
@@ -119,5 +163,7 @@ UNIT_OF_LOAD = {load.name: load.unit for load in LOADS.values()}
 """SI unit of each load."""
 BUSHING_LOADS = tuple(load.name for load in LOADS.values() if load.kind in ("F", "T"))
 """Force and torque of each bushing: what every report shows if the study keeps it."""
+ALL_LIMITS, ANY_LIMIT = "all limits", "any limit"
+"""Name of all limits of a study together, and how a rule names a joint above at least one of them."""
 LOAD_FIELDS = ("status", *(f"{kind}_{of}" for kind in KINDS for of in ("max", "lower", "upper")))
 """Fields of the results that loads and their intervals are read from, and the status."""

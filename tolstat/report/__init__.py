@@ -111,7 +111,7 @@ def build(
                 return _noted(_cases(store, stem, width), stands_on)
             stem = stem.with_name(f"{stem.name}_{point}") if point else stem
             report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width, accepted)
-            for note in (view.missing(), _stopped(store.stop) if store.stop else "", stands_on):
+            for note in (view.missing(), _stopped(store.stop) if store.stop.get("reached") else "", stands_on):
                 report = _noted(report, note)
             return report
     except OSError as error:
@@ -206,6 +206,7 @@ def _stopped(stop: dict[str, Any]) -> str:
     """Sentence about a campaign that its stop rule ended."""
     confidence = f"{100 * stop['confidence']:.0f} %"
     return (
-        f"stopped by {stop['rule']} at {stop['joints']} joints; {confidence} interval corrected for "
-        f"{len(stop['looks'])} looks: {stop['lower']:.5f} to {stop['upper']:.5f}. Intervals above are not corrected."
+        f"stopped by {stop['rule']} at {stop['joints']} joints: {stop['estimate']:.5f}, {confidence} interval "
+        f"{stop['lower']:.5f} to {stop['upper']:.5f}, valid after {len(stop['looks'])} looks. Shares above are not "
+        "corrected for the stop."
     )

@@ -18,7 +18,13 @@ from tolstat.questions.joints import query as joints
 from tolstat.questions.what_if import rendering as what_if
 from tolstat.store.view import View
 
-WORDS = {"yes": "kept", "no": "not kept", "open": "open", "none": "no verdict"}
+WORDS = {
+    "yes": "kept",
+    "searched": "consistent with what was searched",
+    "no": "not kept",
+    "open": "open",
+    "none": "no verdict",
+}
 """Answers of `verdict` in words."""
 Row = Mapping[Any, Any]
 
@@ -29,7 +35,8 @@ class Headline(NamedTuple):
     Attributes
     ----------
     answer : str
-        ``yes``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share can be.
+        ``yes``, ``searched``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share
+        can be.
     value, words : str
         The answer or, without one, a share or its interval; the rest of the sentence.
     notes : tuple of str
@@ -94,8 +101,9 @@ def verdict(row: Row, accepted: float) -> str:
     Returns
     -------
     str
-        ``yes`` (below), ``no`` (above), ``open`` (neither), ``none``: no interval, or joints without a valid load
-        decide, so that more joints do not help; empty without an accepted share.
+        ``yes`` (below), ``no`` (above), ``searched`` (below if the proposals of importance sampling reach every way to
+        the limit; whatever they miss, it may be above), ``open`` (neither), ``none``: no interval, or joints without a
+        valid load decide, so that more joints do not help; empty without an accepted share.
     """
     if np.isnan(accepted):
         return ""
@@ -103,7 +111,8 @@ def verdict(row: Row, accepted: float) -> str:
     if np.isnan(low):
         return "none"
     if high <= accepted or low > accepted:
-        return "yes" if high <= accepted else "no"
+        missed = row["unsearched_upper"] > accepted  # False for joints of equal weight
+        return "no" if low > accepted else "searched" if missed else "yes"
     undecided = row["bound_lower"] <= accepted < row["bound_upper"]
     return "none" if not row["n"] or (undecided and _matter([row])) else "open"
 
@@ -145,7 +154,7 @@ def _needed(row: Row, accepted: float) -> str:
 
 def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headline:
     answers = [verdict(row, accepted) for row in records]
-    answer = next(own for own in ("no", "none", "open", "yes") if own in answers)
+    answer = next(own for own in ("no", "none", "open", "searched", "yes") if own in answers)
     count, most = len(records), text.percent(accepted)
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
     notes: tuple[str, ...] = (f"of {count} limits: {numbers}",) if count > 1 else ()
@@ -163,6 +172,12 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
         said = f"{share} of the joints exceed {limit} ({interval}); {most} is accepted"
         better = what_if.advice(view, worst["load"])
         said += f". {better}" if better else ""
+    elif answer == "searched":
+        missed = text.percent(worst["unsearched_upper"])
+        said = (
+            f"at most {most} of the joints exceed {limit} if the proposals reach every way to it ({interval}); "
+            f"whatever they miss, at most {missed}"
+        )
     elif answer == "yes":
         which = limit if count == 1 else f"each of the {count} limits"
         said = f"at most {most} of the joints exceed {which} (largest share {share_of(worst)}, {interval})"
@@ -187,7 +202,8 @@ def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
         worst = _worst(view, known)
         limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
         interval = "total interval" if _matter([worst]) else f"total interval {text.span(*ends(worst))}"
-        said = f"of the joints exceed {limit}, the limit exceeded most ({interval})"
+        missed = f"whatever the proposals miss, at most {text.percent(worst['unsearched_upper'])}"
+        said = f"of the joints exceed {limit}, the limit exceeded most ({interval}; {missed})"
         return Headline("", share_of(worst), said, notes, worst["load"])
     found = capabilities.together(capability.limits(view))
     if not found.decides:

@@ -102,7 +102,7 @@ def compose(view: View, asked: Asked) -> Page:
 
 def _stopped(view: View) -> str:
     stop = view.store.stop
-    if not stop:
+    if not stop.get("reached"):
         return ""
     return f"stopped by {stop['rule']} at {stop['joints']} joints: intervals here are not corrected for it"
 

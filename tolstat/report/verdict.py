@@ -79,7 +79,7 @@ def _answer(view: View, found: Headline | None) -> Card:
         why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
         return Card("", f"{why}, so there is no verdict.", "")
     note = " ".join(text.sentence(note) for note in found.notes)
-    return Card(found.value, found.words, note, "open" if found.answer == "none" else found.answer)
+    return Card(found.value, found.words, note, "open" if found.answer in ("none", "searched") else found.answer)
 
 
 def _cards(view: View, found: Headline | None) -> list[Card]:

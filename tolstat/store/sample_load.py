@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import exceedance, quantile, replicates, weighted
+from tolstat.analysis import exceedance, prediction, quantile, replicates, weighted
 from tolstat.analysis.exceedance import Exceedance, FloatArray, Mask
 from tolstat.analysis.quantile import Quantile
 from tolstat.common.shown import table
@@ -52,8 +52,14 @@ class SampleLoad:
         Whether the joints are independent samples.
     heaviest : float
         Largest weight that a joint can have; inf without a bound.
+    drawn : ndarray of bool, shape (n,), optional
+        Which joints of importance sampling were drawn from the tolerances themselves.
     replicates : int
         Number of independent replicates, consecutive blocks of the joints; 1 without them.
+    scale : float
+        Value of one in `unit` as a load, SI: 1 but for ratios of load to limit.
+    parts : tuple of SampleLoad
+        Loads of which this is the largest; empty for a single one. See `largest_of`.
     """
 
     name: str
@@ -67,6 +73,9 @@ class SampleLoad:
     iid: bool
     heaviest: float = np.inf
     replicates: int = 1
+    drawn: Mask | None = None
+    scale: float = 1.0
+    parts: tuple[SampleLoad, ...] = ()
 
     def __repr__(self) -> str:
         valid = self.valid
@@ -148,6 +157,31 @@ class SampleLoad:
         """Whether the weights of the joints support a share above a level; equal weights always do."""
         return self.weights is None or self.trust(level).usable
 
+    def unsearched(self, level: float, confidence: float = CONFIDENCE) -> float:
+        """Upper end of the share above a level whatever the proposals of importance sampling miss.
+
+        That of the joints drawn from the tolerances themselves; Clopper and Pearson's, with all joints without a valid
+        load above the level. NaN for joints of equal weight.
+        """
+        if self.drawn is None:
+            return np.nan
+        return replace(self.only(self.drawn), weights=None, drawn=None).above(level, confidence).outer_upper
+
+    def delivery(self, level: float, number: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+        """Prediction interval for the number above a level among further joints; see `analysis.prediction`.
+
+        Joints without a valid load count below the level for its lower end, above it for its upper end. NaN without an
+        interval.
+        """
+        if self.weights is None and self.replicates == 1:
+            found = self.above(level, confidence)
+            if np.isnan(found.lower):
+                return np.nan, np.nan
+            least, most = round(found.n * found.bound_lower), round(found.n * found.bound_upper)
+            return prediction.of_counts(least, most, found.n, number, confidence)
+        found = self.above(level, prediction.half(confidence))
+        return prediction.of_share(found.outer_lower, found.outer_upper, number, confidence)
+
     def shifted(self, by: FloatArray) -> SampleLoad:
         """Return the load of the same joints with `by`, (n,), added to values and ends."""
         return replace(self, values=self.values + by, ends=(self.ends[0] + by, self.ends[1] + by))
@@ -157,7 +191,8 @@ class SampleLoad:
         assert self.limit is not None
         ends = (self.ends[0] / self.limit, self.ends[1] / self.limit)
         values, nominal = self.values / self.limit, self.nominal / self.limit
-        return replace(self, unit="1", limit=1.0, nominal=nominal, values=values, ends=ends)
+        scale = self.scale * self.limit
+        return replace(self, unit="1", limit=1.0, nominal=nominal, values=values, ends=ends, scale=scale)
 
     def only(self, samples: NDArray[np.intp] | Mask) -> SampleLoad:
         """Return the load of some of the joints."""
@@ -168,4 +203,6 @@ class SampleLoad:
             status=self.status[samples],
             replicates=1,
             weights=None if self.weights is None else self.weights[samples],
+            drawn=None if self.drawn is None else self.drawn[samples],
+            parts=tuple(part.only(samples) for part in self.parts),
         )

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from tolstat.store.reader import Reader
     from tolstat.store.result_store import ResultStore
 
-GROUP = "verify"
+VERIFY, NEAR = "verify", "near"
+"""Groups of joints: chosen at random, and those nearest to limits."""
 
 
 @shown
@@ -63,27 +64,27 @@ class Verification(NamedTuple):
     checks: dict[str, Check]
 
 
-def read(store: Reader) -> Verification | None:
-    """Read the verification from a result file; None if it holds none."""
+def read(store: Reader, name: str = VERIFY) -> Verification | None:
+    """Read the verification of a group from a result file; None if it holds none."""
     held = store._held()
-    if GROUP not in held:
+    if name not in held:
         return None
-    group = held[GROUP]
+    group = held[name]
     rows = np.asarray(group["rows"][:], np.intp)
     checks = {}
-    for name in text(group.attrs, "checks").split():
+    for check in text(group.attrs, "checks").split():
         table = np.empty(len(rows), tables.RESULT)
         selected_results.blank_others(table, store.columns)
         for c in store.columns:
-            c.of(table)[:] = group[name][c.name][:]
-        attrs = group[name].attrs
-        checks[name] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
+            c.of(table)[:] = group[check][c.name][:]
+        attrs = group[check].attrs
+        checks[check] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
     base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in store.slot(rows).tolist()])
     return Verification(int(group.attrs["seed"]), rows, base, checks)
 
 
-def write(store: ResultStore, verification: Verification) -> None:
-    """Write a verification to a result file, replacing an earlier one.
+def write(store: ResultStore, verification: Verification, name: str = VERIFY) -> None:
+    """Write a verification to a group of a result file, replacing an earlier one.
 
     Raises
     ------
@@ -91,13 +92,13 @@ def write(store: ResultStore, verification: Verification) -> None:
         When there is no room for a second copy of the file.
     """
     where = store._held().name
-    store._replace(lambda file: _write(file[where], verification, store.columns))
+    store._replace(lambda file: _write(file[where], name, verification, store.columns))
 
 
-def _write(holder: h5py.Group, verification: Verification, columns: tuple[Column, ...]) -> None:
-    if GROUP in holder:
-        del holder[GROUP]
-    group = holder.create_group(GROUP)
+def _write(holder: h5py.Group, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:
+    if place in holder:
+        del holder[place]
+    group = holder.create_group(place)
     about = "joints of the campaign simulated again in other ways, to know its numerical error"
     names = " ".join(verification.checks)
     put_attributes(group, {"description": about, "seed": verification.seed, "checks": names})

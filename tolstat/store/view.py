@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.exceedance import FloatArray, Mask
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
@@ -130,6 +130,13 @@ class View:
         return verification.read(self.store)
 
     @cached_property
+    def near(self) -> Verification | None:
+        """The verification of joints near limits that the file holds, if any."""
+        if len(self.parts) > 1:
+            return worst.checks([part.near for part in self.parts])
+        return verification.read(self.store, verification.NEAR)
+
+    @cached_property
     def altered(self) -> dict[str, Altered]:
         """Loads of joints with other tolerances that the file holds, by the digest of the change."""
         return what_if.read(self.store)
@@ -148,6 +155,12 @@ class View:
         if self.method != "importance":
             return None
         return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
+
+    @cached_property
+    def drawn(self) -> Mask | None:
+        """Which joints were drawn from the tolerances, (n,), if not all were."""
+        component = None if self.weights is None else self.store.origin()["component"][self.store.first_sample :]
+        return None if component is None else frozen(component == 0)
 
     @property
     def results(self) -> NDArray[np.void]:
@@ -215,7 +228,7 @@ class View:
             values, _, (lower, upper) = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = SampleLoad(
                 name, load.unit, self.limits.get(name), nominal, frozen(values), (frozen(lower), frozen(upper)),
-                self.status, self.weights, self.iid, self.store.heaviest, self.replicates,
+                self.status, self.weights, self.iid, self.store.heaviest, self.replicates, self.drawn,
             )  # fmt: skip
         return self._loads[name]
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import KINDS, LOAD_FIELDS, FloatArray, Load
+from tolstat.common.loads import KINDS, LOAD_FIELDS, FloatArray, Limit, Load, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
 from tolstat.store.verification import Verification
+from tolstat.study.points import names_of
 
 _SEVERITY = np.zeros(max(Status) + 1, np.uint8)
 for _rank, _states in enumerate(((Status.STATIONARY,), UNSETTLED, FAILED, (Status.PENDING,)), 1):
@@ -78,6 +79,25 @@ def load_of(
     values = np.maximum.reduce([load.of(part) for part in parts])
     lower, upper = (np.maximum.reduce(ends) for ends in zip(*(load.ends(part) for part in parts), strict=True))
     return values, np.choose(deciding(status), status), (lower, upper)
+
+
+def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
+    """Largest of the loads of a limit in each joint, to be compared with its level, and the status of the joint, (n,).
+
+    Parameters
+    ----------
+    parts : mapping of str to (n,) tables
+        Results at each operating point, with `LOAD_FIELDS` at least.
+    limit : Limit
+        The limit; its loads may name points.
+    """
+    values = []
+    for name, level in zip(limit.loads, limit.levels, strict=True):
+        plain, where = split(name)
+        one = Limit(limit.name, (plain,), (level,))
+        values += [one.of(parts[point]) for point in names_of(where, tuple(parts), limit.name)]
+    status = [part["status"] for part in parts.values()]
+    return np.maximum.reduce(values), np.choose(deciding(status), status)
 
 
 def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:

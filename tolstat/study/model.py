@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model
 
 from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
+from tolstat.common.loads import Limit
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Fidelity, Method, Options, Start
 from tolstat.study import selection
@@ -232,9 +233,9 @@ class Subset(Sampling):
     p0 : float
         Share of them that seeds the next level.
     load : str
-        Load whose exceedance is estimated, ``cross1.F``.
-    above : float
-        Value of the load whose exceedance is estimated, SI.
+        Name of the limit whose exceedance is estimated: ``cross1.F``, ``cross*.F``, ``all limits``.
+    levels : dict of str to float
+        Level of each load of the limit, SI.
     unresolved : str
         Whether a joint without a valid load counts as above every level or below.
     """
@@ -246,8 +247,13 @@ class Subset(Sampling):
     per_level: Annotated[int, Field(strict=True, ge=20, le=MAX_ROWS)]
     p0: Annotated[Number, Field(gt=0, le=0.5)]
     load: str
-    above: Number
+    levels: Annotated[dict[str, Number], Field(min_length=1)]
     unresolved: Literal["above", "below"] = "below"
+
+    @property
+    def limit(self) -> Limit:
+        """The limit whose exceedance is estimated."""
+        return Limit(self.load, tuple(self.levels), tuple(self.levels.values()))
 
     @model_validator(mode="after")
     def _whole_seeds(self) -> Self:

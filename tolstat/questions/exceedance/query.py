@@ -46,8 +46,9 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
-        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
-        `_error_budget`. Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
+        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
+        `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
+        Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `SampleLoad.supports`.
     """
     rows = []
@@ -56,6 +57,9 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         head = {"load": name, "unit": load.unit, "nominal": load.nominal}
         budget = _error_budget(view, load, level, confidence)
         row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
+        # the load with its numerical error, where that is known
+        top = (error_budget.shifted(view, load) or (load, load))[1]
+        row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
         rows.append(row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan))
     return pd.DataFrame(rows)
 

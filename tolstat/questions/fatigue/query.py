@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import cycles, damage, exceedance, quantile
+from tolstat.analysis import cycles, damage, exceedance, prediction, quantile
 from tolstat.analysis.cycles import Cycles, FloatArray
+from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.shown import shown
 from tolstat.common.tables import CHANNELS, Status
 from tolstat.questions.fatigue import duty
@@ -18,6 +19,8 @@ from tolstat.questions.fatigue.counting import cycles_of
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
+ANY = "any of them"
+"""Name of the row for all channels together."""
 SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints at which quantiles are given."""
 MAX_NUMBERS = 40
@@ -146,16 +149,18 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
     return pd.DataFrame(rows)
 
 
-def damages(loading: Loading, confidence: float = 0.95) -> pd.DataFrame:
+def damages(loading: Loading, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
     """Share of the joints whose damage sum in the service life exceeds 1, for each channel that has an S–N line.
 
     Returns
     -------
     DataFrame
+        One row per channel and, of several, `ANY` for joints with any of these damage sums above 1 (it has no line):
         ``channel``, ``m``, ``S0`` (N or N m), ``N0``, ``nominal`` (damage of the nominal joint), ``median`` (of the
-        joints), the fields of `analysis.exceedance.Exceedance` for the level 1, ``confidence``.
+        joints), the fields of `analysis.exceedance.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
+        (prediction interval for the joints above 1 in the next delivery), ``confidence``.
     """
-    rows = []
+    rows, worst = [], []
     for channel, values in loading.settings.lines.items():
         if channel not in loading.cycles.channels:
             continue
@@ -164,11 +169,26 @@ def damages(loading: Loading, confidence: float = 0.95) -> pd.DataFrame:
             damage.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
             for part in (loading.cycles, loading.nominal)
         )
+        worst.append((sums, nominal))
         head = {"channel": channel, **line._asdict(), "nominal": _only(nominal)}
-        head["median"] = quantile.quantile(sums, loading.status, 0.5).estimate
-        above = exceedance.exceedance(sums, loading.status, 1.0, confidence, loading.iid)
-        rows.append({**head, **asdict(above), "confidence": confidence})
+        rows.append(head | _above_one(loading, sums, confidence, delivery))
+    if len(worst) > 1:
+        sums, nominal = (np.maximum.reduce(parts) for parts in zip(*worst, strict=True))
+        head = {"channel": ANY, **dict.fromkeys(damage.Line._fields, np.nan), "nominal": _only(nominal)}
+        rows.append(head | _above_one(loading, sums, confidence, delivery))
     return pd.DataFrame(rows)
+
+
+def _above_one(loading: Loading, sums: FloatArray, confidence: float, delivery: int) -> dict[str, object]:
+    """Columns of `damages` that follow from the damage sums of the joints."""
+    above = exceedance.exceedance(sums, loading.status, 1.0, confidence, loading.iid)
+    following = (np.nan, np.nan)
+    if loading.iid:
+        least, most = round(above.n * above.bound_lower), round(above.n * above.bound_upper)
+        following = prediction.of_counts(least, most, above.n, delivery, confidence)
+    median = quantile.quantile(sums, loading.status, 0.5).estimate
+    ends = dict(zip(("next_lower", "next_upper"), following, strict=True))
+    return {"median": median} | asdict(above) | ends | {"confidence": confidence}
 
 
 def spectra(

@@ -14,13 +14,16 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.analysis import reweight
+from tolstat.analysis import prediction, reweight
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
+from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
+from tolstat.store.several_loads import together
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.axes import columns_of
@@ -32,7 +35,8 @@ SHARES = (0.5, 0.9, 0.99)
 """Quantiles of a study without limits."""
 MAX_OUTSIDE = 1e-4
 """Maximum probability of the new distribution outside the range of the old one; no estimate covers that part."""
-WITHHELD = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
+GIVEN = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
+WITHHELD = (*GIVEN, "total_lower", "total_upper", "next_lower", "next_upper")
 """Columns that are NaN where the joints do not support them."""
 DRAWS = 1 << 15
 """Number of sets of errors drawn for the mean square of the ratio of correlated errors, which has no closed form."""
@@ -54,11 +58,13 @@ class Reweighted(NamedTuple):
     changed : list of str
         Errors whose distribution changes.
     table : DataFrame
-        One row per limit: ``load``, ``unit``, ``level``, ``before`` (share of the joints as drawn), ``estimate``,
-        ``lower``, ``upper``, ``bound_lower`` and ``bound_upper`` (joints without a valid load counted below and above),
-        ``ess``, ``above`` and ``below`` (effective joints on each side of the limit), ``k``, ``usable``. For a study
-        without limits, quantiles: ``share`` instead of ``level``, loads as estimates, no bounds and no sides.
-        Estimates, intervals and bounds are NaN where ``usable`` is false.
+        One row per limit, and `ALL_LIMITS` for all of them together: ``load``, ``unit``, ``level``, ``before`` (share
+        of the joints as drawn), ``estimate``, ``lower``, ``upper``, ``bound_lower`` and ``bound_upper`` (joints without
+        a valid load counted below and above), ``total_lower`` and ``total_upper`` (also with the numerical error; NaN
+        where that is not known, see `store.error_budget.near`), ``next_lower`` and ``next_upper`` (prediction interval
+        for the joints above the limit in the next delivery), ``ess``, ``above`` and ``below`` (effective joints on each
+        side of the limit), ``k``, ``usable``. For a study without limits, quantiles: ``share`` instead of ``level``,
+        loads as estimates, no bounds and no sides. Estimates, intervals and bounds are NaN where ``usable`` is false.
     text : str
         The study with the changed tolerances and the same seed, TOML: run it where the table is not usable.
     """
@@ -98,7 +104,7 @@ class Reweighted(NamedTuple):
         return f"tolstat reweight {self.path} {changes} --out changed.toml && tolstat run changed.toml"
 
 
-def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) -> Reweighted:
+def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95, delivery: int = DELIVERY) -> Reweighted:
     """Estimate a campaign's statistics for other tolerances.
 
     Parameters
@@ -109,6 +115,8 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
         See `study.change.changed`.
     confidence : float
         Confidence level of the intervals.
+    delivery : int
+        Number of joints of the next delivery.
 
     Returns
     -------
@@ -144,14 +152,14 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
     if not ratios.values.any():
         found = "the new tolerances make none of the joints"
         raise StoreError(str(Fault(str(view.path), found, "run a study with these tolerances")))
-    loads = [view.load(name).only(done) for name in view.limits or view.shown_loads]
+    loads = view.loads(list(view.limits) or list(view.shown_loads))
     if lacking := [load.name for load in loads if not load.is_valid.any()]:
         found = f"holds no joint with a valid load: {', '.join(lacking)}"
         raise StoreError(str(Fault(str(view.path), found, f"see why: tolstat status {view.path}")))
     if view.limits:
-        rows = [_share_above(load, ratios, view.limits[load.name], confidence) for load in loads]
+        rows = [_share_above(view, load, done, ratios, confidence, delivery) for load in (*loads, together(view))]
     else:
-        rows = [_quantile(load, ratios, share, confidence) for load in loads for share in SHARES]
+        rows = [_quantile(load.only(done), ratios, share, confidence) for load in loads for share in SHARES]
     table = pd.DataFrame([row if row["usable"] else row | dict.fromkeys(WITHHELD & row.keys(), np.nan) for row in rows])
     return Reweighted(view.path, tuple(settings), ratios, names, table, rewritten(view.study, settings))
 
@@ -224,13 +232,32 @@ def _block_log_ratios(
     return logs
 
 
-def _share_above(load: SampleLoad, ratios: Ratios, level: float, confidence: float) -> dict[str, Any]:
-    """Row of the table for a limit; `ratios` are those of the joints of `load`."""
-    sample = reweight.sort_out(load.values, load.status, ratios)
-    found = reweight.share_above(sample, ratios, level, confidence, load.iid)
-    head = {"load": load.name, "unit": load.unit, "level": level, "before": load.above(level, confidence).estimate}
+def _share_above(
+    view: View, load: SampleLoad, done: NDArray[np.intp], ratios: Ratios, confidence: float, delivery: int
+) -> dict[str, Any]:
+    """Row of the table for a limit; `ratios` are those of the joints `done`."""
+    assert load.limit is not None
+    level, known = load.limit, error_budget.near(view, load)
+
+    def share(load: SampleLoad, confidence: float) -> reweight.Share:
+        own = load.only(done)
+        sample = reweight.sort_out(own.values, own.status, ratios)
+        return reweight.share_above(sample, ratios, level, confidence, own.iid)
+
+    def widest(confidence: float) -> tuple[float, float]:
+        """Ends of the interval; with the numerical error where that is known."""
+        ends = [share(one, confidence) for one in (load, *(known or ()))]
+        return min(one.lower for one in ends), max(one.upper for one in ends)
+
+    found = share(load, confidence)
+    before = load.only(done).above(level, confidence).estimate
     numbers = found._asdict()
-    return {**head, **{key: numbers[key] for key in (*WITHHELD, "ess")}, **found.support._asdict()}
+    row = {"load": load.name, "unit": load.unit, "level": level, "before": before}
+    row |= {key: numbers[key] for key in GIVEN}
+    row |= dict(zip(("total_lower", "total_upper"), widest(confidence) if known else (np.nan, np.nan), strict=True))
+    following = prediction.of_share(*widest(prediction.half(confidence)), delivery, confidence)
+    row |= dict(zip(("next_lower", "next_upper"), following, strict=True))
+    return row | {"ess": found.ess} | found.support._asdict()
 
 
 def _quantile(load: SampleLoad, ratios: Ratios, share: float, confidence: float) -> dict[str, Any]:

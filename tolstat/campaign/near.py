@@ -1,0 +1,138 @@
+"""Verify the joints nearest to a limit: their numerical error decides how far the share above it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.analysis.accuracy import LEAST_NEAR
+from tolstat.campaign import verify
+from tolstat.campaign.verify import QUICK_CHECKS, Progress, no_progress
+from tolstat.common import selected_results
+from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import ANY_LIMIT, LOADS, Limit, load_of
+from tolstat.common.tables import Status
+from tolstat.store import Reader, ResultStore, recorded, verification, worst
+from tolstat.store.verification import Check, Verification
+from tolstat.study import rule
+from tolstat.study.points import limits_at
+
+EXAMPLE = 'write --near "cross1.F > 700 N", or --near "any limit"'
+
+
+def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
+    """File slots of the settled joints whose loads are nearest to a limit, ascending: so many for each load of it."""
+    slots = np.arange(store.first_sample, store.n)
+    results = store.results(slice(store.first_sample, None))
+    settled = results["status"] == Status.OK
+    found: set[int] = set()
+    for name, level in zip(limit.loads, limit.levels, strict=True):
+        distance = np.where(settled, np.abs(LOADS[name].of(results) - level), np.inf)
+        order = np.argsort(distance, kind="stable")[:joints]
+        found |= set(slots[order[np.isfinite(distance[order])]].tolist())
+    return np.array(sorted(found), dtype=np.intp)
+
+
+def check_near(
+    path: Path,
+    text: str,
+    joints: int | str = LEAST_NEAR,
+    names: Iterable[str] = QUICK_CHECKS,
+    on_start: Callable[[], None] = lambda: None,
+    workers: int = 1,
+    progress: Progress = no_progress,
+) -> Verification:
+    """Check the joints of a result file nearest to a limit, and add the checks to those that the file holds.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    text : str
+        ``"cross*.F > 700 N"``, or ``"any limit"``.
+    joints : int
+        Number of joints for each load of the limit, at least `LEAST_NEAR`.
+    names : iterable of str
+        As in `verify.run_checks`, the same at each call.
+    on_start, workers, progress
+        As in `verify.check_file`.
+
+    Returns
+    -------
+    Verification
+        All verified joints near limits of the file.
+
+    Raises
+    ------
+    InputError
+        With every fault of limit and number.
+    StoreError
+        As `verify.check_file`, or when too few joints are settled.
+    """
+    number = verify.parse_joints(joints)
+    if number is None or number < LEAST_NEAR:
+        found = f"{joints} joints do not tell the numerical error near a limit"
+        raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
+    with ResultStore.open_to_write(path) as store:
+        lacking = [
+            name for name in rule.limit_of(text, store.limits, "--near", EXAMPLE).loads if not _kept(store, name)
+        ]
+        if lacking:
+            remedy = "give loads that it keeps, see tolstat status"
+            raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
+        verify.check_version(store)
+        chosen = []
+        for one in store.each():
+            limits = limits_at(store.limits, [one.point or ""], list(store.points))
+            if limits or text.split() != ANY_LIMIT.split():
+                chosen.append((one, nearest(one, rule.limit_of(text, limits, "--near", EXAMPLE), number)))
+        for _, slots in chosen:
+            if slots.size < LEAST_NEAR:
+                found = f"has {slots.size} settled joints; {LEAST_NEAR} are needed"
+                raise StoreError(str(Fault(str(path), found, f"add joints: tolstat extend {path}")))
+        checked = [_checked(one, slots, names, on_start, workers, progress) for one, slots in chosen]
+        found_near = worst.checks(checked)
+    assert found_near is not None
+    return found_near
+
+
+def _kept(store: Reader, name: str) -> bool:
+    return selected_results.holds(store.columns, load_of(name).name)
+
+
+def _checked(
+    store: ResultStore,
+    slots: NDArray[np.intp],
+    names: Iterable[str],
+    on_start: Callable[[], None],
+    workers: int,
+    progress: Progress,
+) -> Verification:
+    """Check the joints of some slots at one operating point, beside those checked before."""
+    before = verification.read(store, verification.NEAR)
+    new = slots if before is None else slots[~np.isin(store.row(slots), before.rows)]
+    if new.size:
+        on_start()
+        params = partial(recorded.parameters, store)
+        made = verify.check_slots(store, params, new, names, workers=workers, progress=progress)
+        before = made if before is None else _merged(before, made)
+        verification.write(store, before, verification.NEAR)
+    assert before is not None
+    return before
+
+
+def _merged(one: Verification, other: Verification) -> Verification:
+    """Joints of both, ascending."""
+    rows = np.concatenate([one.rows, other.rows])
+    order = np.argsort(rows)
+    checks = {
+        name: Check(
+            check.description, check.options, np.concatenate([check.results, other.checks[name].results])[order]
+        )
+        for name, check in one.checks.items()
+    }
+    return Verification(one.seed, rows[order], np.concatenate([one.base, other.base])[order], checks)

@@ -17,6 +17,7 @@ from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.joints import query as joints
 from tolstat.questions.what_if import rendering as what_if
 from tolstat.store.view import View
+from tolstat.store.worst import point_of
 
 WORDS = {
     "yes": "kept",
@@ -83,8 +84,8 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limits(view).to_dict("records")
     found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
-    worst = _worst(view, records)
-    unresolved = _causes(view) if _matter(records if found.answer == "none" else [worst]) else ()
+    decisive = records if found.answer == "none" else [_worst(view, records)]
+    unresolved = _causes(view) if _matter(decisive) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
 
 
@@ -164,7 +165,7 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
     if answer == "none":
         return Headline(answer, WORDS[answer], _reason(view, concerned), notes)
     worst = _worst(view, concerned)
-    limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
+    limit = _limit(view, worst)
     interval = f"total interval {text.span(*ends(worst))}"
     if answer == "no":
         share = share_of(worst)
@@ -187,6 +188,13 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
     return Headline(answer, WORDS[answer], said, notes, worst["load"])
 
 
+def _limit(view: View, row: Row) -> str:
+    """Limit in words: ``1500 N on cross1.F, most often at start`` where it holds at several operating points."""
+    said = f"{text.value(row['level'], row['unit'])} on {row['load']}"
+    several = row["count"] and len(view.narrowed(row["load"])[0].points) > 1
+    return f"{said}, most often at {point_of(view, row['load'])}" if several else said
+
+
 def _worst(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
     """Limit that the largest share of the joints exceeds; of equal shares that of a leading load."""
     return max(records, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
@@ -200,7 +208,7 @@ def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
         if not known or _undecided(known):
             return Headline("none", WORDS["none"], _reason(view, records), notes)
         worst = _worst(view, known)
-        limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
+        limit = _limit(view, worst)
         interval = "total interval" if _matter([worst]) else f"total interval {text.span(*ends(worst))}"
         missed = f"whatever the proposals miss, at most {text.percent(worst['unsearched_upper'])}"
         said = f"of the joints exceed {limit}, the limit exceeded most ({interval}; {missed})"

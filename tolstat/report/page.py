@@ -19,6 +19,7 @@ from tolstat.solver import fidelity
 from tolstat.store import viewed
 from tolstat.store.integrity import DIGEST
 from tolstat.store.result_file import BLOCK
+from tolstat.store.worst import point_of
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -88,7 +89,8 @@ def compose(view: View, asked: Asked) -> Page:
         note for note in (fidelity.sentence(view.store.options, view.store.fidelity), _stopped(view)) if note
     )
     if len(view.points) > 1:
-        remedy = f"tolstat report {asked.path.name} --point {view.points[0]} --out PAGE.html"
+        point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
+        remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
         asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
         asked = replace(asked, replay=0)
     sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]

@@ -205,6 +205,8 @@ class View:
     def load(self, name: str) -> SampleLoad:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
 
+        Its limit is the one of that name or, without it, the one that holds at these points.
+
         Raises
         ------
         InputError
@@ -216,7 +218,8 @@ class View:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
             view, plain = self.narrowed(name)
             if view is not self:
-                self._loads[name] = replace(view.load(plain), name=name, limit=self.limits.get(name))
+                own = view.load(plain)
+                self._loads[name] = replace(own, name=name, limit=self.limits.get(name, own.limit))
                 return self._loads[name]
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
@@ -397,7 +400,8 @@ class View:
         pending = self.counts.total - self.counts.done
         text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)})"
         if all(self.points):
-            text += f" at {self.points[0]}" if len(self.points) == 1 else f", the worst of {', '.join(self.points)}"
+            *others, last = self.points
+            text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"
         text += f", {self.counts.shortfall}"
         return text + (f", {pending} still pending" if pending else "")
 

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import load_of, unit_text
+from tolstat.common.loads import load_of, split, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
@@ -164,14 +164,15 @@ def readings(view: View) -> dict[str, Any]:
     Returns
     -------
     dict
-        By load: ``unit``; ``n``, ``failed``, ``unsettled``; ``start``, index of the level shown first (nearest to the
-        limit or, without one, to the 90 % quantile); lists of equal length ``x``, ``count``, ``share`` and, for
-        independent samples, ``lower``, ``upper``, ``outer_lower``, ``outer_upper``, otherwise ``bound_lower``,
-        ``bound_upper``.
+        By load, and by load at the operating points that a limit names: ``unit``; ``n``, ``failed``, ``unsettled``;
+        ``start``, index of the level shown first (nearest to the limit or, without one, to the 90 % quantile); lists of
+        equal length ``x``, ``count``, ``share`` and, for independent samples, ``lower``, ``upper``, ``outer_lower``,
+        ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``.
     """
     found = {}
     ends = ("lower", "upper", "outer_lower", "outer_upper") if view.has_intervals else ("bound_lower", "bound_upper")
-    for load in view.loads(view.shown_loads):
+    named = [name for name in view.limits if split(name)[1]]
+    for load in view.loads([*view.shown_loads, *named]):
         if not load.valid.size:
             continue
         x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)

@@ -48,7 +48,7 @@ def _load_panel(load: SampleLoad) -> Panel:
     median, most = (text.value(load.quantile(share).estimate, load.unit) for share in (0.5, 0.95))
     scale = ", logarithmic" if load.long_tailed else ""
     return Panel(
-        f"histogram-{load.name.replace('.', '-')}",
+        f"histogram-{load.name}",
         f"{load.name}: distribution of the joints",
         f"Half of the joints are below {median}, 95 % below {most}; scale of loads{scale or ' linear'}",
         partial(_load, load=load),

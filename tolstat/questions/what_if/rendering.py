@@ -150,7 +150,7 @@ def tornado_panel(found: WhatIf, accepted: float) -> Panel:
     left = drawing.rows_left([part for label in labels for part in label.split("\n")])
     top = drawing.legend_room(_STEPS, left)
     return Panel(
-        f"what-if-{found.load.replace('.', '-')}",
+        f"what-if-{found.load}",
         f"Share of the joints with {limit}, if one line is changed",
         f"As drawn {text.percent(found.share)}. Half as wide: {halves}",
         partial(_tornado, found=found, table=table, labels=labels, accepted=accepted),
@@ -164,7 +164,7 @@ def curve_panel(found: WhatIf, accepted: float) -> Panel:
     """Share above the level against the width of each line."""
     table = found.table[np.isfinite(found.table["factor"])]
     return Panel(
-        f"widths-{found.load.replace('.', '-')}",
+        f"widths-{found.load}",
         "The share against the width of each line",
         "; ".join(
             f"{line}: " + ", ".join(f"{row['factor']:.3g} {text.percent(row['share'])}" for row in own)

@@ -187,7 +187,7 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
         notes += (_untold(view, records),)
     elif several and worst["count"] and not np.isnan(worst["estimate"]):
         said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
-    better = what_if.advice(view, row["load"]) if answer == "no" else ""
+    better = what_if.advice(view, row["load"], accepted) if answer == "no" else ""
     said += f". {better}" if better else ""
     return Headline(answer, WORDS[answer], said, notes, worst["load"])
 

@@ -7,6 +7,7 @@ import json
 import h5py
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import tolstat
@@ -17,6 +18,7 @@ from tolstat.campaign.extend import extend, merge
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.display import text
 from tolstat.display.asked import Asked
 from tolstat.joint import perturb
 from tolstat.questions.what_if import query, rendering
@@ -74,14 +76,19 @@ def quick(monkeypatch):
     monkeypatch.setattr(runner, "MOST", 1024)
 
 
-@pytest.fixture
-def path(tmp_path):
-    plan = loaded(tmp_path)
+def made(folder, text=TEXT):
+    """Campaign of the stand-in."""
+    plan = loaded(folder, text)
     errors = sampling.draw(plan)
-    file = tmp_path / "made.h5"
+    file = folder / "made.h5"
     with ResultStore.create(file, plan, errors) as store:
         store.write(np.arange(plan.rows), stand_in(perturb(plan.joint, plan.operation, errors), None))
     return file
+
+
+@pytest.fixture
+def path(tmp_path):
+    return made(tmp_path)
 
 
 def line(plan, label):
@@ -179,7 +186,18 @@ def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
     indices = found.indices.set_index("line")
     assert indices.loc["pin*.tilt_t", "in_all"] > 0.5 > 0.3 > indices.loc["pin*.offset_z", "in_all"]
     assert indices.loc["hole*.diameter", "in_all"] == pytest.approx(0.0, abs=1e-12)
-    assert rendering.sentence(found).startswith("Halve the tilt tolerance of the pins (±0.5 deg) and it is ")
+    said = rendering.sentence(found)
+    assert said.startswith("Halve the tilt tolerance of the pins (±0.5 deg) and ")
+    assert said.endswith(" exceed the limit")
+    half, exact = (
+        found.table.set_index(["line", "step"]).loc[("pin*.tilt_t", step), "share"] for step in (HALF, EXACT)
+    )
+    assert rendering.sentence(found, half) == said
+    assert rendering.sentence(found, 0.5 * (half + exact)).startswith("Halving a single line is not enough: halving")
+    assert rendering.sentence(found, -1.0).startswith(
+        "No single line is enough: halving the tilt tolerance of the pins"
+    )
+    assert rendering.sentence(found, -1.0).endswith(f"exact {text.percent(exact)}")
 
 
 @pytest.mark.usefixtures("quick")
@@ -325,8 +343,55 @@ def test_command_and_page(path, monkeypatch):
     with Reader.open(path) as store:
         (section,) = sections(store.view(), Asked(path, accepted=0.01))
     assert [block.kind for block in section.blocks] == ["text", "panels", "table", "table", "text"]
-    assert "Halve the tilt tolerance of the pins" in section.blocks[0].text
+    assert "Halving a single line is not enough: halving the tilt tolerance of the pins" in section.blocks[0].text
     assert run("--each", "error").exit_code == 2
+
+
+def test_of_all_limits_the_largest_ratio_counts():
+    loads = np.array([[600.0, 900.0], [750.0, 100.0], [np.nan, 1000.0]])
+    one = what_if.Altered({}, 0, ("cross1.F", "cross2.F"), loads, np.full(3, Status.OK, np.uint8))
+    measure = query.Measure(((("cross1.F",), 700.0), (("cross2.F",), 1000.0)))
+    assert measure.held(one)
+    np.testing.assert_allclose(measure.of(one), [0.9, 750 / 700, np.nan])
+    assert not query.Measure(((("cross3.F",), 700.0),)).held(one)
+
+
+@pytest.mark.usefixtures("quick")
+def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_path, monkeypatch):
+    path = made(tmp_path, TEXT.replace('"cross1.F" = "700 N"', '"cross1.F" = "800 N"\n"cross2.F" = "700 N"'))
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        both, second = (query.what_if(view, by) for by in ("all limits", "cross2.F"))  # the first is never reached
+        np.testing.assert_array_equal(both.table["share"], second.table["share"])
+        assert (both.share, both.level) == (second.share, 1.0)
+        found = headline(view, 0.1)
+        (section,) = sections(view, Asked(path, accepted=0.1))
+        view.altered = {name: one for name, one in view.altered.items() if one.about.get("step") != EXACT}
+        told = rendering.absent(query.what_if(view, "all limits")._replace(left_out=("pin*.position",)))
+    assert "Most often 700 N on cross2.F: 22.2 %. Halve the tilt tolerance of the pins" in found.words
+    assert found.words.endswith(" exceed at least one limit")
+    assert section.blocks[0].text.startswith("At least one limit exceeded in 22.2 % of the joints as drawn. Halve the ")
+    assert told == [rendering.absent(both._replace(left_out=("pin*.position",)))[0]]
+    assert told[0].startswith("left out: pin*.position; the width of their zone depends on other errors")
+    shown = [
+        CliRunner().invoke(app, ["causes", str(path), "--top", "2", *more]) for more in ([], ["--by", "all limits"])
+    ]
+    assert shown[0].stdout == shown[1].stdout
+    assert shown[0].stdout.startswith("at least one limit exceeded: 22.2 % ")
+
+
+@pytest.mark.usefixtures("quick")
+def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        found = query.what_if(store.view(), "cross1.F")
+    table = rendering.rows(found)
+    ax = Figure().subplots()
+    rendering.tornado_panel(found, np.nan).draw(ax)
+    half = table.loc[table["half"] > 0.01].iloc[0]
+    drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
+    assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)
 
 
 TWO = TEXT.replace("[operation]", '[[operation]]\nname = "cruise"').replace(
@@ -428,7 +493,7 @@ def test_command_and_page_name_the_point(tmp_path, monkeypatch):
         found = headline(store.view(), 0.01)
         (section,) = sections(store.view(), Asked(path, accepted=0.01))
     assert "700 N on cross1.F at start" in found.sentence
-    assert "Halve the tilt tolerance of the pins" in found.sentence
+    assert "No single line is enough: halving the tilt tolerance of the pins" in found.sentence
     assert section.blocks[0].text.startswith("cross1.F at start > 700 N")
 
 

@@ -128,7 +128,7 @@ Accept = Annotated[
     typer.Option(
         "--accept",
         metavar="SHARE",
-        help='Accepted share of joints above a limit, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
+        help='Accepted share of the joints, all limits together, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
     ),
 ]
 Delivery = Annotated[

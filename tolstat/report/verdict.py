@@ -43,7 +43,7 @@ def limits(view: View, asked: Asked) -> list[Section]:
     table = exceedance.limits(view)
     verdicts = [verdict(row, asked.accepted) for row in table.to_dict("records")]
     words = dict(zip(table["load"], (WORDS.get(v, "") for v in verdicts), strict=True))
-    kept = Column("kept", lambda row: words[row["load"]], shown=lambda _: asked.judges)
+    kept = Column("kept by itself", lambda row: words[row["load"]], shown=lambda _: asked.judges)
     block = as_block(
         "Joints above each limit, in numbers", (LIMITS[0], kept, *LIMITS[1:]), table, verdicts if asked.judges else ()
     )
@@ -160,8 +160,9 @@ def _how(view: View, asked: Asked) -> list[str]:
         paragraphs.append("A limit that names no operating point is about the largest load over all of them.")
     if asked.judges:
         paragraphs.append(
-            f"A limit is kept if its total interval lies below {text.percent(asked.accepted)}, not kept if it lies "
-            "above. It has no verdict where joints without a valid load decide, and is open otherwise."
+            f"Each limit by itself: kept if its total interval lies below {text.percent(asked.accepted)}, not kept if "
+            "it lies above. It has no verdict where joints without a valid load decide, and is open otherwise. The "
+            "verdict at the top is on the joints that exceed at least one limit."
         )
     return paragraphs
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import EXCHANGE, WIDTH
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -32,14 +33,34 @@ TAIL_STARTS_AT = 0.9
 """Quantile of the load that takes the place of a limit where the study sets none."""
 
 
+class Measure(NamedTuple):
+    """How the load that orders the lines follows from the loads that a file keeps.
+
+    Attributes
+    ----------
+    parts : tuple of (tuple of str, float)
+        Names of loads, of which the largest counts, and what it is divided by: 1, or the limit of each of all limits.
+    """
+
+    parts: tuple[tuple[tuple[str, ...], float], ...]
+
+    def held(self, one: Altered) -> bool:
+        """Whether a set has all these loads."""
+        return all(one.holds(names) for names, _ in self.parts)
+
+    def of(self, one: Altered) -> FloatArray:
+        """Load of each joint of a set, NaN where one of its loads is not valid, (n,)."""
+        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self.parts]))
+
+
 @shown
 class WhatIf(NamedTuple):
-    """Share of the joints above a limit with other widths.
+    """Share of the joints above a limit, or above at least one of all limits, with other widths.
 
     Attributes
     ----------
     load, unit : str
-        The load, and its SI unit.
+        The load, and its SI unit; ``"all limits"`` for the largest ratio of load to limit.
     level : float
         The limit; without one, the 90 % quantile of the load.
     n : int
@@ -57,8 +78,8 @@ class WhatIf(NamedTuple):
         level. NaN for correlated lines.
     logarithmic : bool
         Whether the logarithm of the load is decomposed.
-    missing : tuple of str
-        Entries of ``[tolerances]`` without joints in the file.
+    missing, left_out : tuple of str
+        Entries of ``[tolerances]`` without joints in the file, and those whose width is not changed.
     settled : bool
         Whether the order of the lines is settled: neighbours differ, or by less than `NEGLIGIBLE` of the share.
     """
@@ -74,6 +95,7 @@ class WhatIf(NamedTuple):
     indices: pd.DataFrame
     logarithmic: bool
     missing: tuple[str, ...]
+    left_out: tuple[str, ...]
     settled: bool
 
 
@@ -85,7 +107,7 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
     view : View
         A campaign whose joints are drawn from tolerances.
     by : str
-        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or ``"all limits"`` of the study.
     confidence : float
         Confidence level of all intervals.
 
@@ -107,14 +129,14 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
     ...     found = tolstat.what_if(store.view(), "fork1.F")
     """
     check(view)
-    load, names = view.load(by), names_at_points(view, by)
-    held = [one for one in view.altered.values() if one.about["kind"] == WIDTH and one.holds(names)]
+    load, own = view.load(by), measure(view, by)
+    held = [one for one in view.altered.values() if one.about["kind"] == WIDTH and own.held(one)]
     base = as_drawn(view, by, view.altered)
     if not held or not np.isfinite(base).any():
         return None
     level = level_of(load)
     study_lines = widths.lines(view.study)
-    rows = [_row(view, one, base, names, level, confidence) for one in held]
+    rows = [_row(view, one, base, own, level, confidence) for one in held]
     table = pd.DataFrame([row for row in rows if row is not None])
     if table.empty:
         return None
@@ -133,7 +155,8 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
         indices=_indices(view, base, load, level, confidence, list(order)),
         logarithmic=load.long_tailed,
         missing=tuple(line.label for line in study_lines if line.label not in order),
-        settled=is_settled(halves(view.altered, study_lines, names), base, level, confidence),
+        left_out=tuple(widths.left_out(view.study)),
+        settled=is_settled(halves(view.altered, study_lines, own), base, level, confidence),
     )
 
 
@@ -161,6 +184,13 @@ def names_at_points(view: View, load: str) -> tuple[str, ...]:
     return tuple(at(plain, [point], list(view.store.points)) for point in own.points)
 
 
+def measure(view: View, load: str) -> Measure:
+    """Measure of a load, or of all limits together."""
+    if load == ALL_LIMITS:
+        return Measure(tuple((names_at_points(view, name), level) for name, level in view.limits.items()))
+    return Measure(((names_at_points(view, load), 1.0),))
+
+
 def level_of(load: SampleLoad) -> float:
     """Limit of a load; without one, the 90 % quantile of the joints."""
     return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
@@ -178,18 +208,18 @@ def as_drawn(view: View, load: str, held: Mapping[str, Altered]) -> FloatArray:
     """Load of the joints as drawn, from sample 0 on, NaN without a valid one, (n,): the campaign's, then fresh ones."""
     own = own_joints(view)
     values = view.load(load).valid_or_nan[:own]
-    more, names = held.get(kept.key(sets.as_drawn(view.study).about)), names_at_points(view, load)
-    if more is None or not more.holds(names) or not more.first <= own < more.end:
+    more, how = held.get(kept.key(sets.as_drawn(view.study).about)), measure(view, load)
+    if more is None or not how.held(more) or not more.first <= own < more.end:
         return values
-    return np.concatenate([values, more.valid(names)[own - more.first :]])
+    return np.concatenate([values, how.of(more)[own - more.first :]])
 
 
-def halves(held: Mapping[str, Altered], lines: list[Line], names: Sequence[str]) -> list[FloatArray]:
-    """Largest of some loads of the joints of each line that is half as wide; of those lines that the file has."""
+def halves(held: Mapping[str, Altered], lines: list[Line], load: Measure) -> list[FloatArray]:
+    """Load of the joints of each line that is half as wide; of those lines that the file has."""
     by_label = {
-        one.about["label"]: one.valid(names)
+        one.about["label"]: load.of(one)
         for one in held.values()
-        if one.about["kind"] == WIDTH and one.about["step"] == HALF and one.holds(names)
+        if one.about["kind"] == WIDTH and one.about["step"] == HALF and load.held(one)
     }
     return [by_label[line.label] for line in lines if line.label in by_label]
 
@@ -235,12 +265,12 @@ def _order(table: pd.DataFrame) -> dict[str, int]:
 
 
 def _row(
-    view: View, one: Altered, base: FloatArray, names: Sequence[str], level: float, confidence: float
+    view: View, one: Altered, base: FloatArray, load: Measure, level: float, confidence: float
 ) -> dict[str, object] | None:
     n = min(len(base), one.end)
     if one.first or not n:
         return None
-    values = one.valid(names)[:n]
+    values = load.of(one)[:n]
     if not np.isfinite(values).any() or not np.isfinite(values + base[:n]).any():
         return None
     drawn = exceedance.exceedance(base, _states(base), level, confidence)
@@ -289,15 +319,15 @@ def _states(values: FloatArray) -> NDArray[np.uint8]:
 def _indices(
     view: View, base: FloatArray, load: SampleLoad, level: float, confidence: float, order: list[str]
 ) -> pd.DataFrame:
-    names = names_at_points(view, load.name)
+    own = measure(view, load.name)
     held = {one.about["label"]: one for one in view.altered.values() if one.about["kind"] == EXCHANGE}
     rows = []
     for label in order:
         one = held.get(label)
         n = 0 if one is None else min(one.end, len(base) // 2)
-        if one is None or one.first or n < pick_freeze.FEWEST or not one.holds(names):
+        if one is None or one.first or n < pick_freeze.FEWEST or not own.held(one):
             continue
-        a, b, ab = base[: 2 * n : 2], base[1 : 2 * n : 2], one.valid(names)[:n]
+        a, b, ab = base[: 2 * n : 2], base[1 : 2 * n : 2], own.of(one)[:n]
         row: dict[str, object] = {"line": label, "pairs": n}
         of_load, of_event = _decomposed(a, b, ab, load.long_tailed), _event(a, b, ab, level)
         for name, parts, estimate in (("", of_load, pick_freeze.indices), ("above_", of_event, pick_freeze.of_event)):

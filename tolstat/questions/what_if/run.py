@@ -13,7 +13,7 @@ from tolstat.campaign.progress import clock, silent
 from tolstat.campaign.verify import no_progress
 from tolstat.campaign.what_if import Asked, Wanted
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.loads import split
+from tolstat.common.loads import ALL_LIMITS, split
 from tolstat.questions.what_if import query
 from tolstat.solver.simulation import warm_up
 from tolstat.store import Counts, ResultStore, what_if
@@ -93,7 +93,7 @@ def simulate(
     path : Path
         Result file of a campaign whose joints are drawn from tolerances.
     by : str, optional
-        Load whose limit orders the lines; by default that with the limit exceeded most.
+        Load whose limit orders the lines; by default ``"all limits"`` together if there are several.
     each : {"entry", "feature", "error"}
         What a line is: an entry of ``[tolerances]``, a pin with its hole, or an error.
     groups : sequence of str
@@ -221,8 +221,7 @@ class _Run:
         return found + [Wanted(sets.exchanged(study, line), range(n // 2)) for line in apart]
 
     def _is_settled(self) -> bool:
-        names = query.names_at_points(self._view, self._load)
-        values = query.halves(self._held, list(self._lines), names)
+        values = query.halves(self._held, list(self._lines), query.measure(self._view, self._load))
         if len(values) < len(self._lines):
             return False
         base = query.as_drawn(self._view, self._load, self._held)
@@ -232,7 +231,8 @@ class _Run:
 def points_of(view: View, by: str) -> tuple[str, ...]:
     """Operating points that a load, a limit or joints in the file are about; all of them if there is no limit."""
     every = tuple(view.store.points)
-    names = [by, *(view.limits or ("",)), *(name for one in view.altered.values() for name in one.names)]
+    asked = () if by == ALL_LIMITS else (by,)
+    names = [*asked, *(view.limits or ("",)), *(name for one in view.altered.values() for name in one.names)]
     chosen = {point for name in names for point in names_of(split(name)[1], every, name)}
     return tuple(point for point in every if point in chosen)
 
@@ -240,7 +240,7 @@ def points_of(view: View, by: str) -> tuple[str, ...]:
 def _checked(view: View, by: str | None) -> str:
     """Load that orders the lines; refuse a file that the code cannot continue."""
     query.check(view)
-    load = by or view.most_exceeded
+    load = by or view.decisive
     view.load(load)
     store = view.store
     if any(store.versions.get(name) != value for name, value in versions().items() if name in ("tolstat", "sources")):

@@ -19,7 +19,6 @@ from tolstat.common.tables import Status
 from tolstat.store import Reader, ResultStore, recorded, verification, worst
 from tolstat.store.verification import Check, Verification
 from tolstat.study import rule
-from tolstat.study.points import limits_at
 
 EXAMPLE = 'write --near "cross1.F > 700 N", or --near "any limit"'
 

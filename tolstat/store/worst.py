@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
 from tolstat.store.verification import Verification
-from tolstat.study.points import names_of
 
 if TYPE_CHECKING:
     from tolstat.store.view import View

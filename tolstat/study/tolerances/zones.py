@@ -348,9 +348,10 @@ def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[s
     """
     for entry in entries:
         for site, model in entry.models:
-            common = isinstance(model, PositionEntry | OrientationEntry) and site.name.partition(".")[0] in PAIRS
+            if not isinstance(model, PositionEntry | OrientationEntry):
+                continue
             apart = 2.0 * site.reach
-            if common and model.over < apart * (1.0 - 1e-9):
+            if site.name.partition(".")[0] in PAIRS and model.over < apart * (1.0 - 1e-9):
                 found = (
                     f"{units.shown(model.over, 'm')} is shorter than the {units.shown(apart, 'm')} between the bearings"
                 )

@@ -327,13 +327,7 @@ def check_file(
 
 
 def check_version(store: Reader) -> None:
-    """Refuse a file that other code made.
-
-    Raises
-    ------
-    StoreError
-        The hint says what to do.
-    """
+    """Raise a StoreError for a file that other code made; the hint says what to do."""
     if differing_code(store.versions):
         remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
         raise StoreError(str(Fault(str(store.path), "was made by another version of the code", remedy)))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign import executors
 from tolstat.campaign.executors import Lost
+from tolstat.common.solver_options import from_names
 from tolstat.common.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
 from tolstat.store import Reader
 from tolstat.store.provenance import versions
@@ -246,7 +247,7 @@ def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec])
 
 def settings_in_use(study: Study, store: Reader) -> list[Options]:
     """Return the solver options of all joints of a file, each once."""
-    retried = [Options(**retry["options"]) for retry in store.retries]
+    retried = [from_names(retry["options"]) for retry in store.retries]
     return list(dict.fromkeys([*(settings(solver, store.fidelity) for solver in study.solvers), *retried]))
 
 
@@ -262,7 +263,7 @@ def _blocks(
     """Yield the pending file slots below `stop_slot` as blocks whose joints have the same point and solver options."""
     studies = {point: study.at(point) for point in store.points}
     variant_options = [settings(solver, store.fidelity) for solver in study.solvers]
-    retry_options = [Options(**retry["options"]) for retry in store.retries]
+    retry_options = [from_names(retry["options"]) for retry in store.retries]
     distinct = settings_in_use(study, store)
     for one, slots in pending(store, stop_slot):
         read = slice(slots[0], slots[-1] + 1)

@@ -110,7 +110,7 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
     few = synthetic.store(tmp_path)
     sweep = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
     for arguments, text in (
-        ((few,), "60 joints with a valid cross1.F"),
+        ((few,), "60 joints with a valid load on all limits"),
         ((sweep,), "not drawn from tolerances"),
         ((path, "--by", "cross9.F"), "is not a load"),
     ):

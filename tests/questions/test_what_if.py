@@ -335,7 +335,7 @@ def test_command_and_page(path, monkeypatch):
     assert shown.exit_code == 0, shown.output
     assert "lines, 400 joints of each change" in shown.stderr
     assert shown.stdout.startswith("cross1.F > 700 N: ")
-    assert "\n\nscatter of cross1.F over all joints, not of exceeding the limit; by error:\nerror " in shown.stdout
+    assert "\n\nscatter of cross1.F over all joints, not of exceeding a limit:\nerror " in shown.stdout
     assert max(map(len, shown.stdout.splitlines())) <= 80
     told = json.loads(run("--json").stdout)["what_if"]
     assert told["load"] == "cross1.F"

@@ -240,6 +240,7 @@ def test_limits_and_their_verdicts_stand_on_the_page(view, html):
 @pytest.mark.parametrize(("low", "high", "answer"), [(0.01, 0.05, "yes"), (0.04, 0.06, "open"), (0.051, 0.2, "no")])
 def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, high, answer):
     counted = {"n": 100, "n_failed": 0, "n_unsettled": 0, "count": 4, "bound_lower": 0.04, "bound_upper": 0.04}
+    counted["unsearched_upper"] = np.nan  # joints of equal weight
     wide = counted | {"outer_lower": 0.03, "outer_upper": 0.04, "total_lower": low, "total_upper": high}
     assert verdict.verdict(wide, 0.05) == answer
     narrow = counted | {"outer_lower": low, "outer_upper": high, "total_lower": np.nan, "total_upper": np.nan}

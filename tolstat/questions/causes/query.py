@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tolstat import sampling
 from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -129,7 +130,8 @@ def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> C
     values = load.values[samples]
     needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * regression.GROUPS)
     if samples.size < needed:
-        found = f"has {samples.size} joints with a valid {load.name}"
+        what = "load on all limits" if load.name == ALL_LIMITS else load.name
+        found = f"has {samples.size} joints with a valid {what}"
         raise StoreError(str(Fault(str(view.path), found, f"run {needed} joints or more")))
     if np.ptp(values) == 0:
         remedy = "name another load with --by"

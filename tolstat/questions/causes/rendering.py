@@ -57,7 +57,7 @@ def _has(name: str) -> Callable[[pd.DataFrame], bool]:
 
 def heading(causes: Causes) -> str:
     """Line above the table where another one stands before it: what the shares are of."""
-    return f"scatter of {causes.load} over all joints, not of exceeding the limit; by error:"
+    return f"scatter of {causes.load} over all joints, not of exceeding a limit:"
 
 
 def note(causes: Causes, log: bool = False) -> str:

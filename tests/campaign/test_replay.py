@@ -214,7 +214,7 @@ def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
 def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(synthetic.STUDY, encoding="utf-8")
     plan = study.load(tmp_path / "plan.toml")
-    subset = study.subset_of(plan, {"load": "cross1.F", "above": 700.0, "per_level": 60, "p0": 0.1})
+    subset = study.subset_of(plan, {"load": "cross1.F", "levels": {"cross1.F": 700.0}, "per_level": 60, "p0": 0.1})
     results, origin = synthetic.results(61), np.zeros(61, SUBSET)
     with ResultStore.create(tmp_path / "subset.h5", subset, sampling.draw(plan), origin=[origin]) as store:
         store.write(np.arange(61), Simulation(results, None))

@@ -9,7 +9,7 @@ from tests.conftest import with_law
 from tests.measure import stability
 from tests.support.environment import ROOT
 from tolstat import joint as joints
-from tolstat.common.tables import RESULT, RESULTANT, SPAN, Options
+from tolstat.common.tables import RESULT, RESULTANT, SPAN, Options, iterations_allowed
 from tolstat.joint.contact import FROM_COEFFICIENTS
 from tolstat.kernel.mechanics import dynamics, rotation
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PIN
@@ -158,7 +158,8 @@ def test_one_end_alone_touches_with_the_point_law_and_both_with_the_uniform_one(
 def test_samples_know_which_stations_carry_and_see_an_end_touch_beside_the_middle(params):
     """The middle of the law `mode` can carry before the other end does: that end's touch is a switch."""
     par = params(alpha=0.26, torque=1000.0, pin1__tilt_z=0.004, hole2__tilt_t=-0.004)
-    (found,) = simulation._alone(par, Options(), True, np.zeros(1, RESULT).view(np.recarray))
+    left = np.full(1, iterations_allowed(Options().steps_per_rev, Options().max_revs))
+    (found,) = simulation._alone(par, Options(), left, True, np.zeros(1, RESULT).view(np.recarray))
     samples, work = found[1].copy(), make_work()
     bits = np.zeros((len(samples), 4), int)
     for k, sample in enumerate(samples):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tolstat import joint as joints
-from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status
+from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status, iterations_allowed
 from tolstat.joint.contact import FROM_COEFFICIENTS
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
@@ -119,7 +119,8 @@ def assert_same(a, b):
 
 def alone(params, options):
     results = np.zeros(len(params), simulation.RESULT).view(np.recarray)
-    samples = [own.copy() for _, own in simulation._alone(params, options, True, results)]
+    left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))
+    samples = [own.copy() for _, own in simulation._alone(params, options, left, True, results)]
     stationary.fill_intervals(results)
     results["clearance"] = params["clearance"]
     return results, samples

@@ -71,7 +71,8 @@ def growths(params: Table, options: Options) -> list[Growth | None]:
     works, column = np.zeros(1, WORK), np.empty((3, 2 * N_DOF))
     matrices = np.empty((ANGLES, 2 * N_DOF, 2 * N_DOF))
     results = np.zeros(len(params), RESULT).view(np.recarray)
-    for i, samples in simulation._alone(params, options, True, results):
+    left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))
+    for i, samples in simulation._alone(params, options, left, True, results):
         if results[i].status not in SIMULATED:
             found.append(None)
             continue

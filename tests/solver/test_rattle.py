@@ -15,7 +15,7 @@ from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
 from tolstat.analysis import exceedance, weighted
 from tolstat.campaign import plan
-from tolstat.common.tables import PARAM, RESULT, Method, Motion, Options, Status
+from tolstat.common.tables import PARAM, RESULT, Method, Motion, Options, Status, iterations_allowed
 from tolstat.joint import ideal
 from tolstat.kernel.integrators.mesh import CELL, COARSEN_BELOW, COARSENING_REVS, FIRST_LEVEL, UNKNOWN, next_level
 from tolstat.solver import simulation, stationary
@@ -95,7 +95,8 @@ def with_explicit_steps(params: np.ndarray, steps: np.ndarray) -> tuple[np.ndarr
     """Results of joints that start with these numbers of steps a revolution, and statistics of their revolutions."""
     results = np.zeros(len(params), RESULT).view(np.recarray)
     blocks = np.zeros((len(params), EXPLICIT.max_revs), RESULT).view(np.recarray)
-    list(simulation._together(params, EXPLICIT, False, results, blocks, steps))
+    left = np.full(len(params), iterations_allowed(EXPLICIT.steps_per_rev, EXPLICIT.max_revs))
+    list(simulation._together(params, EXPLICIT, left, False, results, blocks, steps))
     return results.view(np.ndarray), blocks.view(np.ndarray)
 
 

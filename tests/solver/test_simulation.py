@@ -12,7 +12,18 @@ import pytest
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
 from tolstat import joint, study
 from tolstat.campaign import trace
-from tolstat.common.tables import RESULT, RESULTANT, SIMULATED, Fidelity, Method, Mode, Options, Start, Status
+from tolstat.common.tables import (
+    RESULT,
+    RESULTANT,
+    SIMULATED,
+    Fidelity,
+    Method,
+    Mode,
+    Options,
+    Start,
+    Status,
+    iterations_allowed,
+)
 from tolstat.joint import ideal
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.work import FORCE, make_work
@@ -61,7 +72,9 @@ def halves(case):
     for key, value in case.errors.items():
         errors[key] = value
     par = joint.perturb(case.joint, case.operation, errors).view(np.recarray)
-    ((_, samples),) = simulation._alone(par, case.solver.options(), True, np.zeros(1, RESULT).view(np.recarray))
+    options = case.solver.options()
+    left = np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
+    ((_, samples),) = simulation._alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
     work, found = make_work(), np.zeros((len(samples), 4, 2))
     outer = np.sign(par.station_s[0, : par.n_stations[0]]) / 2 + 0.5
     for k, sample in enumerate(samples):

@@ -23,7 +23,6 @@ from tolstat.cli._app import (
 )
 from tolstat.cli._talk import fail, progress, say, wrapped
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.loads import ANY_LIMIT
 
 if TYPE_CHECKING:
     from tolstat.questions.rare.query import RareEvent
@@ -143,6 +142,8 @@ def _read_study(source: Path, limit: str | None, point: str | None, given: dict[
     if limit is None:
         faults.append(Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"'))
     else:
+        from tolstat.common.loads import ANY_LIMIT
+
         if limit.split() != ANY_LIMIT.split():
             with gather(faults):
                 parse_limit(limit, {})

@@ -293,7 +293,7 @@ def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
     assert isinstance(loads, Table)
     row = next(row for row in loads.rows if row[0] == f"{leading}, m = 4")
     assert row[1:5] == [f"{x:.4g} N" for x in (own["nominal"][0.5], *own["estimate"])]
-    assert (len(loads.rows), len(damages.rows), damages.rows[0][4]) == (4, 8, f"0 of {loading.settled}")
+    assert (len(loads.rows), len(damages.rows), damages.rows[0][4]) == (4, 9, f"0 of {loading.settled}")
     assert note == Text(f"{rendering.notes(loading, table)}.", small=True)
     assert [text.split(":")[0] for text in asked.notes] == ["load cycles are left out"]
     for path in (campaign("none"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import pytest
 import tolstat
 from tests.support.environment import ROOT
 from tolstat import joint as joints
+from tolstat.campaign import blocks
 from tolstat.common.tables import PARAM
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -30,6 +31,7 @@ steps_per_rev = 15
 UNIFORM = 'upper = "0.030 mm", distribution = "uniform"'
 
 Params = Callable[..., np.recarray]
+DEFAULT_KIND = blocks.default_kind
 
 
 def with_law(par: np.recarray, law: str) -> np.recarray:
@@ -83,6 +85,27 @@ def random_errors() -> Callable[[int], dict[str, float]]:
         return errors
 
     return draw
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _small_campaigns_in_this_process() -> Iterator[None]:
+    """Simulate campaigns of one worker or block here: starting a worker takes longer than the joints of most tests.
+
+    Tests of what joints do to their processes ask for ``"processes"``, or for the fixture `supervised`.
+    """
+
+    def quick(workers: int, blocks: int) -> str:
+        return "processes" if workers > 1 and blocks > 1 else "serial"
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tolstat.campaign.blocks.default_kind", quick)
+        yield
+
+
+@pytest.fixture
+def supervised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulate all campaigns in supervised processes, as users do."""
+    monkeypatch.setattr("tolstat.campaign.blocks.default_kind", DEFAULT_KIND)
 
 
 @pytest.fixture

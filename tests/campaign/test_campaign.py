@@ -25,6 +25,7 @@ from tolstat.campaign import progress, signals
 from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Options
 from tolstat.solver import simulation
 from tolstat.store import Counts, Reader, ResultStore
 from tolstat.store.recall import differing_keys
@@ -128,10 +129,14 @@ def test_progress_hears_the_start_and_every_block(tmp_path: Path) -> None:
     assert heard[-1] == Counts(40, 40, 4, 4)
 
 
+def warm(calls: list[str], options: Options) -> None:
+    calls.append("warm")
+
+
 @pytest.mark.slow
 def test_the_kernel_is_compiled_before_there_are_workers(tmp_path: Path) -> None:
     calls: list[str] = []
-    stages = fakes.stages()._replace(warm_up=partial(calls.append, "warm"))
+    stages = fakes.stages()._replace(warm_up=partial(warm, calls))
     fakes.run(fakes.Study(), tmp_path / "a.h5", 2, progress=lambda c: calls.append("block"), stages=stages)
     assert calls[:2] == ["warm", "block"]
     assert calls.count("warm") == 1

@@ -19,6 +19,7 @@ from tolstat import sampling, study
 from tolstat.analysis import subset
 from tolstat.analysis.subset import Settings, Walk
 from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
@@ -347,3 +348,21 @@ def test_intervals_of_four_seeds_cover():
         rendering.together([walk_of(linear, 100, 2.5, 4 * k + i, 3).estimate() for i in range(4)])[0] for k in range(60)
     ]
     assert np.mean([one.lower < norm.sf(2.5) < one.upper for one in found]) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / 60)
+
+
+def hang_together(params, options, histories="none", n_harmonics=0):
+    while len(params) > 6:
+        pass
+    return simulate(params, options)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("supervised")
+def test_a_stage_whose_blocks_outlast_their_limit_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr(rare, "Execution", partial(Execution, joint_timeout=0.01))
+    plan, whole, parts = asked(load(tmp_path), beta=-1.0, per_level=20), tmp_path / "a.h5", tmp_path / "b.h5"
+    rare.run(plan, whole, tell=lambda _: None)
+    monkeypatch.setattr(campaign, "run", partial(RUN, stages=stages(hang_together)))
+    found = rare.run(plan, parts, tell=lambda _: None)
+    assert (found.reached, found.joints) == (True, 20)
+    assert datasets(parts) == datasets(whole)

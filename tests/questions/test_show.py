@@ -38,6 +38,8 @@ SLIM = {
     "arm": {"l_f": "30 mm"},
 }
 """A joint with pins a quarter as thick as those of the paper's."""
+SHORT = {"pin": {"l": "15 mm"}}
+"""A joint whose hub reaches nearly to the holes."""
 
 
 def drawn(draw, *args, size=(4.9, 4.9), **kwargs):
@@ -167,7 +169,7 @@ def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
 
 
 @pytest.mark.parametrize("alpha", [-20.0, 0.0, 15.0, 32.0])
-@pytest.mark.parametrize("over", [{}, SLIM], ids=["paper", "slim"])
+@pytest.mark.parametrize("over", [{}, SLIM, SHORT], ids=["paper", "slim", "short"])
 def test_labels_are_inside_and_apart(over, alpha):
     d = query.dimensions(joints.load("cirelli2021", over, "test"), np.radians(alpha))
     for view in (front, side):
@@ -181,6 +183,11 @@ def test_labels_are_inside_and_apart(over, alpha):
             assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1, name
         over_each_other = [(a, b) for a, b in combinations(boxes, 2) if boxes[a].overlaps(boxes[b])]
         assert over_each_other == []
+        if view is front:
+            corners = np.array([(-d.root, -d.root), (d.root, d.root)])
+            hub = mpl.transforms.Bbox(figure.axes[0].transData.transform(corners))
+            for name, box in boxes.items():
+                assert not name.startswith("cross") or not box.overlaps(hub), name
 
 
 @pytest.fixture

@@ -7,21 +7,25 @@ import json
 import h5py
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import tolstat
 from tests.support import synthetic
 from tolstat import sampling, study
 from tolstat.campaign import what_if as sets
-from tolstat.campaign.extend import extend
+from tolstat.campaign.extend import extend, merge
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.display import text
 from tolstat.display.asked import Asked
 from tolstat.joint import perturb
 from tolstat.questions.what_if import query, rendering
 from tolstat.questions.what_if import run as runner
 from tolstat.questions.what_if.section import sections
+from tolstat.report.headline import headline
+from tolstat.solver import stationary
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader, ResultStore, what_if
 from tolstat.study import widths
@@ -52,12 +56,14 @@ def loaded(folder, text=TEXT):
 
 
 def stand_in(params, options, histories="none", n_harmonics=0):
-    """Loads that follow from one tilt and one offset: 640 N, 40 N a sigma of the tilt, 15 N a sigma of the offset."""
+    """Loads at 100 N m from one tilt and one offset: 640 N, 40 N a sigma of the tilt, 15 N a sigma of the offset."""
     results = np.zeros(len(params), RESULT)
     tilt = -params["pin_axis"][:, 0, 2] / 0.0029  # about t of pin 1: its axis leaves along z
     offset = params["pin_point"][:, 1, 2] / 5e-5
-    results["F_max"][:] = (640.0 + 40.0 * np.abs(tilt) + 15.0 * np.abs(offset))[:, None]
+    factor = params["torque"] / 100.0
+    results["F_max"][:] = (factor * (640.0 + 40.0 * np.abs(tilt) + 15.0 * np.abs(offset)))[:, None]
     results["status"], results["settled"] = Status.OK, 1
+    stationary.fill_intervals(results)
     return Simulation(results, {})
 
 
@@ -70,14 +76,19 @@ def quick(monkeypatch):
     monkeypatch.setattr(runner, "MOST", 1024)
 
 
-@pytest.fixture
-def path(tmp_path):
-    plan = loaded(tmp_path)
+def made(folder, text=TEXT):
+    """Campaign of the stand-in."""
+    plan = loaded(folder, text)
     errors = sampling.draw(plan)
-    file = tmp_path / "made.h5"
+    file = folder / "made.h5"
     with ResultStore.create(file, plan, errors) as store:
         store.write(np.arange(plan.rows), stand_in(perturb(plan.joint, plan.operation, errors), None))
     return file
+
+
+@pytest.fixture
+def path(tmp_path):
+    return made(tmp_path)
 
 
 def line(plan, label):
@@ -117,7 +128,11 @@ def test_a_finer_fit_keeps_the_limit_at_the_basic_size(tmp_path):
     holes = '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }'
     plan = loaded(tmp_path, TEXT.replace(holes, fit))
     hole, pin = line(plan, "hole*.diameter"), line(plan, "pin*.diameter")
-    assert [widths.words(plan, own, FINER) for own in (hole, pin)] == ["H6", "f6"]
+    assert [widths.words(plan, own, FINER) for own in (hole, pin)] == [
+        "H6 (mean clearance −2.75 µm)",  # radial: half of 9.5 - 15 um
+        "f6 (mean clearance −2.75 µm)",
+    ]
+    assert widths.words(plan, pin, COARSER) == "f8 (mean clearance +4 µm)"
     ends = np.array([0.0, 1.0])
     middle = 15e-6  # of H7, which the nominal diameter is
     found = widths.changed(plan, hole, FINER)["hole1.diameter"].ppf(ends) + middle
@@ -171,7 +186,39 @@ def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
     indices = found.indices.set_index("line")
     assert indices.loc["pin*.tilt_t", "in_all"] > 0.5 > 0.3 > indices.loc["pin*.offset_z", "in_all"]
     assert indices.loc["hole*.diameter", "in_all"] == pytest.approx(0.0, abs=1e-12)
-    assert rendering.sentence(found).startswith("Halve the tilt tolerance of the pins (±0.5 deg) and it is ")
+    said = rendering.sentence(found)
+    assert said.startswith("Halve the tilt tolerance of the pins (±0.5 deg) and ")
+    assert said.endswith(" exceed the limit")
+    half, exact = (
+        found.table.set_index(["line", "step"]).loc[("pin*.tilt_t", step), "share"] for step in (HALF, EXACT)
+    )
+    assert rendering.sentence(found, half) == said
+    assert rendering.sentence(found, 0.5 * (half + exact)).startswith("Halving a single line is not enough: halving")
+    assert rendering.sentence(found, -1.0).startswith(
+        "No single line is enough: halving the tilt tolerance of the pins"
+    )
+    assert rendering.sentence(found, -1.0).endswith(f"exact {text.percent(exact)}")
+
+
+@pytest.mark.usefixtures("quick")
+def test_fewer_changed_joints_move_the_share_of_all(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        whole = query.what_if(view, "cross1.F")
+        view.altered = {
+            name: one._replace(loads=one.loads[:100], status=one.status[:100]) if one.about["kind"] == "width" else one
+            for name, one in view.altered.items()
+        }
+        part = query.what_if(view, "cross1.F")
+    assert (part.n, part.share) == (whole.n, whole.share)
+    np.testing.assert_allclose(part.table["share"], (part.share + part.table["change"]).clip(0.0, 1.0))
+    still = part.table[part.table["line"] == "hole*.diameter"]
+    assert (still["share"] == part.share).all()
+    assert (
+        (part.table["share_lower"] <= part.table["share"]) & (part.table["share"] <= part.table["share_upper"])
+    ).all()
+    assert (part.table["share_upper"] - part.table["share_lower"]).mean() > 0.01
 
 
 @pytest.mark.usefixtures("quick")
@@ -282,12 +329,13 @@ def test_command_and_page(path, monkeypatch):
     assert "--run" in shown.stderr
     with Reader.open(path) as store:
         (section,) = sections(store.view(), Asked(path))
-    assert f"tolstat causes {path.name} --run" in section.blocks[0].text
+    assert f"tolstat causes {path.name} --run; then this page again: tolstat report" in section.blocks[0].text
     monkeypatch.setattr(runner, "available_workers", lambda: 1)
     shown = run("--run", "--budget", "1 min", "--top", "2", "--workers", "1")
     assert shown.exit_code == 0, shown.output
     assert "lines, 400 joints of each change" in shown.stderr
     assert shown.stdout.startswith("cross1.F > 700 N: ")
+    assert "\n\nscatter of cross1.F over all joints, not of exceeding the limit; by error:\nerror " in shown.stdout
     assert max(map(len, shown.stdout.splitlines())) <= 80
     told = json.loads(run("--json").stdout)["what_if"]
     assert told["load"] == "cross1.F"
@@ -295,8 +343,182 @@ def test_command_and_page(path, monkeypatch):
     with Reader.open(path) as store:
         (section,) = sections(store.view(), Asked(path, accepted=0.01))
     assert [block.kind for block in section.blocks] == ["text", "panels", "table", "table", "text"]
-    assert "Halve the tilt tolerance of the pins" in section.blocks[0].text
+    assert "Halving a single line is not enough: halving the tilt tolerance of the pins" in section.blocks[0].text
     assert run("--each", "error").exit_code == 2
+
+
+def test_of_all_limits_the_largest_ratio_counts():
+    loads = np.array([[600.0, 900.0], [750.0, 100.0], [np.nan, 1000.0]])
+    one = what_if.Altered({}, 0, ("cross1.F", "cross2.F"), loads, np.full(3, Status.OK, np.uint8))
+    measure = query.Measure(((("cross1.F",), 700.0), (("cross2.F",), 1000.0)))
+    assert measure.held(one)
+    np.testing.assert_allclose(measure.of(one), [0.9, 750 / 700, np.nan])
+    assert not query.Measure(((("cross3.F",), 700.0),)).held(one)
+
+
+@pytest.mark.usefixtures("quick")
+def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_path, monkeypatch):
+    path = made(tmp_path, TEXT.replace('"cross1.F" = "700 N"', '"cross1.F" = "800 N"\n"cross2.F" = "700 N"'))
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        both, second = (query.what_if(view, by) for by in ("all limits", "cross2.F"))  # the first is never reached
+        np.testing.assert_array_equal(both.table["share"], second.table["share"])
+        assert (both.share, both.level) == (second.share, 1.0)
+        found = headline(view, 0.1)
+        (section,) = sections(view, Asked(path, accepted=0.1))
+        view.altered = {name: one for name, one in view.altered.items() if one.about.get("step") != EXACT}
+        told = rendering.absent(query.what_if(view, "all limits")._replace(left_out=("pin*.position",)))
+    assert "Most often 700 N on cross2.F: 22.2 %. Halve the tilt tolerance of the pins" in found.words
+    assert found.words.endswith(" exceed at least one limit")
+    assert section.blocks[0].text.startswith("At least one limit exceeded in 22.2 % of the joints as drawn. Halve the ")
+    assert told == [rendering.absent(both._replace(left_out=("pin*.position",)))[0]]
+    assert told[0].startswith("left out: pin*.position; the width of their zone depends on other errors")
+    shown = [
+        CliRunner().invoke(app, ["causes", str(path), "--top", "2", *more]) for more in ([], ["--by", "all limits"])
+    ]
+    assert shown[0].stdout == shown[1].stdout
+    assert shown[0].stdout.startswith("at least one limit exceeded: 22.2 % ")
+
+
+@pytest.mark.usefixtures("quick")
+def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        found = query.what_if(store.view(), "cross1.F")
+    table = rendering.rows(found)
+    ax = Figure().subplots()
+    rendering.tornado_panel(found, np.nan).draw(ax)
+    half = table.loc[table["half"] > 0.01].iloc[0]
+    drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
+    assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)
+
+
+TWO = TEXT.replace("[operation]", '[[operation]]\nname = "cruise"').replace(
+    "[tolerances]",
+    """
+[[operation]]
+name = "start"
+alpha = "15 deg"
+speed = "100 rpm"
+torque = "105 N*m"
+
+[tolerances]""",
+)
+OWN = TWO.replace('"cross1.F" = "700 N"', '"cross1.F at start" = "700 N"')
+
+
+def written(folder, text):
+    """Campaign of two points; at the second, loads are larger in proportion to the torque."""
+    plan = loaded(folder, text)
+    errors, file = sampling.draw(plan), folder / "two.h5"
+    with ResultStore.create(file, plan, errors) as store:
+        for point in plan.points:
+            found = stand_in(perturb(plan.joint, point.operation, errors), None)
+            if point.name == "cruise":
+                found.results["status"][7] = Status.NEWTON_FAILED
+            store.at(point.name).write(np.arange(plan.rows), found)
+    return file
+
+
+@pytest.mark.usefixtures("quick")
+def test_changed_joints_are_simulated_at_all_points(tmp_path):
+    path = written(tmp_path, TWO)
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        one = next(own for own in view.altered.values() if own.about["kind"] == "width")
+        assert {"cross1.F at cruise", "cross1.F at start"} < set(one.names)
+        cruise, start = (one.valid([f"cross1.F at {point}"]) for point in ("cruise", "start"))
+        np.testing.assert_allclose(start, 1.05 * cruise)
+        np.testing.assert_array_equal(one.valid(query.names_at_points(view, "cross1.F")), start)
+        worst, at_start, at_cruise = (query.what_if(view, f"cross1.F{at}") for at in ("", " at start", " at cruise"))
+        assert worst.load == "cross1.F"
+        assert (worst.table["share"] == at_start.table["share"]).all()
+        drawn = np.mean(view.load("cross1.F at cruise").valid > 700)
+        assert query.what_if(view.at("cruise"), "cross1.F").share == pytest.approx(drawn)
+        assert at_cruise.level == 700  # a limit of all points holds at each
+        # row 7 (joint 6) has no load at cruise, and so none at the worst of the points
+        assert np.isnan(query.as_drawn(view, "cross1.F", view.altered)[6])
+        assert np.isfinite(query.as_drawn(view, "cross1.F at start", view.altered)[6])
+
+
+@pytest.mark.usefixtures("quick")
+def test_points_without_a_limit_are_simulated_when_they_are_asked_for(tmp_path):
+    path = written(tmp_path, OWN)
+    done = runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        assert all(name.endswith(" at start") for one in view.altered.values() for name in one.names)
+        assert query.what_if(view, "cross1.F at start") is not None
+        assert query.what_if(view, "cross1.F at cruise") is None
+        assert query.what_if(view, "cross1.F") is None
+        before = query.what_if(view, "cross1.F at start")
+    more = runner.simulate(path, by="cross1.F at cruise", budget=60.0, workers=1)
+    assert more.simulated >= done.simulated
+    assert runner.simulate(path, budget=60.0, workers=1).simulated == 0  # what it has since then stays
+    with Reader.open(path) as store:
+        after = query.what_if(store.view(), "cross1.F at start")
+        assert query.what_if(store.view(), "cross1.F") is not None
+    np.testing.assert_array_equal(before.table["share"], after.table["share"])
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_joint_that_fails_at_one_point_has_no_worst_load(tmp_path, monkeypatch):
+    def failing(params, options, **given):
+        found = stand_in(params, options)
+        found.results["status"][(params["torque"] > 102) & (np.arange(len(params)) == 5)] = Status.NOT_SETTLED
+        return found
+
+    path = written(tmp_path, TWO)
+    monkeypatch.setattr(sets, "simulate_rows", failing)
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        for one in what_if.read(store).values():
+            assert one.status[5] == Status.NOT_SETTLED
+            assert np.isfinite(one.valid(["cross1.F at cruise"])[5])
+            assert np.isnan(one.valid(["cross1.F at cruise", "cross1.F at start"])[5])
+
+
+@pytest.mark.usefixtures("quick")
+def test_command_and_page_name_the_point(tmp_path, monkeypatch):
+    path = written(tmp_path, OWN)
+    monkeypatch.setattr(runner, "available_workers", lambda: 1)
+    shown = CliRunner().invoke(app, ["causes", str(path), "--run", "--budget", "1 min", "--top", "2"])
+    assert shown.exit_code == 0, shown.output
+    assert "joints to simulate at start, " in shown.stderr
+    assert shown.stdout.startswith("cross1.F at start > 700 N: ")
+    assert max(map(len, shown.stdout.splitlines())) <= 80
+    with Reader.open(path) as store:
+        found = headline(store.view(), 0.01)
+        (section,) = sections(store.view(), Asked(path, accepted=0.01))
+    assert "700 N on cross1.F at start" in found.sentence
+    assert "No single line is enough: halving the tilt tolerance of the pins" in found.sentence
+    assert section.blocks[0].text.startswith("cross1.F at start > 700 N")
+
+
+@pytest.mark.usefixtures("quick")
+def test_merged_files_keep_what_they_agree_on(path, tmp_path):
+    other, out = tmp_path / "other.h5", [tmp_path / f"out{k}.h5" for k in range(3)]
+    other.write_bytes(path.read_bytes())
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        held = what_if.read(store)
+    assert merge([path, other], out[0]).dropped == 0
+    name, one = next(iter(held.items()))
+    with ResultStore.open_to_write(other) as store:  # the same joints, fewer of them
+        what_if.write(store, {name: one._replace(loads=one.loads[:50], status=one.status[:50])})
+    assert merge([other, path], out[1]).dropped == 0
+    with ResultStore.open_to_write(other) as store:
+        what_if.write(store, {name: one._replace(loads=1.01 * one.loads)})
+    for target, expected in zip(out[:2], (held, held), strict=True):
+        with Reader.open(target) as store:
+            assert what_if.read(store).keys() == expected.keys()
+            np.testing.assert_array_equal(what_if.read(store)[name].loads, one.loads)
+    shown = CliRunner().invoke(app, ["merge", str(path), str(other), "--out", str(out[2])])
+    assert "left out: joints of 1 changes of what_if" in shown.stderr
+    with Reader.open(out[2]) as store:
+        assert what_if.read(store).keys() == held.keys() - {name}
 
 
 def test_files_that_are_no_sample_are_refused(tmp_path):

@@ -38,7 +38,7 @@ PROBE = """
   choose(part("slider"), 0, "input");
   found.first = said();
   found.cursors = [...document.querySelectorAll(".cursor")].filter((line) => line.style.display !== "none").length;
-  const svg = document.querySelector("figure[data-reads~='cross1.F'] svg"), box = svg.getBoundingClientRect();
+  const svg = document.querySelector("figure[data-reads^='cross1.F,'] svg"), box = svg.getBoundingClientRect();
   svg.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + 0.6 * box.width, clientY: box.top + 50 }));
   found.hovered = said();
   found.kept = document.querySelector("#limits td").getBoundingClientRect().right;

@@ -159,7 +159,7 @@ def test_colours_of_the_pictures_follow_the_scheme(html):
 
 
 def test_other_bushings_and_the_band_of_the_whole_curve_are_drawn_on_switches(view, html):
-    drawn = re.search(r"<figure data-reads=\"cross1.F .*?</figure>", html, flags=re.DOTALL)[0]
+    drawn = re.search(r"<figure data-reads=\"cross1.F,.*?</figure>", html, flags=re.DOTALL)[0]
     for name, count in (("others", 7), ("curve-band", 2)):
         assert re.search(rf'<input type="checkbox" class="show-{name}" id="([^"]+)"><label for="\1">', drawn)
         assert drawn.count(f'class="{name}"') == count

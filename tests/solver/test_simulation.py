@@ -356,7 +356,7 @@ counts = []
 for revolutions in (2, 2, 4):
     before = rtsys.get_allocation_stats().alloc
     options = Options(max_revs=revolutions, settle_tol=1e-12)
-    simulate.simulate_joint(par[0], options, alone, out[0])
+    simulate.simulate_joint(par[0], options, 10**6, alone, out[0])
     counts.append(rtsys.get_allocation_stats().alloc - before)
     assert out[0].steps > 150 * revolutions
 print(counts)

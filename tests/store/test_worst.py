@@ -5,9 +5,14 @@ import pytest
 
 from tests.support import synthetic, views
 from tolstat.common.tables import Status
+from tolstat.display.asked import Asked
 from tolstat.questions.causes.tail import worst_joints
+from tolstat.questions.exceedance import section as exceedance
 from tolstat.questions.exceedance.query import at_points, limits
 from tolstat.questions.fatigue.duty import revolutions_at
+from tolstat.report import verdict
+from tolstat.report.headline import headline
+from tolstat.solver import stationary
 from tolstat.store import worst
 
 
@@ -90,6 +95,46 @@ def test_the_worst_joints_name_their_point(view, monkeypatch):
     parts = np.stack([view.load(f"cross1.F at {name}").values[found.samples] for name in ("one", "two")])
     assert found.joints == [("one", "two")[k] for k in parts.argmax(axis=0)]
     assert set(worst_joints(view, "cross1.F at one", 20).joints) == {"one"}
+
+
+def test_the_verdict_names_the_point(tables, view):
+    for table in tables.values():
+        table["status"][1:] = Status.OK
+        stationary.fill_intervals(table)
+    view = views.at_points(tables, {"cross1.F": 700.0})
+    shares = {name: np.mean(table["F_max"][1:, 0] > 700) for name, table in tables.items()}
+    assert shares["two"] != shares["one"]
+    most = max(shares, key=shares.__getitem__)
+    assert worst.point_of(view, "cross1.F") == most
+    assert f"of the joints exceed 700 N on cross1.F, most often at {most} (" in headline(view, 0.01).sentence
+    assert "most often" not in headline(views.at_points(tables, {"cross1.F at one": 700.0}), 0.01).sentence
+    assert view.head() == "200 joints (random sampling), each at one and two, 0 failed, 0 not settled"
+
+
+def test_without_a_limit_the_point_of_the_largest_loads(tables):
+    view = views.at_points(tables)
+    high = {name: np.nanquantile(view.load(f"cross1.F at {name}").valid, 0.99) for name in tables}
+    assert worst.point_of(view, "cross1.F") == max(high, key=high.__getitem__)
+
+
+def test_a_limit_of_all_points_holds_at_each(view):
+    assert view.load("cross1.F at one").limit == 700.0
+    assert view.load("cross1.F at two").limit == 900.0
+    assert view.load("fork1.T").limit is None
+
+
+def test_the_page_names_points(tables):
+    limits = {"cross1.F": 700.0, "fork1.T at one": 50.0, "fork1.T at two": 50.0}
+    view = views.at_points(tables, limits)
+    (panels, _, at_each) = verdict.limits(view, Asked(view.path))[0].blocks
+    assert at_each.head == ["load", "limit", "one", "two"]
+    assert any("largest load over all of them" in text.text for text in panels.beside)
+    found = exceedance.sections(view, Asked(view.path))[0].blocks
+    leading = found[0].panels
+    assert [panel.key for panel in leading if " " in panel.key] == []
+    (torque,) = [panel.reads for panel in leading if panel.reads[0].startswith("fork1.T at ")]
+    assert f"fork2.T{torque[0].removeprefix('fork1.T')}" in torque
+    assert {"fork1.T at one", "fork1.T at two"} < found[2].curves.keys()
 
 
 def test_contact_modes_of_several_points_are_not_averaged(view):

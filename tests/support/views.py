@@ -62,12 +62,18 @@ def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=Non
     return made
 
 
-def at_points(results, limits=None, method="random"):
-    """View of the same joints at several operating points, from their tables of results by name of the point."""
+def at_points(results, limits=None, method="random", joint=None, points=()):
+    """View of the same joints at several operating points, from their tables of results by name of the point.
+
+    `joint` holds the sections of a joint file; `points` take the place of those with equal operation and share.
+    """
     n = len(next(iter(results.values())))
-    made = View(FakeStore(method, limits or {}, synthetic.errors(n), results))
+    store = FakeStore(method, limits or {}, synthetic.errors(n), results, joint=joint)
+    store.points |= {point.name: point for point in points}
+    made = View(store)
     for part in made.parts:
-        part.verification = None
+        part.verification = part.near = None
+    made.altered = {}
     return made
 
 

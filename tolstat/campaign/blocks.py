@@ -33,8 +33,9 @@ MAX_WRITE_SHARE, MAX_PARENT_SHARE = 0.05, 0.25
 """Largest share of a block's simulation time that writing it may take, and largest share of the parent's time spent on
 writing: beyond a quarter the workers begin to wait for the parent. Writing a block waits twice for the disk, 5 to 50 ms
 together, whatever the block's size."""
-JOINT_TIMEOUT_S = 300.0
-"""Default time limit of a joint, s: a thousand times what most joints take."""
+JOINT_TIMEOUT_S = 60.0
+"""Default processor time without progress after which a joint is given up, s: kernels count every iteration, so that
+only what they call in between takes time unseen, a second a block at most."""
 
 
 class Stages(NamedTuple):
@@ -53,8 +54,8 @@ class Stages(NamedTuple):
     simulate : callable
         (m,) table PARAM, Options, ``histories=``, ``n_harmonics=`` -> Simulation; pickled to other processes.
     warm_up : callable
-        Compiles what `simulate` needs. Called before workers start, because two processes that compile into one
-        cache can crash; then called in each worker, to load the compiled code.
+        Options -> None: compiles what `simulate` needs with them. Called before workers start, so that they need not
+        all compile; then called in each worker, to load the compiled code outside the time limit of a joint.
     origins : callable
         Study, rows of the campaign (range) -> which proposal or level gave each joint, consecutive tables; None if the
         sampling method has no such table (`draw_records.columns`).
@@ -65,7 +66,7 @@ class Stages(NamedTuple):
     perturb: Callable[..., NDArray[np.void]]
     history_specs: Callable[..., Mapping[str, HistorySpec]]
     simulate: Callable[..., Simulation]
-    warm_up: Callable[[], object]
+    warm_up: Callable[[Options], object]
     origins: Callable[..., Iterable[NDArray[np.void]] | None] = lambda *_: None
 
 
@@ -76,14 +77,15 @@ class Execution:
     Attributes
     ----------
     kind : {"processes", "serial", "dask"}, optional
-        Supervised worker processes, this process, or a cluster; without it processes if there are several workers
-        and blocks. With "serial" a joint that crashes or hangs takes the campaign with it.
+        Supervised worker processes, this process, or a cluster; without it processes. With "serial" a joint that
+        crashes or hangs takes the campaign with it.
     workers : int, optional
         Number of processes; without it the number of cores.
     block : int, optional
         Joints per block; without it as many as take some seconds, see `Pace`.
     joint_timeout : float
-        Time limit of a joint, s. A block that takes longer is simulated again joint by joint.
+        Processor time without progress after which a joint is given up, s. A block in which one takes longer is halved
+        and simulated again.
     scheduler : str, optional
         Address of a Dask scheduler, such as ``tcp://host:8786``; without it a cluster is started on this machine.
     """
@@ -104,9 +106,14 @@ class Block(NamedTuple):
     options: Options
 
     def split(self) -> list[Block]:
-        """Split into blocks of one joint each."""
-        own = range(len(self.slots))
-        return [Block(self.point, self.slots[i : i + 1], self.params[i : i + 1], self.options) for i in own]
+        """Split into halves; a block of one joint is its only piece."""
+        half = (len(self.slots) + 1) // 2
+        parts = [part for part in (slice(half), slice(half, None)) if self.slots[part].size]
+        return [self._replace(slots=self.slots[part], params=self.params[part]) for part in parts]
+
+    def size(self) -> int:
+        """Return the number of joints."""
+        return len(self.slots)
 
 
 class Timed(NamedTuple):
@@ -190,13 +197,14 @@ def simulate_pending(
     size = execution.block or default_block(todo, workers)
     if not todo:
         return
-    kind = execution.kind or ("processes" if workers > 1 and todo > size else "serial")
+    kind = execution.kind or default_kind(workers, -(-todo // size))
     pace = Pace(todo, workers, execution.block)
     blocks = _blocks(study, store, stop_slot, pace, stages.perturb)
     work: executors.Work[Block, Timed | Lost] = executors.Work(
         partial(_simulate, stages.simulate, study.output.histories, study.output.harmonics, store.history_specs),
         Block.split,
-        stages.warm_up,
+        Block.size,
+        partial(prepare, stages.warm_up, settings_in_use(study, store)),
         execution.joint_timeout,
     )
     results: Generator[tuple[Block, Timed | Lost], None, None]
@@ -221,6 +229,11 @@ def simulate_pending(
                 pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
 
 
+def default_kind(workers: int, blocks: int) -> Literal["processes", "serial"]:
+    """Return where to simulate without further instruction: always supervised, however few joints there are."""
+    return "processes"
+
+
 def default_block(n_pending: int, workers: int) -> int:
     """Return the number of joints in the first blocks: at most `MAX_FIRST_BLOCK`, and several blocks per worker."""
     return max(1, min(MAX_FIRST_BLOCK, n_pending // (MIN_BLOCKS_PER_WORKER * workers)))
@@ -231,6 +244,18 @@ def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec])
     return Simulation(without_results(n, status), {name: spec.blank(n) for name, spec in specs.items()})
 
 
+def settings_in_use(study: Study, store: Reader) -> list[Options]:
+    """Return the solver options of all joints of a file, each once."""
+    retried = [Options(**retry["options"]) for retry in store.retries]
+    return list(dict.fromkeys([*(settings(solver, store.fidelity) for solver in study.solvers), *retried]))
+
+
+def prepare(warm_up: Callable[[Options], object], options: Iterable[Options]) -> None:
+    """Compile what joints with any of the options need, or load it."""
+    for one in options:
+        warm_up(one)
+
+
 def _blocks(
     study: Study, store: Reader, stop_slot: int, pace: Pace, perturb: Callable[..., NDArray[np.void]]
 ) -> Iterator[Block]:
@@ -238,7 +263,7 @@ def _blocks(
     studies = {point: study.at(point) for point in store.points}
     variant_options = [settings(solver, store.fidelity) for solver in study.solvers]
     retry_options = [Options(**retry["options"]) for retry in store.retries]
-    distinct = list(dict.fromkeys(variant_options + retry_options))
+    distinct = settings_in_use(study, store)
     for one, slots in pending(store, stop_slot):
         read = slice(slots[0], slots[-1] + 1)
         errors, attempt = store.errors(read), one.attempt(read)[slots - slots[0]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import chain
 from pathlib import Path
@@ -20,6 +20,7 @@ from tolstat.store.assembly import DifferingResults, assemble, check_free
 from tolstat.store.provenance import differing_code
 from tolstat.store.recall import differing_keys, recall
 from tolstat.store.result_file import BLOCK
+from tolstat.store.what_if import Altered
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -44,10 +45,13 @@ class Merged(NamedTuple):
         Numbers of joints of the campaign by status.
     twice : int
         Number of surplus copies of rows that several files hold with the same results.
+    dropped : int
+        Number of changes of the group ``what_if`` that are left out, because the files hold different joints of them.
     """
 
     counts: Counts
     twice: int
+    dropped: int
 
 
 def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
@@ -83,10 +87,15 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
         more = range(store.n, study.rows)
         altered = what_if.read(store)
         grow(store, study, draw_blocks(study, more), origin_blocks(study, more))
-    if altered:  # their joints are still samples of the campaign
+    _keep(path, altered)
+    return study
+
+
+def _keep(path: Path, altered: Mapping[str, Altered]) -> None:
+    """Write joints with other tolerances to the new file of a campaign: they are samples of that campaign."""
+    if altered:
         with ResultStore.open_to_write(path) as store:
             what_if.write(store, altered)
-    return study
 
 
 def grow(
@@ -164,8 +173,11 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
             found = f"hold different results of row {error.row}: {error.column} differs"
             remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {error.row}"
             raise InputError([Fault(" and ".join(holding), found, remedy)]) from None
+        twice = sum(len(store.rows) for store in stores) - stores[0].campaign_rows
+        altered, dropped = what_if.common(what_if.read(store) for store in stores)
+    _keep(out, altered)
     with Reader.open(out) as store:
-        return Merged(store.counts(), sum(len(s.rows) for s in stores) - store.n)
+        return Merged(store.counts(), twice, dropped)
 
 
 def _check_extendable(store: Reader, n: int) -> None:

@@ -161,6 +161,8 @@ class Plan:
         Axes of a sweep whose values are deviations where a value of the joint is easily meant, as lines of text.
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
+    exact : list of str
+        Patterns of the offsets and tilts that nothing sets in a study with tolerances; see `meaning.exact`.
     correlations : list of dict
         What correlations mean for the errors themselves: rows of `study.tolerances.meaning.correlations`.
     wilks : dict of float to int
@@ -187,6 +189,7 @@ class Plan:
     fit: list[str]
     sweep: list[str]
     tolerances: list[dict[str, Any]]
+    exact: list[str]
     correlations: list[dict[str, Any]]
 
     @property
@@ -256,6 +259,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         fit=fit_in_words(study),
         sweep=swept.meaning(study.sweep, study.joint),
         tolerances=text.records(meaning.table(study.entries)),
+        exact=meaning.exact(study.entries, study.errors),
         correlations=text.records(meaning.correlations(study.copula, study.tolerances)),
     )
 

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import FAILED, MAX_ITERATIONS, STATUS_TEXT, UNSETTLED, Motion, Status
+from tolstat.common.tables import (
+    FAILED,
+    MAX_ITERATIONS,
+    STATUS_TEXT,
+    UNSETTLED,
+    Motion,
+    Status,
+    iterations_allowed,
+)
 from tolstat.solver.refinement import MIN_MAX_REVS
 
 if TYPE_CHECKING:
@@ -20,7 +28,7 @@ if TYPE_CHECKING:
 MAX_REVS, MAX_STEPS = 1000, 20_000
 """Largest solver.max_revs and solver.steps_per_rev that a study may have."""
 WITHOUT_RESULTS = {
-    Status.TIMEOUT: 'simulate it again with more time: tolstat run STUDY --retry timeout --joint-timeout "1 h"',
+    Status.TIMEOUT: 'it hangs; with more time: tolstat run STUDY --retry timeout --joint-timeout "1 h"',
     Status.CRASHED: "simulate it again: tolstat run STUDY --retry crashed; if it crashes again, report the error",
     Status.INVALID_INPUT: "a parameter is not finite: check the tolerances in the study",
     Status.OUTSIDE_MODEL: "negative clearance, |alpha| >= 90 deg, no speed or no stiffness: change joint or tolerances",
@@ -154,6 +162,9 @@ def _more_revs(options: Mapping[str, Any]) -> int:
 
 def _of_newton_failure(row: np.void, options: Mapping[str, Any]) -> str:
     place, steps = _place(row), _more_steps(options)
+    if row["newton_iterations"] == iterations_allowed(options["steps_per_rev"], options["max_revs"]):
+        spent = f"all {row['newton_iterations']} iterations that a joint may take were spent at {place}"
+        return f"{spent}: try solver.steps_per_rev = {steps}"
     if row["newton_iterations"] > MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
         return f"{MAX_ITERATIONS} iterations a step were spent at {place}: try solver.steps_per_rev = {steps}"
     return f"failed at {place}: try solver.steps_per_rev = {steps}, or solver.max_halvings = 20"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import signals, verify
-from tolstat.campaign.blocks import Execution, Finished, Stages, pending, simulate_pending
+from tolstat.campaign.blocks import Execution, Finished, Stages, pending, prepare, settings_in_use, simulate_pending
 from tolstat.campaign.executors import WorkerDied
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
@@ -131,7 +131,7 @@ def run(
         try:
             if next(pending(store, last), None) is not None:
                 stage(kernels())
-                stages.warm_up()
+                prepare(stages.warm_up, settings_in_use(study, store))
                 store.begin_session(counts.done)
             stage(JOINTS)
             finished = simulate_pending(study, store, last, stages, execution, stop)
@@ -234,7 +234,7 @@ def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any
         The record of the choice, see `fidelity.Choice`.
     """
     stages = stages or _own_stages()
-    stages.warm_up()
+    stages.warm_up(study.solver.options())
     rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
     errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
     each = [perturbed(study.at(point.name), rows, errors, stages.perturb) for point in study.points]

@@ -15,13 +15,14 @@ from tolstat import sampling
 from tolstat.campaign.blocks import JOINT_TIMEOUT_S, Block, simulate_finite
 from tolstat.campaign.executors import Lost, Work, map_in_processes, map_serially
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import Options, Status
+from tolstat.common.tables import VALID, Options, Status
 from tolstat.joint import perturb
 from tolstat.solver.simulation import simulate_rows, warm_up
-from tolstat.store import Counts, ResultStore, what_if
+from tolstat.store import Counts, ResultStore, what_if, worst
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
 from tolstat.study import axes, widths
+from tolstat.study.points import at
 from tolstat.study.widths import Line
 
 if TYPE_CHECKING:
@@ -83,10 +84,30 @@ def as_drawn(study: Study) -> Change:
     return Change(about, partial(_draw, widths.applied(study, {})))
 
 
-def missing(held: Mapping[str, Altered], wanted: Wanted) -> range:
-    """Joints of a change that the file lacks; all of them if those held begin later."""
+class Asked(NamedTuple):
+    """What is kept of each joint.
+
+    Attributes
+    ----------
+    loads : sequence of str
+        Loads.
+    points : sequence of str
+        Operating points of the study that the joints are simulated at.
+    """
+
+    loads: Sequence[str]
+    points: Sequence[str]
+
+    def names(self, study: Study) -> tuple[str, ...]:
+        """Names of the loads at each of the points, as `Altered.names`."""
+        every = [point.name for point in study.points]
+        return tuple(at(load, [point], every) for point in self.points for load in self.loads)
+
+
+def missing(held: Mapping[str, Altered], wanted: Wanted, names: Sequence[str]) -> range:
+    """Joints of a change that the file lacks; all of them if those held begin later, or lack one of the loads."""
     own = held.get(what_if.key(wanted.change.about))
-    if own is None or own.first > wanted.numbers.start:
+    if own is None or own.first > wanted.numbers.start or not own.holds(names):
         return wanted.numbers
     return range(max(own.end, wanted.numbers.start), max(own.end, wanted.numbers.stop))
 
@@ -96,11 +117,13 @@ def options_of(study: Study, store: ResultStore) -> Options:
     return settings(study.solver, store.fidelity)
 
 
-def seconds_per_joint(study: Study, options: Options, joints: int) -> float:
-    """Time of a joint in one process, s, from the first samples; kernels must be ready."""
-    params = perturb(study.joint, study.operation, as_drawn(study).draw(range(joints)))
+def seconds_per_joint(study: Study, options: Options, joints: int, points: Sequence[str]) -> float:
+    """Time of a joint at all these points in one process, s, from the first samples; kernels must be ready."""
+    errors = as_drawn(study).draw(range(joints))
+    params = [perturb(study.joint, study.at(point).operation, errors) for point in points]
     begin = time.perf_counter()
-    simulate_rows(params, options)
+    for own in params:
+        simulate_rows(own, options)
     return (time.perf_counter() - begin) / joints
 
 
@@ -108,7 +131,7 @@ def simulate(
     study: Study,
     store: ResultStore,
     wanted: Sequence[Wanted],
-    names: Sequence[str],
+    asked: Asked,
     workers: int,
     stop: Callable[[], bool],
     progress: Callable[[Counts], None],
@@ -123,14 +146,14 @@ def simulate(
         Its file.
     wanted : sequence of Wanted
         Changes and joints, in the order in which they are simulated.
-    names : sequence of str
-        Loads that are kept.
+    asked : Asked
+        Loads that are kept, and operating points.
     workers : int
         Number of processes; does not affect results.
     stop : callable
         Called often; once it returns True no further block is begun.
     progress : callable
-        Called with the counts of the joints.
+        Called with the counts of the joints, each at every point.
 
     Returns
     -------
@@ -138,19 +161,20 @@ def simulate(
         All sets that the file holds.
     """
     held = what_if.read(store)
-    todo = [(one.change, numbers) for one in wanted if (numbers := missing(held, one))]
-    table = _Table(todo, names)
-    work: Work[Block, NDArray[np.void] | Lost] = Work(_solve, Block.split, warm_up, JOINT_TIMEOUT_S)
-    blocks = _blocks(study, options_of(study, store), todo)
+    names = asked.names(study)
+    todo = [(one.change, numbers) for one in wanted if (numbers := missing(held, one, names))]
+    table = _Table(todo, asked, names)
+    work: Work[Block, NDArray[np.void] | Lost] = Work(_solve, Block.split, Block.size, warm_up, JOINT_TIMEOUT_S)
+    blocks = _blocks(study, options_of(study, store), todo, asked.points)
     done: Generator[tuple[Block, NDArray[np.void] | Lost], None, None]
-    parallel = workers > 1 and len(table.status) > BLOCK
+    parallel = workers > 1 and table.status.size > BLOCK
     done = map_in_processes(work, blocks, workers, stop) if parallel else map_serially(work, blocks, stop)
-    counts, saved = Counts(len(table.status), 0, 0, 0), time.monotonic()
+    counts, saved = Counts(table.status.size, 0, 0, 0), time.monotonic()
     progress(counts)
     try:
         with closing(done):
             for block, result in done:
-                counts = counts.after(table.put(block.slots, result))
+                counts = counts.after(table.put(block, result))
                 progress(counts)
                 if time.monotonic() - saved > SAVE_S:
                     what_if.write(store, table.sets(held))
@@ -163,21 +187,23 @@ def simulate(
 
 
 class _Table:
-    """Loads and status of all joints to do, one set after the other."""
+    """Loads, (n, points, k), and status, (n, points), of all joints to do, one set after the other."""
 
-    def __init__(self, todo: Sequence[tuple[Change, range]], names: Sequence[str]) -> None:
-        self.todo, self.names = todo, tuple(names)
+    def __init__(self, todo: Sequence[tuple[Change, range]], asked: Asked, names: tuple[str, ...]) -> None:
+        self.todo, self.asked, self.names = todo, asked, names
         n = sum(len(numbers) for _, numbers in todo)
-        self.loads = np.full((n, len(self.names)), np.nan)
-        self.status = np.full(n, Status.PENDING, np.uint8)
+        self.loads = np.full((n, len(asked.points), len(asked.loads)), np.nan)
+        self.status = np.full((n, len(asked.points)), Status.PENDING, np.uint8)
 
-    def put(self, slots: NDArray[np.intp], result: NDArray[np.void] | Lost) -> NDArray[np.uint8]:
+    def put(self, block: Block, result: NDArray[np.void] | Lost) -> NDArray[np.uint8]:
+        own = block.slots, self.asked.points.index(block.point)
         if isinstance(result, Lost):
-            self.status[slots] = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
+            self.status[own] = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
         else:
-            self.loads[slots] = np.column_stack([LOADS[name].of(result) for name in self.names])
-            self.status[slots] = result["status"]
-        return self.status[slots]
+            loads = np.column_stack([LOADS[name].of(result) for name in self.asked.loads])
+            self.loads[own] = np.where(np.isin(result["status"], VALID)[:, None], loads, np.nan)
+            self.status[own] = result["status"]
+        return np.asarray(self.status[own])
 
     def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
         """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
@@ -185,12 +211,13 @@ class _Table:
         for change, numbers in self.todo:
             here = slice(begin, begin + len(numbers))
             begin = here.stop
-            waiting = np.flatnonzero(self.status[here] == Status.PENDING)
+            waiting = np.flatnonzero((self.status[here] == Status.PENDING).any(axis=1))
             own = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
             if own.stop > own.start:
-                name = what_if.key(change.about)
-                new = Altered(change.about, numbers.start, self.names, self.loads[own], self.status[own])
-                found[name] = _joined(held.get(name), new)
+                name, states = what_if.key(change.about), list(self.status[own].T)
+                status = np.choose(worst.deciding(states), states)
+                loads = self.loads[own].reshape(-1, len(self.names))
+                found[name] = _joined(held.get(name), Altered(change.about, numbers.start, self.names, loads, status))
         return found
 
 
@@ -201,13 +228,16 @@ def _joined(old: Altered | None, new: Altered) -> Altered:
     return old._replace(loads=loads, status=status)
 
 
-def _blocks(study: Study, options: Options, todo: Sequence[tuple[Change, range]]) -> Iterator[Block]:
-    begin = 0
+def _blocks(
+    study: Study, options: Options, todo: Sequence[tuple[Change, range]], points: Sequence[str]
+) -> Iterator[Block]:
+    operations, begin = {point: study.at(point).operation for point in points}, 0
     for change, numbers in todo:
         for first in range(0, len(numbers), BLOCK):
             own = numbers[first : first + BLOCK]
-            slots = np.arange(begin + first, begin + first + len(own))
-            yield Block("", slots, perturb(study.joint, study.operation, change.draw(own)), options)
+            slots, errors = np.arange(begin + first, begin + first + len(own)), change.draw(own)
+            for point, operation in operations.items():
+                yield Block(point, slots, perturb(study.joint, operation, errors), options)
         begin += len(numbers)
 
 

@@ -13,7 +13,7 @@ COMMANDS = {
     "Run": ("run", "extend", "merge", "status", "verify", "replay"),
     "Read": ("report", *questions.commands("Read")),
     "Decide": questions.commands("Decide"),
-    "Share": ("export", "docs"),
+    "Share": ("export", "docs", "cache"),
 }
 """Headings of ``tolstat --help`` in the order of the work, and under each the files of this package with the commands,
 each with a function of the same name; on the command line ``-`` stands for ``_``. Commands of questions come from their

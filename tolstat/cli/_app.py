@@ -19,6 +19,7 @@ import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from tolstat import __version__
+from tolstat.cli._shortage import shortage
 from tolstat.cli._talk import LogFile, Quiet, Verbose, fail, say, session, warn
 from tolstat.common.errors import Fault, InputError, TolstatError
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from tolstat.display.table import Column
     from tolstat.joint import Joint
     from tolstat.report import Report
-    from tolstat.study.model import Sampling
+    from tolstat.study import Study
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load."
 EPILOG = (
@@ -127,7 +128,7 @@ Accept = Annotated[
     typer.Option(
         "--accept",
         metavar="SHARE",
-        help='Accepted share of joints above a limit, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
+        help='Accepted share of the joints, all limits together, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
     ),
 ]
 Delivery = Annotated[
@@ -183,6 +184,12 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
                 except TolstatError as error:
                     fail(f"error: {error}")
                     raise typer.Exit(2) from error
+                except (MemoryError, OSError, ImportError) as error:
+                    fault = shortage(error)
+                    if fault is None:
+                        raise
+                    fail(f"error: {fault}")
+                    raise typer.Exit(2) from error
                 except KeyboardInterrupt as error:
                     fail("interrupted")
                     raise typer.Exit(130) from error
@@ -218,11 +225,15 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
-def warn_without_interval(sampling: Sampling) -> None:
-    """Print a warning if shares of a study's sampling have no interval."""
+def print_study_warnings(path: Path, study: Study) -> None:
+    """Print the warnings of a study: of its joints, common axes that are too short, shares without an interval."""
     from tolstat.campaign.remedy import without_interval
+    from tolstat.study.tolerances import zones
 
-    if said := without_interval(sampling.method, sampling.replicates):
+    print_warnings(path, study.joints, study.variants)
+    for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):
+        warn(f"warning: {study.fault(key, found, remedy)}")
+    if said := without_interval(study.sampling.method, study.sampling.replicates):
         warn(f"warning: {said}")
 
 
@@ -302,7 +313,7 @@ def output_file(path: Path) -> Iterator[Path]:
         with files.atomic_write(path) as temporary:
             yield temporary
     except OSError as error:
-        found = f"cannot be written: {error.strerror or error}"
+        found = f"cannot be written: {files.reason(error)}"
         raise InputError(
             [Fault(str(path), found, "check that the folder is writable and the disk has space")]
         ) from error

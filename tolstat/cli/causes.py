@@ -11,7 +11,6 @@ import typer
 from tolstat.cli._app import (
     AsJson,
     AtPoints,
-    ByOne,
     StudyOption,
     Wide,
     Workers,
@@ -43,7 +42,14 @@ def causes(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="Result file (HDF5); with --pick-freeze: study file (TOML).")
     ],
-    by: ByOne = None,
+    by: Annotated[
+        str | None,
+        typer.Option(
+            "--by",
+            metavar="LOAD",
+            help='Load, such as cross1.F or psi, or "all limits"; default: all limits, or the only one.',
+        ),
+    ] = None,
     top: Annotated[int, typer.Option("--top", metavar="N", min=1, help="Number of errors in the printed table.")] = 12,
     logarithm: Annotated[
         bool, typer.Option("--logarithm", help="Explain the variance of the load's logarithm instead of the load's.")
@@ -144,7 +150,7 @@ def causes(
         raise InputError([Fault("--out", "is used with --pick-freeze or --against-angle only", remedy)])
     with progress("causes"), Reader.open(file) as store:
         view = store.view(study_file).at(point or "")
-        load = by or view.most_exceeded
+        load = by or view.decisive
         lines = what_if(view, load) if view.altered else None
         found = causes_of(view, load, log=logarithm)
     if as_json:
@@ -154,7 +160,7 @@ def causes(
         typer.echo(whatifs.heading(lines))
         print_table(whatifs.columns(lines), whatifs.rows(lines), wide)
         say(whatifs.note(lines))
-        typer.echo()
+        typer.echo(f"\n{rendering.heading(found)}")
     elif not found.from_design:
         say(f"which line of the drawing to change: tolstat causes {file} --run")
     print_table(rendering.columns(found), rendering.largest(found, top), wide)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_warnings, warn_without_interval
+from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_study_warnings
 from tolstat.cli._talk import progress, say, wrapped
 
 if TYPE_CHECKING:
@@ -40,8 +40,7 @@ def plan(
     from tolstat.campaign import plan as plans
 
     loaded = study.load(study_file, n=n)
-    print_warnings(study_file, loaded.joints, loaded.variants)
-    warn_without_interval(loaded.sampling)
+    print_study_warnings(study_file, loaded)
     announce_compilation()
     with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)
@@ -64,6 +63,7 @@ def _lines(made: Plan) -> str:
         f"file: {_size(made.file_bytes)}",
         *made.fit,
         *made.sweep,
+        *([f"no tolerance, taken as exact: {', '.join(made.exact)}"] if made.exact else []),
     ]
     lines += [
         f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"

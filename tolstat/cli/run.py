@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Wide, Workers, announce_compilation, print_warnings, tell, warn_without_interval, width_of
+from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_warnings, tell, width_of
 from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
@@ -57,9 +57,9 @@ def run(
         typer.Option(
             "--joint-timeout",
             metavar="TIME",
-            help="Time limit of a joint, with unit s, min or h; if exceeded twice, its status is timeout.",
+            help="Processor time without progress, with unit s, min or h; a joint that exceeds it twice is a timeout.",
         ),
-    ] = "300 s",
+    ] = "60 s",
     retry: Annotated[
         str | None,
         typer.Option(
@@ -105,6 +105,7 @@ def run(
     from tolstat import study
     from tolstat.campaign.blocks import Execution
     from tolstat.campaign.retry import parse
+    from tolstat.common.files import check_target
 
     limit, part, again = 0.0, None, None
     faults = _cannot_be_combined(rows, until, retry, settings)
@@ -114,14 +115,15 @@ def run(
         limit = parse_time(joint_timeout)
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
+    path = out if out is not None else Path(f"{study_file.stem}.h5")
+    with gather(faults):
+        check_target(path)  # now, not when the pictures of the report are written
     with gather(faults):
         plan = study.load(study_file, n=n)
         again = None if retry is None else parse(retry, settings or (), plan)
     if faults:
         raise InputError(faults)
-    print_warnings(study_file, plan.joints, plan.variants)
-    warn_without_interval(plan.sampling)
-    path = out if out is not None else Path(f"{study_file.stem}.h5")
+    print_study_warnings(study_file, plan)
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:
         simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)

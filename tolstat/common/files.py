@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,6 +27,14 @@ def docs_dir() -> Path:
     return inside if inside.is_dir() else package.parent / "docs"
 
 
+def reason(error: OSError) -> str:
+    """Say in a few words why a file cannot be used; of the messages of HDF5 the system's own words are taken."""
+    if error.strerror:
+        return error.strerror
+    own = re.search(r"error message = '([^']*)'", str(error))
+    return own[1] if own else " ".join(str(error).split())
+
+
 def check_target(path: Path, *inputs: Path) -> None:
     """Check that a result file can be written, before the work that produces the result.
 
@@ -41,6 +50,8 @@ def check_target(path: Path, *inputs: Path) -> None:
     above = next((folder for folder in path.parents if folder.exists()), path.parent)
     if not above.is_dir():
         raise InputError([Fault(place, f"cannot be written: {above} is no folder", "give another folder")])
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError([Fault(place, f"cannot be written: {above} is read-only", "give another folder")])
     if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
         raise InputError([Fault(place, "cannot be written: it is the input", "give the output another name")])
 

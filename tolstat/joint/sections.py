@@ -96,7 +96,13 @@ class Material(Strict):
 class Pin(Strict):
     """Each of the four pins: a round beam along its axis e, clamped at the hub, its mass lumped at its end."""
 
-    l: Annotated[Length, Field(description="length of the beam, from the hub to the middle of the contact")]  # noqa: E741
+    l: Annotated[  # noqa: E741
+        Length,
+        Field(
+            description="length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque "
+            "of the bushing is the force times l, or up to l + z/2"
+        ),
+    ]
     d: Annotated[Diameter, Field(description="diameter of the beam")]
     chi: Annotated[Number, Field(description="shear factor of the section")] = PIN_CHI
     A: Annotated[Area, follows("pin.A", "area of the section")] = FOLLOWS

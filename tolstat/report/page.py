@@ -18,7 +18,9 @@ from tolstat.report import html, joint_values, verdict
 from tolstat.solver import fidelity
 from tolstat.store import viewed
 from tolstat.store.integrity import DIGEST
+from tolstat.store.recorded import joint_of
 from tolstat.store.result_file import BLOCK
+from tolstat.store.worst import point_of
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -88,7 +90,8 @@ def compose(view: View, asked: Asked) -> Page:
         note for note in (fidelity.sentence(view.store.options, view.store.fidelity), _stopped(view)) if note
     )
     if len(view.points) > 1:
-        remedy = f"tolstat report {asked.path.name} --point {view.points[0]} --out PAGE.html"
+        point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
+        remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
         asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
         asked = replace(asked, replay=0)
     sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
@@ -97,7 +100,8 @@ def compose(view: View, asked: Asked) -> Page:
     provenance = Section("provenance", "Provenance", [facts, joint_values.listing(view.store), text])
     lead = [section for section in sections if section.lead]
     rest = [section for section in sections if not section.lead]
-    return Page(view.name, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
+    described = joint_of(view.store, 0).description
+    return Page(view.name, described, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
 
 
 def _stopped(view: View) -> str:

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.files import atomic_write
+from tolstat.common.files import atomic_write, reason
 from tolstat.common.tables import Status
 from tolstat.store.axes import attach_scales
 from tolstat.store.histories import (
@@ -93,9 +93,9 @@ def assemble(
     except FileExistsError as error:
         raise store_error(path, "exists already", "give another file: --out OTHER.h5") from error
     except OSError as error:
-        reason = error.strerror or str(error)
+        why = reason(error)
         raise store_error(
-            path, f"cannot be written: {reason}", "check that the folder is writable and the disk has space"
+            path, f"cannot be written: {why}", "check that the folder is writable and the disk has space"
         ) from error
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
-from tolstat.common.loads import ANY_LIMIT, LOADS
+from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS
 from tolstat.store.several_loads import largest_of, together
 
 if TYPE_CHECKING:
@@ -98,7 +98,12 @@ def command(path: Path, limit: str = ANY_LIMIT) -> str:
 
 
 def relative(view: View, name: str) -> float:
-    """Numerical error of a load, relative to the largest load of its kind in the joint; NaN if unknown."""
+    """Numerical error of a load, relative to the largest load of its kind in the joint; NaN if unknown.
+
+    Of all limits that of the load whose error is the largest.
+    """
+    if name == ALL_LIMITS:
+        return float(np.max([relative(view, own) for own in view.limits]))
     narrowed, plain = view.narrowed(name)
     return narrowed.numerical_error.get(LOADS[plain].kind, np.nan)
 

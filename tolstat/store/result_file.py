@@ -33,7 +33,7 @@ RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
 """Remedy for a file that cannot be repaired."""
 
 
-POINT_GROUPS = ("results", "ledger", "histories", "verify")
+POINT_GROUPS = ("results", "ledger", "histories", "verify", "near")
 """Groups that a file has once for each operating point."""
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
-from tolstat.common.files import atomic_write, check_disk_space, make_parent
+from tolstat.common.files import atomic_write, check_disk_space, make_parent, reason
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store.histories import HISTORY_BYTES, parts_folder
 from tolstat.store.integrity import history_checks, results_hash
@@ -97,9 +97,9 @@ class ResultStore(Reader):
                 path, "exists already", "resume it with its own study, or give another file: --out OTHER.h5"
             ) from error
         except OSError as error:
-            reason = error.strerror or str(error)
+            why = reason(error)
             remedy = "check that the folder is writable and the disk has space"
-            raise store_error(path, f"cannot be written: {reason}", remedy) from error
+            raise store_error(path, f"cannot be written: {why}", remedy) from error
         return cls.open_to_write(path)
 
     @classmethod
@@ -157,9 +157,9 @@ class ResultStore(Reader):
             self._sync()
             self._check_path()
         except OSError as error:
-            reason = error.strerror or str(error)
+            why = reason(error)
             remedy = "free disk space, and run the same command again; finished joints are kept"
-            raise store_error(self.path, f"cannot be written: {reason}", remedy) from error
+            raise store_error(self.path, f"cannot be written: {why}", remedy) from error
 
     def begin_session(self, done: int) -> None:
         """Record for readers of the file that a run begins with `done` joints finished."""
@@ -271,9 +271,9 @@ class ResultStore(Reader):
         try:
             self._handle.file = replace(self.path, self._file, change, growth)
         except OSError as error:
-            reason = error.strerror or str(error)
+            why = reason(error)
             remedy = "free disk space for a second copy, and run the same command again; finished joints are kept"
-            raise store_error(self.path, f"cannot be replaced: {reason}", remedy) from error
+            raise store_error(self.path, f"cannot be replaced: {why}", remedy) from error
 
     def _put(self, name: str, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
         put(self._held()["results"][name], rows, values)

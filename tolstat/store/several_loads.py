@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tolstat.common.loads import ALL_LIMITS, Limit
+from tolstat.common.loads import load_of as of_name
 from tolstat.store.sample_load import SampleLoad
 
 if TYPE_CHECKING:
@@ -38,3 +39,21 @@ def largest_of(name: str, loads: Sequence[SampleLoad]) -> SampleLoad:
     ends = (np.maximum.reduce([load.ends[k] for load in loads]) for k in (0, 1))
     values, nominal = np.maximum.reduce([load.values for load in loads]), max(load.nominal for load in loads)
     return replace(first, name=name, nominal=nominal, values=values, ends=tuple(ends), parts=tuple(loads))
+
+
+def leading(view: View) -> tuple[str, ...]:
+    """Leading load of each kind (force, torque, ...).
+
+    Candidates are the loads with limits or, without limits, all bushing loads kept. The leading load is the one whose
+    limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the limit (without limits
+    by the 99 % quantile).
+    """
+    found: dict[str, tuple[tuple[float, float], str]] = {}
+    for load in view.loads(list(view.limits) or view.bushing_loads):
+        if load.valid.size:
+            limit = 1.0 if load.limit is None else load.limit
+            share = 0.0 if load.limit is None else load.above(limit).estimate
+            rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
+            kind = of_name(load.name).kind
+            found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
+    return tuple(name for _, name in found.values())

@@ -16,7 +16,7 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import BUSHING_LOADS, LOADS, limits_in_words, load_of, split
+from tolstat.common.loads import ALL_LIMITS, BUSHING_LOADS, LOADS, limits_in_words, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
@@ -26,6 +26,7 @@ from tolstat.store.first_pass import FirstPass
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
 from tolstat.store.sample_load import SampleLoad, frozen
+from tolstat.store.several_loads import leading, together
 from tolstat.store.verification import Verification
 from tolstat.store.what_if import Altered
 from tolstat.study.points import limits_at, names_of
@@ -132,6 +133,8 @@ class View:
     @cached_property
     def near(self) -> Verification | None:
         """The verification of joints near limits that the file holds, if any."""
+        if len(self.parts) > 1:
+            return worst.checks([part.near for part in self.parts])
         return verification.read(self.store, verification.NEAR)
 
     @cached_property
@@ -197,6 +200,10 @@ class View:
     def load(self, name: str) -> SampleLoad:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
 
+        ``"all limits"`` is the largest ratio of load to limit of each joint, see `several_loads.together`.
+
+        Its limit is the one of that name or, without it, the one that holds at these points.
+
         Raises
         ------
         InputError
@@ -206,9 +213,13 @@ class View:
         """
         if name not in self._loads:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
+            if name == ALL_LIMITS and self.limits:
+                self._loads[name] = together(self)
+                return self._loads[name]
             view, plain = self.narrowed(name)
             if view is not self:
-                self._loads[name] = replace(view.load(plain), name=name, limit=self.limits.get(name))
+                own = view.load(plain)
+                self._loads[name] = replace(own, name=name, limit=self.limits.get(name, own.limit))
                 return self._loads[name]
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
@@ -248,19 +259,14 @@ class View:
     def leading(self) -> tuple[str, ...]:
         """Leading load of each kind (force, torque, ...).
 
-        Candidates are the loads with limits or, without limits, all bushing loads kept. The leading load is the one
-        whose limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the limit
-        (without limits by the 99 % quantile).
+        See `several_loads.leading`.
         """
-        found: dict[str, tuple[tuple[float, float], str]] = {}
-        for load in self.loads(list(self.limits) or self.bushing_loads):
-            if load.valid.size:
-                limit = 1.0 if load.limit is None else load.limit
-                share = 0.0 if load.limit is None else load.above(limit).estimate
-                rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
-                kind = load_of(load.name).kind
-                found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
-        return tuple(name for _, name in found.values())
+        return leading(self)
+
+    @property
+    def decisive(self) -> str:
+        """What a verdict is about: of several limits all together, ``"all limits"``; else `most_exceeded`."""
+        return ALL_LIMITS if len(self.limits) > 1 else self.most_exceeded
 
     @property
     def most_exceeded(self) -> str:
@@ -390,7 +396,8 @@ class View:
         pending = self.counts.total - self.counts.done
         text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)})"
         if all(self.points):
-            text += f" at {self.points[0]}" if len(self.points) == 1 else f", the worst of {', '.join(self.points)}"
+            *others, last = self.points
+            text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"
         text += f", {self.counts.shortfall}"
         return text + (f", {pending} still pending" if pending else "")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.shown import shown
-from tolstat.common.tables import VALID
 from tolstat.store import meanings
 from tolstat.store.new_file import GROUPS
 from tolstat.store.result_file import put_attributes, text
@@ -24,9 +23,9 @@ if TYPE_CHECKING:
 GROUP = "what_if"
 DATASETS = {
     "sample": ("i8", "1", "number of the sample; of an exchange, of the pair of samples 2 i and 2 i + 1"),
-    "load": (h5py.string_dtype(), "1", "name of the load"),
-    "loads": ("f8", "N, N*m", "largest loads over the revolution; NaN without a result"),
-    "status": ("u1", "1", "outcome of the simulation"),
+    "load": (h5py.string_dtype(), "1", "name of the load, of several operating points with that of the point"),
+    "loads": ("f8", "N, N*m", "largest loads over the revolution; NaN without a valid one"),
+    "status": ("u1", "1", "outcome of the simulation; of several operating points that of the point that decides"),
 }
 """Type, unit and description of each dataset of a set; the first two are the scales of the others."""
 
@@ -43,11 +42,11 @@ class Altered(NamedTuple):
     first : int
         Sample of the first joint; of an exchange, the number of the first pair.
     names : tuple of str
-        The loads, (k,).
+        The loads, (k,); of a campaign at several operating points each with one of them, ``cross1.F at cruise``.
     loads : ndarray, shape (n, k)
-        SI, NaN for a joint without result.
+        SI, NaN for a joint without a valid load at that point.
     status : ndarray of uint8, shape (n,)
-        `tables.Status` of each joint.
+        `tables.Status` of each joint; of several operating points that of the point that decides, `worst.deciding`.
     """
 
     about: Mapping[str, Any]
@@ -61,9 +60,13 @@ class Altered(NamedTuple):
         """Number after that of the last joint."""
         return self.first + len(self.status)
 
-    def valid(self, load: str) -> NDArray[np.float64]:
-        """One load of each joint, NaN without a valid one, (n,)."""
-        return np.where(np.isin(self.status, VALID), self.loads[:, self.names.index(load)], np.nan)
+    def holds(self, names: Sequence[str]) -> bool:
+        """Whether all these loads are among `names`."""
+        return set(names) <= set(self.names)
+
+    def valid(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Largest of some loads of each joint, NaN where one of them is not valid, (n,)."""
+        return np.asarray(np.max(self.loads[:, [self.names.index(name) for name in names]], axis=1))
 
 
 def key(about: Mapping[str, Any]) -> str:
@@ -103,6 +106,33 @@ def write(store: ResultStore, sets: Mapping[str, Altered]) -> None:
     """
     growth = sum(one.loads.nbytes + one.status.nbytes for one in sets.values())
     store._replace(lambda file: _write(file, sets), growth)
+
+
+def common(files: Iterable[Mapping[str, Altered]]) -> tuple[dict[str, Altered], int]:
+    """Sets of several files of one campaign: of each change the longest, unless the others differ from its beginning.
+
+    Returns
+    -------
+    sets : dict of str to Altered
+    dropped : int
+        Number of changes whose sets differ.
+    """
+    found: dict[str, Altered] = {}
+    differing = set()
+    for sets in files:
+        for name, one in sets.items():
+            short, long = sorted((one, found.get(name, one)), key=lambda own: own.end)
+            found[name] = long
+            if not _begins(long, short):
+                differing.add(name)
+    return {name: one for name, one in found.items() if name not in differing}, len(differing)
+
+
+def _begins(long: Altered, short: Altered) -> bool:
+    """Whether a set begins with another one, to the last bit."""
+    n = len(short.status)
+    begin = long._replace(loads=long.loads[:n], status=long.status[:n])
+    return _check(begin) == _check(short)
 
 
 def _write(file: h5py.File, sets: Mapping[str, Altered]) -> None:

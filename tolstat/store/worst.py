@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
 from tolstat.store.verification import Verification
+
+if TYPE_CHECKING:
+    from tolstat.store.view import View
 
 _SEVERITY = np.zeros(max(Status) + 1, np.uint8)
 for _rank, _states in enumerate(((Status.STATIONARY,), UNSETTLED, FAILED, (Status.PENDING,)), 1):
@@ -98,6 +102,32 @@ def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[Float
         found.append(values if limit.has_one_level else values / level)
         states.append(status)
     return np.maximum.reduce(found), np.choose(deciding(states), states)
+
+
+def point_of(view: View, name: str) -> str:
+    """Operating point at which a load matters most: where most joints exceed its limit, else where it is largest.
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+    name : str
+        A load, ``cross1.F`` or ``cross1.F at cruise+start``.
+
+    Returns
+    -------
+    str
+        Name of the point; empty if the file has one without a name.
+    """
+    at, plain = view.narrowed(name)
+    limit = view.load(name).limit
+
+    def rank(part: View) -> tuple[float, float]:
+        load = part.load(plain)
+        share = 0.0 if limit is None else float(np.nan_to_num(load.above(limit).estimate))
+        return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) if load.valid.size else 0.0
+
+    return max(at.parts, key=rank).points[0]
 
 
 def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:

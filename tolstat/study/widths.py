@@ -100,7 +100,8 @@ class Width(NamedTuple):
     factor, shift : float
         As in `Rescaled`.
     words : str
-        ``"half"``, ``"exact"``, ``"× 0.63"``, ``"class m"``, ``"H6"``.
+        ``"half"``, ``"exact"``, ``"× 0.63"``, ``"class m"``,
+        ``"f8 (mean clearance +8 µm)"``: of a fit with the change of the mean radial clearance.
     """
 
     factor: float
@@ -241,7 +242,10 @@ def _graded(fit: fits.Fit, is_hole: bool, side: int) -> Width | None:
     moved = code._replace(**{"hole_grade" if is_hole else "shaft_grade": other})
     zones = fit.entry.zones, iso286.zones(moved, round(1e3 * fit.entry.basic, 9))
     old, new = (zone.hole if is_hole else zone.shaft for zone in zones)
-    return Width(new.half / old.half, 1e-6 * (new.middle - old.middle), f"{letter}{other}")
+    moved_by = new.middle - old.middle
+    looser = 0.5 * (moved_by if is_hole else -moved_by)
+    said = f"{letter}{other} (mean clearance {looser:+.3g} µm)".replace("-", "−")
+    return Width(new.half / old.half, 1e-6 * moved_by, said)
 
 
 def _classed(entry: Toleranced, site: Site, side: int) -> Width | None:

@@ -37,6 +37,8 @@ class Lives:
         Name of the study.
     bearing : Bearing
         Section ``[bearing]`` of the joint.
+    duty : dict of str to float
+        Share of the service time at each operating point; their sum is 1.
     loads : ndarray, shape (n, 4)
         Dynamic equivalent load of each pin's bearing over the duty cycle, N; NaN without a result.
     hours : ndarray, shape (n, 5)
@@ -57,6 +59,7 @@ class Lives:
 
     name: str
     bearing: Bearing
+    duty: Mapping[str, float]
     loads: FloatArray
     hours: FloatArray
     nominal_loads: FloatArray
@@ -129,7 +132,7 @@ def lives_of(view: View) -> Lives:
     if not keeps_loads(view):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise StoreError(str(Fault(str(view.path), "does not keep the equivalent loads of the bearings", remedy)))
-    duty = _duty(view)
+    duty = duty_of(view)
     samples = np.arange(view.n)
     operation = [
         operating(
@@ -147,6 +150,7 @@ def lives_of(view: View) -> Lives:
     return Lives(
         name=view.name,
         bearing=bearing,
+        duty=dict(zip(view.points, duty, strict=True)),
         loads=loads,
         hours=hours,
         nominal_loads=nominal_loads,
@@ -159,7 +163,7 @@ def lives_of(view: View) -> Lives:
     )
 
 
-def _duty(view: View) -> list[float]:
+def duty_of(view: View) -> list[float]:
     """Share of the service time at each operating point of a view; their sum is 1.
 
     Raises

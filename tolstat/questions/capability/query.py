@@ -10,9 +10,9 @@ import pandas as pd
 
 from tolstat.analysis import capability, exceedance, extreme
 from tolstat.analysis.prediction import DELIVERY
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
 from tolstat.store import error_budget
-from tolstat.store.several_loads import together
 from tolstat.store.view import View
 
 NOT_NORMAL = 0.01
@@ -43,7 +43,7 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
         (`analysis.exceedance.unresolved_matter`).
     """
     rows = []
-    for load in [*view.loads(list(view.limits)), together(view)]:
+    for load in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
         assert load.limit is not None
         pair = error_budget.shifted(view, load)
         c = capability.of_sample(load.sample, load.limit, confidence, view.iid)

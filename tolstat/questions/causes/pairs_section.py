@@ -62,7 +62,7 @@ def _shares(found: Pairs) -> tuple[float, float]:
 
 def _panel(found: Pairs) -> Panel:
     return Panel(
-        f"pairs-{found.load.replace('.', '-')}",
+        f"pairs-{found.load}",
         f"{found.load} against the share of the clearance used",
         f"{found.name}: rank correlation {found.correlation:.2f} over {found.use.size} joints",
         partial(_draw, found=found),

@@ -55,6 +55,11 @@ def _has(name: str) -> Callable[[pd.DataFrame], bool]:
     return lambda table: bool(table[name].notna().any())
 
 
+def heading(causes: Causes) -> str:
+    """Line above the table where another one stands before it: what the shares are of."""
+    return f"scatter of {causes.load} over all joints, not of exceeding the limit; by error:"
+
+
 def note(causes: Causes, log: bool = False) -> str:
     """Notes to the table: number of joints, explained variance, restrictions."""
     unit = unit_text(causes.unit)

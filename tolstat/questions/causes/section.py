@@ -112,7 +112,7 @@ def _tornado_panel(causes: Causes, quantity: str) -> Panel:
     part = causes.table.head(SHOWN)
     top = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in part.head(5).to_dict("records"))
     return Panel(
-        f"tornado-{causes.load.replace('.', '-')}",
+        f"tornado-{causes.load}",
         f"{quantity}: share of the variance by error",
         f"Largest first-order indices: {top}; all errors alone {100 * causes.additive:.0f} %",
         partial(_tornado, causes=causes, quantity=quantity),
@@ -144,7 +144,7 @@ def _tornado(ax: Axes, causes: Causes, quantity: str) -> None:
 
 
 def _angle_panels(angle: AgainstAngle, quantity: str) -> list[Panel]:
-    key, unit = angle.load.replace(".", "-"), unit_text(angle.unit)
+    key, unit = angle.load, unit_text(angle.unit)
     middle = angle.spread[1]
     loads = Panel(
         f"angle-{key}",

@@ -73,7 +73,8 @@ def section(view: View, loads: Sequence[str], against: Sequence[AgainstAngle], h
     ]
     blocks: list[Block] = [Panels(panels)] if panels else []
     blocks += [_table(tail) for tail in tails]
-    blocks.append(Text("To simulate one of them again: tolstat replay FILE --row ROW --out trace.csv", small=True))
+    at = " --point POINT" if len(view.points) > 1 else ""
+    blocks.append(Text(f"To simulate one of them again: tolstat replay FILE --row ROW{at} --out trace.csv", small=True))
     return Section("worst", "The worst joints", blocks)
 
 
@@ -99,7 +100,7 @@ def _history_panel(found: _Histories) -> Panel:
     tail = found.tail
     rows = ", ".join(f"row {joint.row} up to {text.value(joint.value, tail.unit)}" for joint in tail.joints[:DRAWN])
     return Panel(
-        f"worst-{tail.by.replace('.', '-')}",
+        f"worst-{tail.by}",
         f"{tail.by} of the worst joints over the revolution",
         f"Histories of the worst joints: {rows}",
         partial(_draw, found=found),

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import load_of, unit_text
+from tolstat.common.loads import ALL_LIMITS, load_of, split, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
@@ -51,17 +51,27 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `SampleLoad.supports`.
     """
-    rows = []
-    for name, level in view.limits.items():
-        load = view.load(name)
-        head = {"load": name, "unit": load.unit, "nominal": load.nominal}
-        budget = _error_budget(view, load, level, confidence)
-        row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
-        # the load with its numerical error, where that is known
-        top = (error_budget.shifted(view, load) or (load, load))[1]
-        row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
-        rows.append(row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan))
-    return pd.DataFrame(rows)
+    return pd.DataFrame([_above_limit(view, view.load(name), confidence) for name in view.limits])
+
+
+def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
+    """Share of the joints above at least one limit of the study: a row as those of `limits`, of the load `ALL_LIMITS`.
+
+    Its level is 1, and its loads are the largest ratios of load to limit.
+    """
+    return _above_limit(view, view.load(ALL_LIMITS), confidence)
+
+
+def _above_limit(view: View, load: SampleLoad, confidence: float) -> dict[str, Any]:
+    level = load.limit
+    assert level is not None
+    head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
+    budget = _error_budget(view, load, level, confidence)
+    row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
+    # the load with its numerical error, where that is known
+    top = (error_budget.shifted(view, load) or (load, load))[1]
+    row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
+    return row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan)
 
 
 def at_points(view: View) -> pd.DataFrame:
@@ -164,14 +174,15 @@ def readings(view: View) -> dict[str, Any]:
     Returns
     -------
     dict
-        By load: ``unit``; ``n``, ``failed``, ``unsettled``; ``start``, index of the level shown first (nearest to the
-        limit or, without one, to the 90 % quantile); lists of equal length ``x``, ``count``, ``share`` and, for
-        independent samples, ``lower``, ``upper``, ``outer_lower``, ``outer_upper``, otherwise ``bound_lower``,
-        ``bound_upper``.
+        By load, and by load at the operating points that a limit names: ``unit``; ``n``, ``failed``, ``unsettled``;
+        ``start``, index of the level shown first (nearest to the limit or, without one, to the 90 % quantile); lists of
+        equal length ``x``, ``count``, ``share`` and, for independent samples, ``lower``, ``upper``, ``outer_lower``,
+        ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``.
     """
     found = {}
     ends = ("lower", "upper", "outer_lower", "outer_upper") if view.has_intervals else ("bound_lower", "bound_upper")
-    for load in view.loads(view.shown_loads):
+    named = [name for name in view.limits if split(name)[1]]
+    for load in view.loads([*view.shown_loads, *named]):
         if not load.valid.size:
             continue
         x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)

@@ -23,6 +23,7 @@ from tolstat.analysis.exceedance import FloatArray, split
 from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
+from tolstat.campaign.executors import kept_workers
 from tolstat.campaign.extend import grow
 from tolstat.campaign.progress import Reporter, note
 from tolstat.common.draw_records import SUBSET
@@ -36,7 +37,7 @@ from tolstat.study import Study, rule, subset_of
 from tolstat.study.model import Subset
 
 MIN_PARALLEL = 2000
-"""Minimum number of joints of a stage for which worker processes are started: some seconds of work."""
+"""Minimum number of joints of a stage for which several worker processes are started: some seconds of work."""
 CONFIDENCE = 0.95
 EXAMPLE = 'write --limit "cross1.F > 900 N"'
 
@@ -214,7 +215,7 @@ def run(
         Result file; created if it does not exist, otherwise resumed.
     workers : int, optional
         Number of processes for each stage; does not affect results. By default, stages of fewer than `MIN_PARALLEL`
-        joints run in this process, which a crash in the simulation of a joint then ends.
+        joints have one.
     tell : callable, optional
         Receives a sentence on each completed level.
     progress : callable, optional
@@ -231,6 +232,13 @@ def run(
     Interrupted, WorkerDied
         As `campaign.run`; the same call resumes.
     """
+    with kept_workers():
+        return _run(plan, out, workers, tell, progress)
+
+
+def _run(
+    plan: Study, out: Path, workers: int | None, tell: Callable[[str], None], progress: Reporter | None
+) -> RareEvent:
     settings = plan.sampling
     assert isinstance(settings, Subset)
     walk = Walk(Settings(settings.per_level, settings.p0, settings.limit.level), lambda *which: _noise(plan, *which))
@@ -278,11 +286,12 @@ def repeated(
     `run`.
     """
     found = []
-    for k in range(repeats):
-        own = replace(plan, sampling=plan.sampling.model_copy(update={"seed": plan.sampling.seed + k}))
-        path = out.with_name(f"{out.stem}_{k + 1}{out.suffix}") if k else out
-        tell(f"seed {own.sampling.seed}: {path}")
-        found.append(run(own, path, workers, tell, progress))
+    with kept_workers():
+        for k in range(repeats):
+            own = replace(plan, sampling=plan.sampling.model_copy(update={"seed": plan.sampling.seed + k}))
+            path = out.with_name(f"{out.stem}_{k + 1}{out.suffix}") if k else out
+            tell(f"seed {own.sampling.seed}: {path}")
+            found.append(run(own, path, workers, tell, progress))
     return found
 
 
@@ -327,7 +336,7 @@ def _simulate(
     """Simulate the pending rows of the file, about `count` of them."""
     execution = Execution(workers=workers)
     if workers is None and count < MIN_PARALLEL:
-        execution = Execution("serial", 1, block=count)
+        execution = Execution(workers=1, block=count)
     campaign.run(_sized(plan, rows), out, execution=execution, tell=tell, check=False, progress=progress)
 
 

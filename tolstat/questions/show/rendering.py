@@ -83,8 +83,10 @@ def lengths(joint: Joint, alpha: float) -> pd.DataFrame:
         ("contact.z", d.z, "length of the contact"),
         ("pin.d", joint.pin.d, "diameter of a pin's beam"),
         ("pin.l", joint.pin.l, "length of a pin's beam"),
+        ("arm.width", joint.arm.width or 0.0, "side of an arm's section along t"),
+        ("arm.depth", joint.arm.depth or 0.0, "side of an arm's section along e"),
     ]
-    found = [(name, 1e3 * x, "mm", said) for name, x, said in rows]
+    found = [(name, 1e3 * x, "mm", said) for name, x, said in rows if x or not name.startswith("arm.")]
     found.append(("operation.alpha", float(np.degrees(alpha)), "deg", "misalignment of the shafts"))
     return pd.DataFrame(found, columns=["name", "value", "unit", "meaning"])
 

@@ -16,6 +16,7 @@ from tolstat.display.joint_drawing import sheets
 from tolstat.questions.show import query
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
+from tolstat.store.worst import point_of
 
 LEGEND = (
     "The joint from its own dimensions. Marked: the bushings and pins of the leading loads. Loads of cross1–4 act on "
@@ -40,20 +41,25 @@ def worst(view: View, load: str, asked: Asked) -> Panel | None:
     """
     with asked.noting("the joint is not drawn"):
         place = split(load)[0].rpartition(".")[0]
-        front, side, _ = _joint(view, [place] if place else [])
+        front, side, _ = _joint(view, [place] if place else [], load)
         title = "The joint"
         if place:
             own = view.load(load)
             exceeded = own.limit is not None and own.above(own.limit).count
             title = f"{place}: {'most often above its limit' if exceeded else 'nearest to its limit'}"
             title = title if own.limit is not None else f"{place}: the largest loads"
+            title += f", at {point_of(view, load)}" if len(view.points) > 1 else ""
         return replace(side if place.startswith("fork") else front, key="joint-worst", title=title)
     return None
 
 
-def _joint(view: View, marked: Collection[str]) -> tuple[Panel, Panel, Panel]:
-    alpha = view.parts[0].store.operation.alpha
-    return sheets.joint(query.dimensions(joint_of(view.store, 0), alpha), marked)
+def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel, Panel]:
+    """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
+    point = point_of(view, load) if load else view.points[0]
+    front, side, pin = sheets.joint(
+        query.dimensions(joint_of(view.store, 0), view.at(point).store.operation.alpha), marked
+    )
+    return front, replace(side, title=f"{side.title}, at {point}") if point else side, pin
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
@@ -68,7 +74,13 @@ def sections(view: View, asked: Asked) -> list[Section]:
         marked = sorted({name.rpartition(".")[0] for name in view.leading} - {""})
         joint = joint_of(view.store, 0)
         kinds = sheets.errors(query.positive(joint), query.dimensions(joint, 0.0))
-        found.append(Section("joint", "The joint", [Panels([*_joint(view, marked), kinds]), Text(LEGEND, small=True)]))
+        found.append(
+            Section(
+                "joint",
+                "The joint",
+                [Panels([*_joint(view, marked, next(iter(view.leading), "")), kinds]), Text(LEGEND, small=True)],
+            )
+        )
     return found
 
 

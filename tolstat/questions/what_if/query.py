@@ -15,6 +15,7 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import EXCHANGE, WIDTH
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -23,6 +24,7 @@ from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
 from tolstat.study import widths
+from tolstat.study.points import at
 from tolstat.study.widths import EXACT, HALF, Line
 
 NEGLIGIBLE = 0.1
@@ -31,14 +33,34 @@ TAIL_STARTS_AT = 0.9
 """Quantile of the load that takes the place of a limit where the study sets none."""
 
 
+class Measure(NamedTuple):
+    """How the load that orders the lines follows from the loads that a file keeps.
+
+    Attributes
+    ----------
+    parts : tuple of (tuple of str, float)
+        Names of loads, of which the largest counts, and what it is divided by: 1, or the limit of each of all limits.
+    """
+
+    parts: tuple[tuple[tuple[str, ...], float], ...]
+
+    def held(self, one: Altered) -> bool:
+        """Whether a set has all these loads."""
+        return all(one.holds(names) for names, _ in self.parts)
+
+    def of(self, one: Altered) -> FloatArray:
+        """Load of each joint of a set, NaN where one of its loads is not valid, (n,)."""
+        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self.parts]))
+
+
 @shown
 class WhatIf(NamedTuple):
-    """Share of the joints above a limit with other widths.
+    """Share of the joints above a limit, or above at least one of all limits, with other widths.
 
     Attributes
     ----------
     load, unit : str
-        The load, and its SI unit.
+        The load, and its SI unit; ``"all limits"`` for the largest ratio of load to limit.
     level : float
         The limit; without one, the 90 % quantile of the load.
     n : int
@@ -48,15 +70,16 @@ class WhatIf(NamedTuple):
     table : DataFrame
         One row per line and step, lines in the order of their share if half as wide: ``line``, ``size``, ``step``,
         ``words``, ``factor`` (NaN if it differs within the line), ``n``, ``share`` with ``_lower`` and ``_upper``, and
-        ``change``, the paired difference to the joints as drawn, with ends.
+        ``change``, the paired difference to the joints as drawn, with ends. Where `n` is larger than that of the line,
+        its share is the share of all joints as drawn plus the change.
     indices : DataFrame
         One row per line: ``line``, ``pairs``; ``alone`` and ``in_all`` with ends, the closed and total Sobol' index of
         the load, or of its logarithm; ``above_alone`` and ``above_in_all``, those of the event that it is above the
         level. NaN for correlated lines.
     logarithmic : bool
         Whether the logarithm of the load is decomposed.
-    missing : tuple of str
-        Entries of ``[tolerances]`` without joints in the file.
+    missing, left_out : tuple of str
+        Entries of ``[tolerances]`` without joints in the file, and those whose width is not changed.
     settled : bool
         Whether the order of the lines is settled: neighbours differ, or by less than `NEGLIGIBLE` of the share.
     """
@@ -72,6 +95,7 @@ class WhatIf(NamedTuple):
     indices: pd.DataFrame
     logarithmic: bool
     missing: tuple[str, ...]
+    left_out: tuple[str, ...]
     settled: bool
 
 
@@ -83,7 +107,7 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
     view : View
         A campaign whose joints are drawn from tolerances.
     by : str
-        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or ``"all limits"`` of the study.
     confidence : float
         Confidence level of all intervals.
 
@@ -105,14 +129,14 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
     ...     found = tolstat.what_if(store.view(), "fork1.F")
     """
     check(view)
-    load = view.load(by)
-    held = [one for one in view.altered.values() if one.about["kind"] == WIDTH and by in one.names]
+    load, own = view.load(by), measure(view, by)
+    held = [one for one in view.altered.values() if one.about["kind"] == WIDTH and own.held(one)]
     base = as_drawn(view, by, view.altered)
     if not held or not np.isfinite(base).any():
         return None
     level = level_of(load)
     study_lines = widths.lines(view.study)
-    rows = [_row(view, one, base, by, level, confidence) for one in held]
+    rows = [_row(view, one, base, own, level, confidence) for one in held]
     table = pd.DataFrame([row for row in rows if row is not None])
     if table.empty:
         return None
@@ -131,7 +155,8 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
         indices=_indices(view, base, load, level, confidence, list(order)),
         logarithmic=load.long_tailed,
         missing=tuple(line.label for line in study_lines if line.label not in order),
-        settled=is_settled(halves(view.altered, study_lines, by), base, level, confidence),
+        left_out=tuple(widths.left_out(view.study)),
+        settled=is_settled(halves(view.altered, study_lines, own), base, level, confidence),
     )
 
 
@@ -148,12 +173,22 @@ def check(view: View) -> None:
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
-    if len(view.store.points) > 1:
-        remedy = "run the study with one of its points in [operation]"
-        raise StoreError(str(Fault(str(view.path), "has several operating points", remedy)))
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
         raise StoreError(str(Fault(str(view.path), "holds a part of the campaign only", remedy)))
+
+
+def names_at_points(view: View, load: str) -> tuple[str, ...]:
+    """Names that the file keeps of a load, one for each operating point: that of the load unless it has several."""
+    own, plain = view.narrowed(load)
+    return tuple(at(plain, [point], list(view.store.points)) for point in own.points)
+
+
+def measure(view: View, load: str) -> Measure:
+    """Measure of a load, or of all limits together."""
+    if load == ALL_LIMITS:
+        return Measure(tuple((names_at_points(view, name), level) for name, level in view.limits.items()))
+    return Measure(((names_at_points(view, load), 1.0),))
 
 
 def level_of(load: SampleLoad) -> float:
@@ -173,18 +208,18 @@ def as_drawn(view: View, load: str, held: Mapping[str, Altered]) -> FloatArray:
     """Load of the joints as drawn, from sample 0 on, NaN without a valid one, (n,): the campaign's, then fresh ones."""
     own = own_joints(view)
     values = view.load(load).valid_or_nan[:own]
-    more = held.get(kept.key(sets.as_drawn(view.study).about))
-    if more is None or load not in more.names or not more.first <= own < more.end:
+    more, how = held.get(kept.key(sets.as_drawn(view.study).about)), measure(view, load)
+    if more is None or not how.held(more) or not more.first <= own < more.end:
         return values
-    return np.concatenate([values, more.valid(load)[own - more.first :]])
+    return np.concatenate([values, how.of(more)[own - more.first :]])
 
 
-def halves(held: Mapping[str, Altered], lines: list[Line], load: str) -> list[FloatArray]:
+def halves(held: Mapping[str, Altered], lines: list[Line], load: Measure) -> list[FloatArray]:
     """Load of the joints of each line that is half as wide; of those lines that the file has."""
     by_label = {
-        one.about["label"]: one.valid(load)
+        one.about["label"]: load.of(one)
         for one in held.values()
-        if one.about["kind"] == WIDTH and one.about["step"] == HALF and load in one.names
+        if one.about["kind"] == WIDTH and one.about["step"] == HALF and load.held(one)
     }
     return [by_label[line.label] for line in lines if line.label in by_label]
 
@@ -215,6 +250,8 @@ def best(found: WhatIf) -> Mapping[Any, Any] | None:
     return min(rows, key=lambda row: float(row["share"]), default=None)
 
 
+Ends = tuple[float, float, float]
+"""An estimate, and the ends of its interval."""
 _STEPS = {step: number for number, step in enumerate(widths.STEPS)}
 
 
@@ -228,18 +265,23 @@ def _order(table: pd.DataFrame) -> dict[str, int]:
 
 
 def _row(
-    view: View, one: Altered, base: FloatArray, load: str, level: float, confidence: float
+    view: View, one: Altered, base: FloatArray, load: Measure, level: float, confidence: float
 ) -> dict[str, object] | None:
     n = min(len(base), one.end)
     if one.first or not n:
         return None
-    values = one.valid(load)[:n]
+    values = load.of(one)[:n]
     if not np.isfinite(values).any() or not np.isfinite(values + base[:n]).any():
         return None
-    own = exceedance.exceedance(values, one.status[:n], level, confidence)
+    drawn = exceedance.exceedance(base, _states(base), level, confidence)
+    own = exceedance.exceedance(values, _states(values), level, confidence)
     pair = difference.shares(base[:n], values, [level], paired=True, confidence=confidence)
     factors = {own["factor"] for own in one.about["tolerances"].values()}
     factor = factors.pop() if len(factors) == 1 else np.nan
+    change = float(pair.estimate[0]), float(pair.outer_lower[0]), float(pair.outer_upper[0])
+    share = own.estimate, own.outer_lower, own.outer_upper
+    if n < len(base):
+        share = _moved((drawn.estimate, drawn.outer_lower, drawn.outer_upper), change)
     line = Line(one.about["label"], tuple(one.about["tolerances"]))
     return {
         "line": line.label,
@@ -249,35 +291,48 @@ def _row(
         "words": one.about["words"],
         "factor": factor,
         "n": n,
-        "share": own.estimate,
-        "share_lower": own.outer_lower,
-        "share_upper": own.outer_upper,
-        "change": float(pair.estimate[0]),
-        "change_lower": float(pair.outer_lower[0]),
-        "change_upper": float(pair.outer_upper[0]),
+        "share": share[0],
+        "share_lower": share[1],
+        "share_upper": share[2],
+        "change": change[0],
+        "change_lower": change[1],
+        "change_upper": change[2],
     }
 
 
+def _moved(drawn: Ends, change: Ends) -> Ends:
+    """Share as drawn plus a change that fewer joints tell, with the interval of both (Zou and Donner 2008).
+
+    The share and its change have a negative covariance, so the interval is wide rather than narrow.
+    """
+    share = drawn[0] + change[0]
+    low, high = (np.hypot(drawn[0] - drawn[k], change[0] - change[k]) for k in (1, 2))
+    found = (share, share - low, share + high)
+    return tuple(float(np.clip(value, 0.0, 1.0)) for value in found)  # type: ignore[return-value]
+
+
 def _states(values: FloatArray) -> NDArray[np.uint8]:
-    """Status of joints as drawn: valid, or failed where they have no valid load."""
+    """Status of joints: valid, or failed where they have no valid load."""
     return np.where(np.isfinite(values), Status.OK, Status.NEWTON_FAILED).astype(np.uint8)
 
 
 def _indices(
     view: View, base: FloatArray, load: SampleLoad, level: float, confidence: float, order: list[str]
 ) -> pd.DataFrame:
+    own = measure(view, load.name)
     held = {one.about["label"]: one for one in view.altered.values() if one.about["kind"] == EXCHANGE}
     rows = []
     for label in order:
         one = held.get(label)
         n = 0 if one is None else min(one.end, len(base) // 2)
-        if one is None or one.first or n < pick_freeze.FEWEST or load.name not in one.names:
+        if one is None or one.first or n < pick_freeze.FEWEST or not own.held(one):
             continue
-        a, b, ab = base[: 2 * n : 2], base[1 : 2 * n : 2], one.valid(load.name)[:n]
+        a, b, ab = base[: 2 * n : 2], base[1 : 2 * n : 2], own.of(one)[:n]
         row: dict[str, object] = {"line": label, "pairs": n}
-        for name, parts in (("", _decomposed(a, b, ab, load.long_tailed)), ("above_", _event(a, b, ab, level))):
+        of_load, of_event = _decomposed(a, b, ab, load.long_tailed), _event(a, b, ab, level)
+        for name, parts, estimate in (("", of_load, pick_freeze.indices), ("above_", of_event, pick_freeze.of_event)):
             try:
-                found = pick_freeze.indices(parts[0], parts[1], parts[2][:, None], confidence)
+                found = estimate(parts[0], parts[1], parts[2][:, None], confidence)
             except ValueError:  # too few joints with a load, or none, or all of them, above the level
                 continue
             for word, index in (("alone", found.first), ("in_all", found.total)):

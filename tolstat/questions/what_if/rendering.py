@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Panel
 from tolstat.display.table import Column, Row
@@ -53,9 +54,10 @@ def columns(found: WhatIf) -> list[Column]:
 
 def index_columns(found: WhatIf) -> list[Column]:
     """Columns of the table `indices` of a result: Sobol' indices of the load and of the event, with intervals."""
-    load = f"log {found.load}" if found.logarithmic else found.load
+    load = "largest load over its limit" if found.load == ALL_LIMITS else found.load
+    load = f"log {load}" if found.logarithmic else load
     heads = {"alone": f"{load}: alone, %", "in_all": "in all, %"}
-    heads |= {"above_alone": "above the limit: alone, %", "above_in_all": "in all, %"}
+    heads |= {"above_alone": f"{_above(found)}: alone, %", "above_in_all": "in all, %"}
     return [
         Column("line", lambda row: str(row["line"]), words=True),
         *(Column(head, partial(_index, name=name)) for name, head in heads.items()),
@@ -78,26 +80,52 @@ def rows(found: WhatIf) -> pd.DataFrame:
 
 def heading(found: WhatIf) -> str:
     """Two lines above the table: the joints as drawn, and what the table holds."""
-    limit = text.limit({"load": found.load, "level": found.level, "unit": found.unit})
     share = f"{text.percent(found.share)} ({text.span(found.lower, found.upper)})"
-    return f"{limit}: {share} of {found.n} joints as drawn\nshare above it with one line changed:"
+    return f"{event(found)}: {share} of {found.n} joints as drawn\nthis share with one line changed:"
 
 
 def note(found: WhatIf) -> str:
     """Notes to the table."""
-    said = ["share of the joints above the limit, 95 % intervals; joints with the same seeds, compared one by one"]
+    said = [
+        f"share of the joints {_above(found)}, 95 % intervals without the numerical error; joints with the same seeds"
+    ]
     if found.table["n"].nunique() > 1:
         said.append(joints(found))
     if not found.settled:
         said.append("the order of neighbouring lines is not settled: --run with a longer --budget goes on")
-    if found.missing:
-        said.append(f"not in the file: {', '.join(found.missing)}; --run simulates them")
+    said += absent(found)
     if not found.indices.empty:
         said.append(
-            "alone, in all: Sobol' indices of the event that the load is above the limit, "
+            f"alone, in all: Sobol' indices of the event that the load is {_above(found)}, "
             f"from {int(found.indices['pairs'].max())} pairs of joints"
         )
     return "\n".join(said)
+
+
+def absent(found: WhatIf) -> list[str]:
+    """Sentences on what the table lacks, without full stop: steps, lines without joints, lines that are not changed."""
+    said, table = [], rows(found)
+    if any(step in table and table[step].isna().any() for step in _HEADS):
+        said.append("-: not simulated yet; the same command with --run goes on")
+    if found.missing:
+        said.append(f"not in the file: {', '.join(found.missing)}; --run simulates them")
+    if found.left_out:
+        said.append(
+            f"left out: {', '.join(found.left_out)}; the width of their zone depends on other errors (a common "
+            "direction, or a bonus), and is not changed by itself"
+        )
+    return said
+
+
+def event(found: WhatIf) -> str:
+    """What the share is about: ``cross1.F > 1500 N``, or ``at least one limit exceeded``."""
+    if found.load == ALL_LIMITS:
+        return "at least one limit exceeded"
+    return text.limit({"load": found.load, "level": found.level, "unit": found.unit})
+
+
+def _above(found: WhatIf) -> str:
+    return "above at least one limit" if found.load == ALL_LIMITS else "above the limit"
 
 
 def joints(found: WhatIf) -> str:
@@ -106,23 +134,38 @@ def joints(found: WhatIf) -> str:
     return f"joints compared: {', '.join(f'{step} {n}' for step, n in least.items())}"
 
 
-def sentence(found: WhatIf) -> str:
+def sentence(found: WhatIf, accepted: float = np.nan) -> str:
     """Sentence on the line that lowers the share most if half as wide; empty if none surely does.
 
-    ``Halve the tilt tolerance of the holes (±0.5 deg) and it is 2.1 % (1.4 to 3 %)``, without full stop.
+    ``Halve the tilt tolerance of the holes (±0.5 deg) and 2.1 % (1.4 to 3 %) exceed the limit``, without full stop.
+    Where that is more than the accepted share, it says that no line suffices, and what the exact line gives.
     """
     row = query.best(found)
     if row is None:
         return ""
-    size = f" ({row['size']})" if row["size"] else ""
+    line = f"{phrase(row)} ({row['size']})" if row["size"] else phrase(row)
+    if not row["share"] > accepted:
+        limit = "at least one limit" if found.load == ALL_LIMITS else "the limit"
+        return f"Halve the {line} and {_share_in_words(row)} exceed {limit}"
+    exact = {own["line"]: own for own in found.table.to_dict("records") if own["step"] == EXACT}
+    least = min(exact.values(), key=lambda own: float(own["share"]), default=None)
+    said = f"halving the {line} gives {_share_in_words(row)}"
+    if least is not None and least["share"] <= accepted:
+        which = "" if least["line"] == row["line"] else f" the {phrase(least)}"
+        return f"Halving a single line is not enough: {said}, exact{which} {text.percent(least['share'])}"
+    same = exact.get(row["line"])
+    return f"No single line is enough: {said}" + ("" if same is None else f", exact {text.percent(same['share'])}")
+
+
+def _share_in_words(row: Row) -> str:
     low, high = 100.0 * row["share_lower"], text.percent(row["share_upper"])
-    return f"Halve the {phrase(row)}{size} and it is {text.percent(row['share'])} ({low:.3g} to {high})"
+    return f"{text.percent(row['share'])} ({low:.3g} to {high})"
 
 
-def advice(view: View, load: str) -> str:
+def advice(view: View, load: str, accepted: float) -> str:
     """Return the `sentence` of a load for the verdict; empty where the file holds no joints with other widths."""
     found = query.what_if(view, load) if view.altered else None
-    return "" if found is None else sentence(found)
+    return "" if found is None else sentence(found, accepted)
 
 
 def phrase(row: Row) -> str:
@@ -138,20 +181,19 @@ def phrase(row: Row) -> str:
 def values(found: WhatIf) -> dict[str, Any]:
     """JSON values."""
     own = found._asdict() | {"table": text.records(found.table), "indices": text.records(found.indices)}
-    return own | {"missing": list(found.missing), "sentence": sentence(found) or None}
+    return own | {"missing": list(found.missing), "left_out": list(found.left_out), "sentence": sentence(found) or None}
 
 
 def tornado_panel(found: WhatIf, accepted: float) -> Panel:
     """Share above the level with each line half as wide, exact, and coarser."""
     table = rows(found)
     halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in table.to_dict("records"))
-    limit = text.limit({"load": found.load, "level": found.level, "unit": found.unit})
     labels = _labels(table)
     left = drawing.rows_left([part for label in labels for part in label.split("\n")])
     top = drawing.legend_room(_STEPS, left)
     return Panel(
-        f"what-if-{found.load.replace('.', '-')}",
-        f"Share of the joints with {limit}, if one line is changed",
+        f"what-if-{_slug(found)}",
+        f"Share of the joints with {event(found)}, if one line is changed",
         f"As drawn {text.percent(found.share)}. Half as wide: {halves}",
         partial(_tornado, found=found, table=table, labels=labels, accepted=accepted),
         (drawing.WIDTH, 0.34 * (len(table) + 2.2) + drawing.BOTTOM + top),
@@ -164,7 +206,7 @@ def curve_panel(found: WhatIf, accepted: float) -> Panel:
     """Share above the level against the width of each line."""
     table = found.table[np.isfinite(found.table["factor"])]
     return Panel(
-        f"widths-{found.load.replace('.', '-')}",
+        f"widths-{_slug(found)}",
         "The share against the width of each line",
         "; ".join(
             f"{line}: " + ", ".join(f"{row['factor']:.3g} {text.percent(row['share'])}" for row in own)
@@ -192,7 +234,7 @@ def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], ac
     ax.tick_params(axis="y", labelsize=7.6)
     floor = _floor(found, accepted)
     style.share_axis(ax, floor, "x")
-    shares = [found.upper, *found.table["share"], *(found.share + found.table["change_upper"])]
+    shares = [found.upper, *found.table["share_upper"]]
     ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax(shares))))
     ax.axvspan(max(found.lower, floor), found.upper, color=drawing.GREY, alpha=0.3, lw=0)
     ax.axvline(found.share, color=style.INK, lw=1.2)
@@ -201,7 +243,7 @@ def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], ac
             if not np.isnan(row.get(step, np.nan)):
                 end = max(row[step], floor)
                 ax.barh(place, end - found.share, height, left=found.share, color=colour, zorder=2)
-                low, high = (max(found.share + row[f"{step}_change_{end}"], floor) for end in ("lower", "upper"))
+                low, high = (max(row[f"{step}_{end}"], floor) for end in ("lower", "upper"))
                 ax.plot([low, high], [place, place], color=style.INK, lw=1.2, zorder=3)
     for place, row in enumerate(table.to_dict("records")):
         if not np.isnan(row.get(EXACT, np.nan)):
@@ -215,7 +257,7 @@ def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], ac
     handles: list[Patch | Line2D] = [Patch(color=style.COLOURS[0]), Patch(color=style.COLOURS[1])]
     handles.append(Line2D([], [], ls="", marker="o", mfc="white", mec=style.INK, ms=5.5))
     drawing.legend_above(ax, handles, _STEPS)
-    ax.set_xlabel("share of the joints above the limit")
+    ax.set_xlabel(f"share of the joints {_above(found)}")
 
 
 def _curves(ax: Axes, found: WhatIf, table: pd.DataFrame, accepted: float) -> None:
@@ -233,14 +275,19 @@ def _curves(ax: Axes, found: WhatIf, table: pd.DataFrame, accepted: float) -> No
         (drawn,) = ax.plot(x, np.maximum(y, floor), color=colour, ls=dash, marker="o", ms=3.0, lw=1.0 if grey else 1.6)
         handles += [drawn] if place <= CURVES else []
         if place == 0:
-            low, high = (np.insert(found.share + own[f"change_{end}"], at, found.share) for end in ("lower", "upper"))
+            ends = (("share_lower", found.lower), ("share_upper", found.upper))
+            low, high = (np.insert(own[name].to_numpy(), at, drawn) for name, drawn in ends)
             ax.fill_between(x, np.maximum(low, floor), np.maximum(high, floor), color=colour, alpha=0.18, lw=0)
     ax.plot(1.0, found.share, "D", color=style.INK, ms=6.0, zorder=5)
     ax.set_ylim(floor, min(1.0, 2.0 * top))
     if accepted > 0.0:
         handles.append(ax.axhline(accepted, **_ACCEPTED))
-    ax.set(xlabel="width of the line, relative to the drawing", ylabel="share above the limit")
+    ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share {_above(found)}")
     drawing.legend_above(ax, handles, _curve_labels(table, accepted))
+
+
+def _slug(found: WhatIf) -> str:
+    return found.load.replace(" ", "-")
 
 
 def _floor(found: WhatIf, accepted: float) -> float:

@@ -11,14 +11,16 @@ from tolstat.campaign import what_if as sets
 from tolstat.campaign.executors import available_workers
 from tolstat.campaign.progress import clock, silent
 from tolstat.campaign.verify import no_progress
-from tolstat.campaign.what_if import Wanted
+from tolstat.campaign.what_if import Asked, Wanted
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.loads import ALL_LIMITS, split
 from tolstat.questions.what_if import query
 from tolstat.solver.simulation import warm_up
 from tolstat.store import Counts, ResultStore, what_if
 from tolstat.store.provenance import versions
 from tolstat.store.view import View
 from tolstat.study import widths
+from tolstat.study.points import names_of
 from tolstat.study.widths import HALF, Line
 
 FIRST, LEAST, MOST = 1024, 128, 16_384
@@ -84,12 +86,14 @@ def simulate(
 ) -> Outcome:
     """Simulate joints with other widths of each line, and keep their loads in the file.
 
+    Of several operating points those that `by` or a limit of the study is about.
+
     Parameters
     ----------
     path : Path
         Result file of a campaign whose joints are drawn from tolerances.
     by : str, optional
-        Load whose limit orders the lines; by default that with the limit exceeded most.
+        Load whose limit orders the lines; by default ``"all limits"`` together if there are several.
     each : {"entry", "feature", "error"}
         What a line is: an entry of ``[tolerances]``, a pin with its hole, or an error.
     groups : sequence of str
@@ -159,8 +163,10 @@ class _Run:
         self._store, self._view, self._lines, self._load = store, view, lines, load
         self._workers, self._tell, self._progress = workers, tell, progress
         self.limit, self._budget = _Time(budget), budget
-        self._seconds = sets.seconds_per_joint(view.study, sets.options_of(view.study, store), PILOT) / workers
-        self._held = what_if.read(store)
+        self._held, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
+        self._names = self._asked.names(view.study)
+        options = sets.options_of(view.study, store)
+        self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / workers
         self.each, self.simulated, self.settled = 0, 0, False
 
     def first(self) -> int:
@@ -181,13 +187,15 @@ class _Run:
         lacking = self._lacking(wanted)
         if lacking:
             cost = f"about {clock(self._seconds * lacking)} on {self._workers} processes"
-            self._tell(f"{len(self._lines)} lines, {n} joints of each change: {lacking} joints to simulate, {cost}")
+            where = f" at {', '.join(self._asked.points)}" if all(self._asked.points) else ""
+            lines = f"{len(self._lines)} lines, {n} joints of each change"
+            self._tell(f"{lines}: {lacking} joints to simulate{where}, {cost}")
             begin = self.limit.spent
             self._held = sets.simulate(
                 self._view.study,
                 self._store,
                 wanted,
-                self._view.kept_loads,
+                self._asked,
                 self._workers,
                 self.limit.over,
                 self._progress,
@@ -199,7 +207,7 @@ class _Run:
         self.each, self.settled = n, self._is_settled()
 
     def _lacking(self, wanted: Sequence[Wanted]) -> int:
-        return sum(len(sets.missing(self._held, one)) for one in wanted)
+        return sum(len(sets.missing(self._held, one, self._names)) for one in wanted)
 
     def _wanted(self, n: int, steps: Sequence[str]) -> list[Wanted]:
         """Sets of a look, what the order needs first."""
@@ -213,17 +221,26 @@ class _Run:
         return found + [Wanted(sets.exchanged(study, line), range(n // 2)) for line in apart]
 
     def _is_settled(self) -> bool:
-        values = query.halves(self._held, list(self._lines), self._load)
+        values = query.halves(self._held, list(self._lines), query.measure(self._view, self._load))
         if len(values) < len(self._lines):
             return False
         base = query.as_drawn(self._view, self._load, self._held)
         return query.is_settled(values, base, query.level_of(self._view.load(self._load)), 1.0 - 0.05 / LOOKS)
 
 
+def points_of(view: View, by: str) -> tuple[str, ...]:
+    """Operating points that a load, a limit or joints in the file are about; all of them if there is no limit."""
+    every = tuple(view.store.points)
+    asked = () if by == ALL_LIMITS else (by,)
+    names = [*asked, *(view.limits or ("",)), *(name for one in view.altered.values() for name in one.names)]
+    chosen = {point for name in names for point in names_of(split(name)[1], every, name)}
+    return tuple(point for point in every if point in chosen)
+
+
 def _checked(view: View, by: str | None) -> str:
     """Load that orders the lines; refuse a file that the code cannot continue."""
     query.check(view)
-    load = by or view.most_exceeded
+    load = by or view.decisive
     view.load(load)
     store = view.store
     if any(store.versions.get(name) != value for name, value in versions().items() if name in ("tolstat", "sources")):

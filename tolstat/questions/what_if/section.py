@@ -23,7 +23,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
     if not (view.sampled and view.limits and view.count(*VALID)) or view.weighted or not view.store.whole:
         return []
     with asked.noting("nothing on the lines of the drawing"):
-        found = query.what_if(view, view.most_exceeded)
+        found = query.what_if(view, view.decisive)
         blocks = _missing(asked) if found is None else _blocks(found, asked)
         return [Section("what-if", TITLE, blocks, lead=True)]
     return []
@@ -33,37 +33,37 @@ def _missing(asked: Asked) -> list[Block]:
     said = (
         "Not in the file yet. To simulate the same joints with each tolerance half as wide, exact, finer and coarser: "
     )
-    return [Text(f"{said}tolstat causes {asked.path.name} --run")]
+    again = f"then this page again: tolstat report {asked.path.name} --out PAGE.html"
+    return [Text(f"{said}tolstat causes {asked.path.name} --run; {again}")]
 
 
 def _blocks(found: query.WhatIf, asked: Asked) -> list[Block]:
-    best = rendering.sentence(found)
-    limit = text.limit({"load": found.load, "level": found.level, "unit": found.unit})
-    said = f"{limit} in {text.percent(found.share)} of the joints as drawn. "
-    said += f"{best}." if best else "No line that is made half as wide surely lowers it."
+    best = rendering.sentence(found, asked.accepted)
+    words = rendering.event(found)
+    said = text.sentence(f"{words} in {text.percent(found.share)} of the joints as drawn")
+    said += f" {best}." if best else " No line that is made half as wide surely lowers it."
     steps = [column for column in rendering.columns(found) if column.rank <= SHOWN]
     how = (
         "Each line is an entry of [tolerances]: made half as wide about the middle of its band, exact (in the middle "
         "of its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. The joints have the "
-        f"same seeds, {found.n} as drawn ({rendering.joints(found)}); whiskers and bands are 95 % intervals of the "
-        "change, joint by joint. "
+        f"same seeds, {found.n} as drawn ({rendering.joints(found)}); whiskers and bands are the 95 % intervals of "
+        "the table, without the numerical error. "
         f"{_rest(found)}"
     )
     blocks: list[Block] = [
         Text(said),
         Panels([rendering.tornado_panel(found, asked.accepted), rendering.curve_panel(found, asked.accepted)]),
-        as_block("Share of the joints above the limit, with one line changed", steps, rendering.rows(found)),
+        as_block(f"Share of the joints with {words}, with one line changed", steps, rendering.rows(found)),
     ]
     if not found.indices.empty:
-        title = "Part of each line in the scatter of the load, and in whether it is above the limit"
+        title = "Part of each line in the scatter of the load, and in whether it is above its limit"
         blocks.append(as_block(title, rendering.index_columns(found), found.indices))
     return [*blocks, Text(how.strip(), small=True)]
 
 
 def _rest(found: query.WhatIf) -> str:
     said = "" if found.settled else "The order of neighbouring lines is not settled. "
-    if found.missing:
-        said += f"Not in the file: {', '.join(found.missing)}. "
+    said += "".join(f"{text.sentence(one)} " for one in rendering.absent(found))
     if not found.indices.empty:
         said += (
             "Alone and in all: closed and total Sobol' index, from "

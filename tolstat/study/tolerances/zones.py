@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
@@ -83,7 +83,12 @@ class ZoneEntry(ToleranceEntry):
         ),
     ]
     over: Annotated[
-        PositiveLength, Field(description="length of the pin or hole that the drawing tolerances", examples=["22 mm"])
+        PositiveLength,
+        Field(
+            description="length over which the zone holds: of a pin or hole; of the common axis of a pair from face to "
+            "face, with the joint's centre in the middle, such as 2 (R + z/2) (coaxiality: of each pin or hole)",
+            examples=["22 mm"],
+        ),
     ]
     distribution: Annotated[
         Literal["normal", "uniform"],
@@ -324,6 +329,38 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
     if faults:
         raise InputError(list(dict.fromkeys(faults)))
     return found
+
+
+def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[str, str, str]]:
+    """Common axes that are toleranced over less than the distance of their two features.
+
+    Parameters
+    ----------
+    entries : sequence of Toleranced
+        All entries of a study.
+    length : float
+        Length of each pin and hole, m.
+
+    Yields
+    ------
+    tuple of str
+        Key, what is wrong with it, and the remedy.
+    """
+    for entry in entries:
+        for site, model in entry.models:
+            if not isinstance(model, PositionEntry | OrientationEntry) or site.name.partition(".")[0] not in PAIRS:
+                continue
+            apart = 2.0 * site.reach
+            if model.over < apart * (1.0 - 1e-9):
+                found = (
+                    f"{units.shown(model.over, 'm')} is shorter than the {units.shown(apart, 'm')} between the bearings"
+                )
+                remedy = (
+                    "for a common axis over is the length from face to face with the joint's centre in the middle, "
+                    f"here 2 (R + z/2) = {units.shown(apart + length, 'm')}"
+                )
+                yield f"tolerances.{entry.pattern}.over", found, remedy
+                break
 
 
 def _contradictions(direction: Any, position: PositionEntry, where: str) -> list[Fault]:

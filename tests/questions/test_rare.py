@@ -280,7 +280,7 @@ def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, 
 @pytest.mark.slow
 def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
     plan, found, path = whole
-    monkeypatch.setattr(provenance, "versions", lambda: dict.fromkeys(("tolstat", "sources"), "other"))
+    monkeypatch.setattr(provenance, "source_hash", lambda: "other")
     again = rare.run(plan, path, tell=lambda _: None)
     assert again.estimate == found.estimate
     done = CliRunner().invoke(app, ["rare", str(path)])

@@ -25,7 +25,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
 from tolstat.questions.rare import query as rare
 from tolstat.questions.rare import rendering
-from tolstat.store import Reader, ResultStore
+from tolstat.store import Reader, ResultStore, provenance
 from tolstat.store.recall import recall
 
 SEEDS = 500
@@ -280,7 +280,7 @@ def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, 
 @pytest.mark.slow
 def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
     plan, found, path = whole
-    monkeypatch.setattr(campaign, "versions", lambda: dict.fromkeys(("tolstat", "sources"), "other"))
+    monkeypatch.setattr(provenance, "source_hash", lambda: "other")
     again = rare.run(plan, path, tell=lambda _: None)
     assert again.estimate == found.estimate
     done = CliRunner().invoke(app, ["rare", str(path)])

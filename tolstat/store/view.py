@@ -295,10 +295,7 @@ class View:
     def check_sample(self, allow_weights: bool = True) -> None:
         """Refuse a file whose joints are no sample of a production, or (unless `allow_weights`) differ in weight.
 
-        Raises
-        ------
-        StoreError
-            The hint names what can be used.
+        Raises a StoreError, whose hint names what can be used.
         """
         check_equal_weights(self.store.sampling, self.path, allow_weights)
         if self.method in ("cases", "sweep"):
@@ -306,13 +303,7 @@ class View:
             raise StoreError(str(Fault(str(self.path), "holds joints that are no sample of a production", remedy)))
 
     def check_drawn(self) -> None:
-        """Refuse a file whose joints were not drawn from tolerances.
-
-        Raises
-        ------
-        StoreError
-            The hint names what can be used.
-        """
+        """Raise a StoreError for joints that were not drawn from tolerances."""
         if not self.study.tolerances:
             remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
             raise StoreError(str(Fault(str(self.path), "holds joints that are not drawn from tolerances", remedy)))

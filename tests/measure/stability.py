@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat import joint, sampling, study
-from tolstat.common.tables import RESULT, SIMULATED, Options, Status
+from tolstat.common.tables import RESULT, SIMULATED, Options, Status, iterations_allowed
 from tolstat.joint.contact import FROM_COEFFICIENTS
 from tolstat.kernel.integrators import first_order
 from tolstat.kernel.integrators.integrate import reset

@@ -136,14 +136,13 @@ def rare(
 
 def _read_study(source: Path, limit: str | None, point: str | None, given: dict[str, Any]) -> Study:
     from tolstat import study
+    from tolstat.common.loads import ANY_LIMIT
     from tolstat.questions.rare.query import parse_limit, subset_study
 
     faults: list[Fault] = []
     if limit is None:
         faults.append(Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"'))
     else:
-        from tolstat.common.loads import ANY_LIMIT
-
         if limit.split() != ANY_LIMIT.split():
             with gather(faults):
                 parse_limit(limit, {})

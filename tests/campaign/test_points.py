@@ -12,6 +12,7 @@ from tests.support import fakes
 from tolstat import study
 from tolstat.campaign import extend, replay
 from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import settings_in_use
 from tolstat.campaign.retry import Retry
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Status
@@ -121,6 +122,9 @@ def test_a_retry_simulates_the_points_that_failed(tmp_path, whole):
     with Reader.open(path) as store:
         assert {one.point: np.flatnonzero(one.attempt()).tolist() for one in store.each()} == failed
         assert len(store.retries) == 1
+        used = settings_in_use(fake(), store)  # the file holds names of methods, kernels take numbers
+        assert used[-1] == Options(steps_per_rev=30)
+        assert all(isinstance(own.method, int) for own in used)
     for name in ALPHAS:
         held, expected = (tables(file, f"/points/{name}") for file in (path, whole))
         assert all(held[key] == value for key, value in expected.items() if key.startswith(("results", "histories")))

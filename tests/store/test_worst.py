@@ -9,7 +9,6 @@ from tolstat.display.asked import Asked
 from tolstat.questions.causes.tail import worst_joints
 from tolstat.questions.exceedance import section as exceedance
 from tolstat.questions.exceedance.query import at_points, limits
-from tolstat.questions.fatigue.duty import revolutions_at
 from tolstat.report import verdict
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
@@ -146,7 +145,7 @@ def test_revolutions_follow_from_time_and_speed(view):
     points = view.store.points
     fast = points["two"].operation.model_copy(update={"speed": -3 * points["one"].operation.speed})
     points["two"] = points["two"]._replace(operation=fast)
-    assert revolutions_at(view) == pytest.approx([0.25, 0.75])
+    assert worst.shares_of_revolutions(view) == pytest.approx([0.25, 0.75])
 
 
 def test_one_point_alone_is_the_worst_of_itself(tables):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
 from tolstat.store.verification import Verification
@@ -155,3 +156,29 @@ def checks(parts: Sequence[Verification | None]) -> Verification | None:
             for name in names
         },
     )
+
+
+def shares_of_time(view: View) -> FloatArray:
+    """Share of the service time at each operating point of a view, (points,); their sum is 1.
+
+    Raises
+    ------
+    InputError
+        When the study does not give the shares of several points.
+    """
+    shares = np.array([view.store.points[name].share for name in view.points] if len(view.parts) > 1 else [1.0])
+    if np.isnan(shares).any():
+        remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
+        remedy += f"; or look at one point: --point {view.points[0]}"
+        raise InputError([Fault(str(view.path), "has operating points without a share of the time", remedy)])
+    return np.asarray(shares / shares.sum())
+
+
+def shares_of_revolutions(view: View) -> FloatArray:
+    """Share of the revolutions at each operating point: share of the time times speed, (points,); their sum is 1.
+
+    Raises `InputError` as `shares_of_time`.
+    """
+    speeds = np.array([abs(view.store.points[name].operation.speed) for name in view.points])
+    turns = shares_of_time(view) * speeds
+    return np.asarray(turns / turns.sum())

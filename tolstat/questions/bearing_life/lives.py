@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import LIFE_EXPONENT, PINS, VALID
 from tolstat.joint import Bearing, operating
+from tolstat.store import worst
 from tolstat.store.recorded import joint_of
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -132,7 +133,7 @@ def lives_of(view: View) -> Lives:
     if not keeps_loads(view):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise StoreError(str(Fault(str(view.path), "does not keep the equivalent loads of the bearings", remedy)))
-    duty = duty_of(view)
+    duty = worst.shares_of_time(view).tolist()
     samples = np.arange(view.n)
     operation = [
         operating(
@@ -161,22 +162,6 @@ def lives_of(view: View) -> Lives:
         weights=view.weights,
         iid=view.iid,
     )
-
-
-def duty_of(view: View) -> list[float]:
-    """Share of the service time at each operating point of a view; their sum is 1.
-
-    Raises
-    ------
-    InputError
-        When the study does not give the shares.
-    """
-    shares = [view.store.points[name].share for name in view.points] if len(view.parts) > 1 else [1.0]
-    if np.isnan(shares).any():
-        remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
-        remedy += f"; or look at one point: --point {view.points[0]}"
-        raise InputError([Fault(str(view.path), "has operating points without a share of the time", remedy)])
-    return [share / sum(shares) for share in shares]
 
 
 def _loads(results: NDArray[np.void]) -> FloatArray:

@@ -11,7 +11,8 @@ import pandas as pd
 
 from tolstat.common.tables import LIFE_EXPONENT, PINS, Mode
 from tolstat.display import text
-from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, duty_of, keeps_loads, lives_of
+from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, keeps_loads, lives_of
+from tolstat.store import worst
 from tolstat.store.error_budget import total_interval
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -133,11 +134,8 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
     """
     if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
         return pd.DataFrame()
-    times = duty_of(view)
-    turns = [share * abs(part.store.operation.speed) for share, part in zip(times, view.parts, strict=True)]
-    weights = [own / sum(turns) for own in turns] if any(turns) else times
     modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
-    spent = np.tensordot(weights, np.stack(modes), 1)
+    spent = np.tensordot(worst.shares_of_revolutions(view), np.stack(modes), 1)
     rows = []
     for place in (*PINS, ANY):
         own = spent[:, [PINS.index(place)]] if place in PINS else spent

@@ -60,24 +60,7 @@ def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[l
     if shares is not None:
         remedy = "leave --share out: the study gives share in [[operation]]"
         raise InputError([Fault(place, "has several operating points", remedy)])
-    return view.parts, revolutions_at(view)
-
-
-def revolutions_at(view: View) -> list[float]:
-    """Share of the revolutions at each operating point of a view: share of the time times speed, summing to 1.
-
-    Raises
-    ------
-    InputError
-        When the study does not give the shares of the time.
-    """
-    points = [view.store.points[name] for name in view.points]
-    turns = np.array([point.share * abs(point.operation.speed) for point in points])
-    if np.isnan(turns).any():
-        remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
-        remedy += f"; or look at one point: --point {view.points[0]}"
-        raise InputError([Fault(str(view.path), "has operating points without a share of the time", remedy)])
-    return [float(own) for own in turns / turns.sum()]
+    return view.parts, worst.shares_of_revolutions(view).tolist()
 
 
 def _check_same_joints(view: View, first: View) -> None:

@@ -24,6 +24,7 @@ FILE = files.data_dir() / "joints" / "cirelli2021.toml"
 GIVEN = leaves(tomllib.loads(FILE.read_text(encoding="utf-8")))
 UNITS = quantities(Joint)
 RECTANGLE = {"arm.width": "58 mm", "arm.depth": "21 mm"}
+ROUND = {"arm.d": "40 mm"}
 OWN = """
 [material]
 E = "210 GPa"
@@ -103,6 +104,52 @@ def test_values_by_hand(own: Joint) -> None:
     assert_allclose([k1p, k2p], [k1u / 6.9**2, k2u / 6.9])
 
 
+def with_round_arms(folder: Path, line: str = 'd = "30 mm"') -> Path:
+    path = folder / "round.toml"
+    path.write_text(OWN.replace('width = "40 mm"\ndepth = "14 mm"', line), encoding="utf-8")
+    return path
+
+
+def test_round_arms_by_hand(tmp_path: Path) -> None:
+    joint = joints.load(with_round_arms(tmp_path), {}, "case")
+    A, J = math.pi * 0.015**2, math.pi * 0.015**4 / 4
+    mass = 7850 * A * 0.025
+    across = mass * (0.015**2 / 4 + 0.025**2 / 12)
+    assert_allclose([joint.arm.A, joint.arm.Jx, joint.arm.Jy, joint.arm.Jp, joint.arm.mass], [A, J, J, 2 * J, mass])
+    assert_allclose(joint.arm.inertia, [across, across, mass * 0.015**2 / 2])
+    E, G = 210e9, 210e9 / 2.6
+    assert joint.arm.chi == 1.11
+    assert_allclose(joint.k_fork[:3], [*2 * [G * A / (1.11 * 0.025)], E * A / 0.025])
+    assert_allclose(joint.k_fork[3:], [E * J / 0.025, E * J / 0.025, G * 2 * J / 0.025])
+
+
+def test_an_override_makes_arms_round_or_rectangular(tmp_path: Path) -> None:
+    joint = overridden(arm__d="30 mm")
+    assert_allclose([joint.arm.chi, joint.arm.A], [1.11, math.pi * 0.015**2])
+    assert joint.warnings() == []
+    path = with_round_arms(tmp_path)
+    back = joints.load(path, nested(RECTANGLE), "case")
+    assert back.arm.d is None
+    assert_allclose([back.arm.chi, back.arm.A, back.k_fork[2]], [1.2, 0.058 * 0.021, 210e9 * 0.058 * 0.021 / 0.025])
+
+
+@pytest.mark.parametrize(
+    ("line", "place", "found", "remedy"),
+    [
+        ('d = "30 mm"\nwidth = "20 mm"', "arm.d", "a round section has no width", "remove d, or width"),
+        ("", "arm", "missing keys A, Jx, Jy", "give them, or d, or width and depth"),
+        ('width = "20 mm"', "arm", "missing keys A, Jx, Jy", "give them, or depth"),
+    ],
+)
+def test_arms_have_one_section(tmp_path: Path, line: str, place: str, found: str, remedy: str) -> None:
+    path = with_round_arms(tmp_path, line)
+    with pytest.raises(InputError) as caught:
+        joints.load(path, {}, "case")
+    (fault,) = caught.value.faults
+    assert re.sub(r"(?<=round\.toml):\d+", "", fault.place) == f"{path}: {place}"
+    assert (fault.found, fault.remedy) == (found, remedy)
+
+
 def test_crossed_cylinders_against_a_fine_grid() -> None:
     r, half, n = 0.01, 0.022, 121
     edges = np.linspace(-half, half, n + 1)
@@ -118,7 +165,7 @@ def test_the_formulas_give_the_default_joint() -> None:
     """Printed and assumed values of the paper's joint, but for the misprints, within some per cent."""
     joint = joints.load("cirelli2021", {}, "case")
     for key, rule in DERIVED.items():
-        given = key in GIVEN and all(get(joint, of) is not None for of in rule.follows)
+        given = key in GIVEN and rule.applies(joint)
         # the bearing's diameters are twice the pin's, k1p of Table 2 does not follow from H
         if given and key not in ("contact.D_H", "contact.D_P", "contact.k1p"):
             tolerance = 0.25 if key.startswith(("hub.inertia", "contact.k")) else 0.04 if key == "material.G" else 0.02
@@ -127,8 +174,9 @@ def test_the_formulas_give_the_default_joint() -> None:
 
 def test_sources_come_before_what_follows_from_them() -> None:
     known = {key for key in UNITS if key not in DERIVED} | set(BEARING)
+    assert known >= RECTANGLE.keys() | ROUND.keys()
     for key, rule in DERIVED.items():
-        assert set(rule.follows) <= known | {"arm.width", "arm.depth"}, key
+        assert set(rule.follows) <= known, key
         known.add(key)
     assert {key: rule.unit for key, rule in DERIVED.items() if key in UNITS} == {
         key: UNITS[key] for key in DERIVED if key in UNITS
@@ -140,7 +188,7 @@ def test_sources_come_before_what_follows_from_them() -> None:
 
 def scaled(key: str) -> object:
     """Value of a key of the default joint, a little larger, as a file writes it."""
-    joint = joints.load("cirelli2021", nested(RECTANGLE), "case")
+    joint = joints.load("cirelli2021", nested(ROUND if key in ROUND else RECTANGLE), "case")
     return units.Quantity(UNITS[key]).written(1.001 * get(joint, key))
 
 
@@ -150,8 +198,9 @@ PAIRS = [(of, key) for key, rule in DERIVED.items() for of in rule.follows if of
 @pytest.mark.parametrize(("of", "key"), PAIRS)
 def test_an_override_moves_what_follows_from_it(of: str, key: str) -> None:
     """Unless it stays with a warning, or is given, too."""
-    over = {of: scaled(of)} | (RECTANGLE if of.startswith("arm.") and key.startswith("arm.") else {})
-    if of in RECTANGLE:
+    section = ROUND if of in ROUND else RECTANGLE
+    over = {of: scaled(of)} | (section if of.startswith("arm.") and key.startswith("arm.") else {})
+    if of in section:
         over[of] = scaled(of)
     joint = joints.load("cirelli2021", nested(over), "case")
     if DERIVED[key].stays:

@@ -251,7 +251,7 @@ def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, 
 
 def test_reader_holds_the_shares_that_are_counted(view):
     curves = query.readings(view)
-    assert list(curves) == list(view.bushing_loads)
+    assert list(curves) == [*view.bushing_loads, "pin1.contact", "psi"]
     status = view.status
     for name, curve in curves.items():
         values = view.load(name).values
@@ -262,6 +262,20 @@ def test_reader_holds_the_shares_that_are_counted(view):
             assert curve["count"][i] == share.count
             assert curve["lower"][i] == pytest.approx(share.lower, rel=5e-3, abs=1e-12)
             assert curve["outer_upper"][i] == pytest.approx(share.outer_upper, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("limits", "name"), [({"pin1.contact": 605}, "pin1.contact"), ({"cross3.F": 1000}, "cross1.F")]
+)
+def test_reader_begins_with_the_limit_that_the_verdict_names(tmp_path, limits, name):
+    """Of a load that no table shows, or of the one limit that joints exceed."""
+    lines = "".join(f'"{load}" = "{limit} N"\n' for load, limit in ({"cross1.F": 700} | limits).items())
+    text = re.sub(r"(?<=\[limits\]\n)[^\[]*", f"{lines}\n", TEXT)
+    path = synthetic.store(tmp_path, text)
+    with Reader.open(path) as store:
+        assert verdict.headline(store.view(), 0.05).load == name
+    page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=0)
+    assert f"<option selected>{name}</option>" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_joints_without_a_load_are_named_with_what_to_do_and_compared_with_the_others(view):

@@ -22,8 +22,12 @@ WIDE = 0.05
 """Clearance, or difference of two diameters, relative to a diameter, that no bearing has by intention."""
 ISOTROPIC = 0.1
 """Difference between G and E/(2 (1 + nu)), relative to the latter, that no metal has."""
+PIN_CHI, ARM_CHI = 1.11, 1.2
+"""Shear factors of a circular and of a rectangular section, Cirelli et al. (2021), above Table 3."""
 BEARING = ("contact.D_H", "contact.D_P", "contact.clearance")
 """Keys any two of which define the third."""
+ROUND, RECTANGULAR = ("arm.d",), ("arm.width", "arm.depth")
+"""Keys of a round and of a rectangular section of the arms; a joint has one of the two, or neither."""
 
 
 class Rule(NamedTuple):
@@ -41,6 +45,8 @@ class Rule(NamedTuple):
         SI unit.
     stays : bool
         Whether the value of a joint file stays when a key that it follows from is overridden.
+    enough : tuple of tuple of str
+        Sets of keys of `follows`, of which one suffices for the formula; without any, all of `follows` are needed.
     """
 
     follows: tuple[str, ...]
@@ -48,6 +54,11 @@ class Rule(NamedTuple):
     value: Callable[[Any], Any]
     unit: str
     stays: bool = False
+    enough: tuple[tuple[str, ...], ...] = ()
+
+    def applies(self, joint: Any) -> bool:
+        """Whether a joint has the keys that the formula needs."""
+        return any(all(get(joint, of) is not None for of in keys) for keys in self.enough or (self.follows,))
 
 
 def _beam(body: str, l: str, bending: tuple[str, str]) -> dict[str, Rule]:  # noqa: E741
@@ -85,6 +96,21 @@ def _beam(body: str, l: str, bending: tuple[str, str]) -> dict[str, Rule]:  # no
             "k_tz": (("G", "Jp"), f"G Jp/{l}, eqs. (9)-(11)", "N*m/rad"),
         }.items()
     }
+
+
+def _section(name: str, unit: str, of_round: str, of_rectangular: str) -> Rule:
+    """Rule of a property of the arms' section, that of a circle or that of a rectangle: `A`, `Jx` or `Jy`."""
+    place = ("A", "Jx", "Jy").index(name)
+
+    def value(joint: Any) -> float:
+        arm = joint.arm
+        if arm.d is None:
+            return material.rectangle(arm.width, arm.depth)[place]
+        A, J = material.circle(arm.d)
+        return (A, J, J)[place]
+
+    formula = f"{of_rectangular}, of a round arm {of_round}"
+    return Rule((*ROUND, *RECTANGULAR), formula, value, unit, enough=(ROUND, RECTANGULAR))
 
 
 def _pin_diameter(joint: Any) -> float:
@@ -143,15 +169,16 @@ DERIVED: dict[str, Rule] = {
         lambda j: material.cylinder_inertia(j.pin.mass, j.pin.d, j.pin.l),
         "kg*m^2",
     ),
-    "arm.A": Rule(
-        ("arm.width", "arm.depth"), "width depth", lambda j: material.rectangle(j.arm.width, j.arm.depth)[0], "m^2"
+    "arm.chi": Rule(
+        (*ROUND, *RECTANGULAR),
+        f"{ARM_CHI}, of a round arm {PIN_CHI}",
+        lambda j: ARM_CHI if j.arm.d is None else PIN_CHI,
+        "1",
+        enough=((),),
     ),
-    "arm.Jx": Rule(
-        ("arm.width", "arm.depth"), "width depth^3/12", lambda j: material.rectangle(j.arm.width, j.arm.depth)[1], "m^4"
-    ),
-    "arm.Jy": Rule(
-        ("arm.width", "arm.depth"), "depth width^3/12", lambda j: material.rectangle(j.arm.width, j.arm.depth)[2], "m^4"
-    ),
+    "arm.A": _section("A", "m^2", "pi d^2/4", "width depth"),
+    "arm.Jx": _section("Jx", "m^4", "pi d^4/64", "width depth^3/12"),
+    "arm.Jy": _section("Jy", "m^4", "pi d^4/64", "depth width^3/12"),
     "arm.Jp": Rule(("arm.Jx", "arm.Jy"), "Jx + Jy", lambda j: j.arm.Jx + j.arm.Jy, "m^4"),
     "arm.mass": Rule(
         ("material.rho", "arm.A", "arm.l_f"), "rho A l_f", lambda j: j.material.rho * j.arm.A * j.arm.l_f, "kg"
@@ -215,7 +242,10 @@ def changed(given: Set[str], held: Collection[str]) -> set[str]:
 
 
 def replaced(given: Collection[str], held: Collection[str]) -> set[str]:
-    """Keys of a bearing among `held` that give way when other keys of it are `given`: two of the three define it."""
+    """Keys among `held` that give way to `given` ones of the same bearing or section.
+
+    Of a bearing two of three keys define it; the section of an arm is round or rectangular.
+    """
     new = set(given).intersection(BEARING)
     hole, pin, clearance = BEARING
     if len(new) > 1 or (new == {clearance} and "pin.d" in given):
@@ -228,7 +258,10 @@ def replaced(given: Collection[str], held: Collection[str]) -> set[str]:
         away = set() if hole in held else {clearance}
     else:
         away = set()
-    return (away - new).intersection(held)
+    for section, other in ((ROUND, RECTANGULAR), (RECTANGULAR, ROUND)):
+        if set(section).intersection(given):
+            away.update(other)
+    return (away - set(given)).intersection(held)
 
 
 UNITS = {key: rule.unit for key, rule in DERIVED.items()} | {"pin.d": "m"}
@@ -253,7 +286,7 @@ def completed(name: str, section: ModelT, others: Mapping[str, Any]) -> ModelT:
     joint = SimpleNamespace(**others, **{name: copy})
     for key, rule in DERIVED.items():
         path = key.split(".")
-        if path[0] == name and get(joint, key) is None and all(get(joint, of) is not None for of in rule.follows):
+        if path[0] == name and get(joint, key) is None and rule.applies(joint):
             for table in path[1:-1]:
                 own = get(joint, f"{name}.{table}")
                 copy.__dict__[table] = own.model_copy()

@@ -167,12 +167,17 @@ def _lacking(keys: list[str], section: BaseModel) -> tuple[str, str]:
         if section.D_H == section.D_P:
             return "eq. (3) has no value without clearance", "give a clearance above zero, or k1u and k2u"
     names = [key.rpartition(".")[2] for key in keys]
-    sources = dict.fromkeys(of for key in keys for of in DERIVED[key].follows if of not in keys)
-    left_out = [of.partition(".")[2] for of in sources if derived.get(section, of.partition(".")[2]) is None]
-    left_out = [name for name in left_out if name in type(section).model_fields]
+    ways = dict.fromkeys(way for key in keys for way in DERIVED[key].enough or (DERIVED[key].follows,))
+    begun = [way for way in ways if any(derived.get(section, of.partition(".")[2]) is not None for of in way)]
     them = "it" if len(names) == 1 else "them"
-    instead = f", or {' and '.join(left_out)}" if left_out else ""
+    instead = "".join(f", or {' and '.join(left)}" for way in begun or ways if (left := _left_out(way, keys, section)))
     return f"missing {'key' if len(names) == 1 else 'keys'} {', '.join(names)}", f"give {them}{instead}"
+
+
+def _left_out(way: tuple[str, ...], keys: list[str], section: BaseModel) -> list[str]:
+    """Names of the keys of `way`, without `keys`, that a section has but that are not given."""
+    names = [of.partition(".")[2] for of in way if of not in keys]
+    return [name for name in names if name in type(section).model_fields and derived.get(section, name) is None]
 
 
 def load(

@@ -10,11 +10,11 @@ from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
-from tolstat.joint.derived import DERIVED
+from tolstat.joint.derived import DERIVED, PIN_CHI
 
 Array = NDArray[np.float64]
 
@@ -57,8 +57,6 @@ ARM_INERTIA = ["1.40e-4 kg*m^2", "5.31e-5 kg*m^2", "1.11e-4 kg*m^2"]
 """Examples: those of the joint of Cirelli et al. (2021)."""
 FOLLOWS: Any = None
 """Default of a key that follows from others where it is left out."""
-PIN_CHI, ARM_CHI = 1.11, 1.2
-"""Shear factors of a circular and of a rectangular section, Cirelli et al. (2021), above Table 3."""
 
 
 def follows(key: str, meaning: str, *examples: Any) -> Any:
@@ -115,7 +113,7 @@ class Pin(Strict):
 class Arm(Strict):
     """Each of the four arms: a beam along the shaft, clamped at its fork, its mass lumped at the hole's centre.
 
-    A rectangular section needs only its `width` and `depth`; for another give `A`, `Jx` and `Jy`.
+    A rectangular section needs only its `width` and `depth`, a round one `d`; for another give `A`, `Jx` and `Jy`.
     """
 
     l_f: Annotated[Length, Field(description="length of the beam, from its fork to the hole's centre")]
@@ -125,13 +123,23 @@ class Arm(Strict):
     depth: Annotated[
         Length | None, Field(description="side of a rectangular section along e, the hole's axis", examples=["21 mm"])
     ] = None
-    chi: Annotated[Number, Field(description="shear factor of the section")] = ARM_CHI
+    d: Annotated[Diameter | None, Field(description="diameter of a round section", examples=["40 mm"])] = None
+    chi: Annotated[Number, follows("arm.chi", "shear factor of the section")] = FOLLOWS
     A: Annotated[Area, follows("arm.A", "area of the section")] = FOLLOWS
     Jx: Annotated[AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
     Jy: Annotated[AreaMoment, follows("arm.Jy", "area moment about y, the local e")] = FOLLOWS
     Jp: Annotated[AreaMoment, follows("arm.Jp", "polar moment of the section")] = FOLLOWS
     mass: Annotated[Mass, follows("arm.mass", "mass", "0.3516 kg")] = FOLLOWS
     inertia: Annotated[Triple, follows("arm.inertia", "moments of inertia about e, t, z", ARM_INERTIA)] = FOLLOWS
+
+    @field_validator("d")
+    @classmethod
+    def _one_section(cls, value: float | None, info: ValidationInfo) -> float | None:
+        """Refuse a diameter beside the sides of a rectangle."""
+        sides = [key for key in ("width", "depth") if info.data.get(key) is not None]
+        if value is not None and sides:
+            raise refuse(f"a round section has no {' and '.join(sides)}", f"remove d, or {' and '.join(sides)}")
+        return value
 
 
 class Hub(Strict):

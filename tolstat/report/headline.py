@@ -153,13 +153,14 @@ def _needed(row: Row, accepted: float) -> str:
 
 
 def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headline:
-    row, worst = _decisive(view, records), _worst(view, records)
+    row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
     several, most = len(records) > 1, text.percent(accepted)
     answers = [verdict(own, accepted) for own in records]
     answer = verdict(row, accepted)
     alone = several and answer == "none" and "no" in answers  # the joints above one limit are too many already
     if alone:
-        answer, row = "no", _worst(view, [own for own, said in zip(records, answers, strict=True) if said == "no"])
+        missed = [own for own, said in zip(records, answers, strict=True) if said == "no"]
+        answer, row = "no", exceedance.most_exceeded(view, missed)
         worst = row
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
@@ -214,22 +215,17 @@ def _limit(view: View, row: Row) -> str:
     return f"{said} (most often at {point_of(view, row['load'])})" if several else said
 
 
-def _worst(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
-    """Limit that the largest share of the joints exceeds; of equal shares that of a leading load."""
-    return max(records, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
-
-
 def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     notes: tuple[str, ...] = () if view.has_intervals else (without_interval(view.method),)
     if view.weighted:
-        row, worst = _decisive(view, records), _worst(view, records)
+        row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
         if np.isnan(row["estimate"]):
             known = [own for own in records if not np.isnan(own["estimate"])]
             if len(records) == 1 or not known or _undecided(known):
                 return Headline("none", WORDS["none"], _reason(view, [row]), notes)
             notes += (_untold(view, records),)
-            row = worst = _worst(view, known)
+            row = worst = exceedance.most_exceeded(view, known)
         if _undecided([row]):
             return Headline("none", WORDS["none"], _reason(view, [row]), notes)
         interval = "total interval" if _matter([row]) else f"total interval {text.span(*ends(row))}"
@@ -242,7 +238,7 @@ def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
     found = capabilities.together(capability.limits(view))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
-    return Headline("", found.value, found.words, notes, _worst(view, records)["load"])
+    return Headline("", found.value, found.words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
 def _undecided(records: list[dict[Any, Any]]) -> bool:

@@ -84,5 +84,5 @@ def _draw(ax: Axes, found: Pairs) -> None:
         ax.set_ylim(low, high)
     ax.axhline(found.limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
     ax.set_xlim(0.0, None)
-    ax.set(xlabel=f"share of the clearance used by {found.name}", ylabel=f"{found.load} [{unit_text(found.unit)}]")
+    ax.set(xlabel=f"share of the clearance used by\n{found.name}", ylabel=f"{found.load} [{unit_text(found.unit)}]")
     ax.legend(loc="upper left", ncols=3, columnspacing=1.2, handlelength=1.8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -10,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import ALL_LIMITS, load_of, split, unit_text
+from tolstat.common.loads import ALL_LIMITS, load_of, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
@@ -52,6 +53,11 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         `SampleLoad.supports`.
     """
     return pd.DataFrame([_above_limit(view, view.load(name), confidence) for name in view.limits])
+
+
+def most_exceeded(view: View, rows: Sequence[Mapping[Any, Any]]) -> Mapping[Any, Any]:
+    """Row of `limits` whose limit the largest share of the joints exceeds; of equal shares that of a leading load."""
+    return max(rows, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
 
 
 def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
@@ -174,15 +180,14 @@ def readings(view: View) -> dict[str, Any]:
     Returns
     -------
     dict
-        By load, and by load at the operating points that a limit names: ``unit``; ``n``, ``failed``, ``unsettled``;
+        By load, also those that only limits name: ``unit``; ``n``, ``failed``, ``unsettled``;
         ``start``, index of the level shown first (nearest to the limit or, without one, to the 90 % quantile); lists of
         equal length ``x``, ``count``, ``share`` and, for independent samples, ``lower``, ``upper``, ``outer_lower``,
         ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``.
     """
     found = {}
     ends = ("lower", "upper", "outer_lower", "outer_upper") if view.has_intervals else ("bound_lower", "bound_upper")
-    named = [name for name in view.limits if split(name)[1]]
-    for load in view.loads([*view.shown_loads, *named]):
+    for load in view.loads(list(dict.fromkeys((*view.shown_loads, *view.limits)))):
         if not load.valid.size:
             continue
         x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)

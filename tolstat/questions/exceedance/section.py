@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
@@ -32,12 +33,20 @@ def sections(view: View, asked: Asked) -> list[Section]:
         return []
     blocks: list[Block] = [Panels([_leading_panel(view, name) for name in view.leading])] if view.leading else []
     blocks.append(Text(_note(view), small=True))
-    blocks.append(Reader(query.readings(view), view.most_exceeded))
+    limits = query.limits(view)
+    blocks.append(Reader(query.readings(view), _read_first(view, limits)))
     blocks.append(_quantiles(view))
     if view.limits and view.sampled and view.numerical_error:
         title = "What makes the shares above limits uncertain, in per cent of the joints"
-        blocks.append(as_block(title, rendering.BUDGET, query.limits(view)))
+        blocks.append(as_block(title, rendering.BUDGET, limits))
     return [Section("exceedance", "Which load is exceeded by which share", blocks)]
+
+
+def _read_first(view: View, limits: pd.DataFrame) -> str:
+    """Load that the reader begins with: that of the limit which the verdict names; without limits a leading load."""
+    if limits.empty:
+        return view.most_exceeded
+    return str(query.most_exceeded(view, limits.to_dict("records"))["load"])
 
 
 def _note(view: View) -> str:

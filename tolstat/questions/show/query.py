@@ -33,7 +33,8 @@ def dimensions(joint: Joint, alpha: float) -> Dimensions:
     R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
     along = np.array([-l_f if FRAME[body] == FRAME_I else l_f for body in range(ARM, ARM + 4)])
     markers = np.concatenate([r_b * e[:4], R * e[4:] + along[:, None] * z[4:]])
-    width, thickness = (float(np.sqrt(12.0 * J / joint.arm.A)) for J in (joint.arm.Jy, joint.arm.Jx))
+    d = joint.arm.d
+    width, thickness = (d or float(np.sqrt(12.0 * J / joint.arm.A)) for J in (joint.arm.Jy, joint.arm.Jx))
     return Dimensions(
         R=R,
         r_b=r_b,

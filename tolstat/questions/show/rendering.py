@@ -85,6 +85,7 @@ def lengths(joint: Joint, alpha: float) -> pd.DataFrame:
         ("pin.l", joint.pin.l, "length of a pin's beam"),
         ("arm.width", joint.arm.width or 0.0, "side of an arm's section along t"),
         ("arm.depth", joint.arm.depth or 0.0, "side of an arm's section along e"),
+        ("arm.d", joint.arm.d or 0.0, "diameter of a round arm"),
     ]
     found = [(name, 1e3 * x, "mm", said) for name, x, said in rows if x or not name.startswith("arm.")]
     found.append(("operation.alpha", float(np.degrees(alpha)), "deg", "misalignment of the shafts"))

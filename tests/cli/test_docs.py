@@ -65,7 +65,9 @@ def test_an_installed_package_finds_the_clone_around_the_current_folder(
     monkeypatch.chdir("/")
     done = CliRunner().invoke(cli.app, ["docs"])
     assert done.exit_code == 0
-    titles = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    lines = done.stdout.splitlines()
+    assert max(map(len, lines)) <= 80
+    titles = dict(line.split(maxsplit=1) for line in lines if not line.startswith(" "))
     assert {"study", "tolerances", "causes", "time-above"} <= titles.keys()
     assert titles["tutorial"] == "Your own joint"
     assert "next: tolstat docs study" in done.stderr

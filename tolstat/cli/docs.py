@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import sys
+import textwrap
 import webbrowser
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tolstat.cli._talk import say
+from tolstat.cli._talk import WIDTH, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import docs_dir
 
@@ -103,12 +104,15 @@ def _plain(text: str) -> str:
 
 
 def _titled() -> str:
-    """Names of the pages, and their titles."""
+    """Names of the pages, and their titles, on lines that a terminal shows whole."""
     found = {}
     for name, file in pages().items():
         found[name] = next(line for line in _plain(file.read_text(encoding="utf-8")).splitlines() if line[:2] == "# ")
     width = max(map(len, found))
-    return "\n".join(f"{name:{width}}  {title[2:]}" for name, title in found.items())
+    return "\n".join(
+        textwrap.fill(title[2:], WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=" " * (width + 2))
+        for name, title in found.items()
+    )
 
 
 def find_clone(folders: list[Path]) -> Path | None:

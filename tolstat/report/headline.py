@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,15 +152,15 @@ def _needed(row: Row, accepted: float) -> str:
     return text.number(joints) if joints < 1e7 else "more than 1e7"
 
 
-def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headline:
+def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
     row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
     several, most = len(records) > 1, text.percent(accepted)
     answers = [verdict(own, accepted) for own in records]
     answer = verdict(row, accepted)
     alone = several and answer == "none" and "no" in answers  # the joints above one limit are too many already
     if alone:
-        missed = [own for own, said in zip(records, answers, strict=True) if said == "no"]
-        answer, row = "no", exceedance.most_exceeded(view, missed)
+        broken = [own for own, said in zip(records, answers, strict=True) if said == "no"]
+        answer, row = "no", exceedance.most_exceeded(view, broken)
         worst = row
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
@@ -193,12 +193,12 @@ def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headl
     return Headline(answer, WORDS[answer], said, notes, worst["load"])
 
 
-def _decisive(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
+def _decisive(view: View, records: Sequence[Row]) -> Row:
     """Row on which the verdict is: that of the joints above at least one limit, or of the only limit."""
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
 
 
-def _untold(view: View, records: list[dict[Any, Any]]) -> str:
+def _untold(view: View, records: Sequence[Row]) -> str:
     """Why the verdict is on one of several limits."""
     return f"No share of the joints that exceed at least one limit: {_reason(view, [_decisive(view, records)])}"
 
@@ -215,7 +215,7 @@ def _limit(view: View, row: Row) -> str:
     return f"{said} (most often at {point_of(view, row['load'])})" if several else said
 
 
-def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
+def _yield(view: View, records: Sequence[Row]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     notes: tuple[str, ...] = () if view.has_intervals else (without_interval(view.method),)
     if view.weighted:
@@ -241,11 +241,11 @@ def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
     return Headline("", found.value, found.words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
-def _undecided(records: list[dict[Any, Any]]) -> bool:
+def _undecided(records: Sequence[Row]) -> bool:
     return max(high - low for low, high in map(ends, records)) >= capabilities.WIDEST
 
 
-def _reason(view: View, records: list[dict[Any, Any]]) -> str:
+def _reason(view: View, records: Sequence[Row]) -> str:
     """Why there is no verdict on some limits."""
     lost = max(row["n_failed"] + row["n_unsettled"] for row in records)
     n = max(row["n"] for row in records)
@@ -261,7 +261,7 @@ def _reason(view: View, records: list[dict[Any, Any]]) -> str:
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 
 
-def _matter(records: list[dict[Any, Any]] | list[Row]) -> bool:
+def _matter(records: Sequence[Row] | list[Row]) -> bool:
     return any(
         shares.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]) for row in records
     )

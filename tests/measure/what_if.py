@@ -1,9 +1,9 @@
 """Fresh joints against the tornado: ``python -m tests.measure.what_if FILE JOINTS COUNTS``.
 
 FILE is a campaign whose joints with one line changed are simulated (``tolstat causes FILE --run``). For each line and
-each change of it, JOINTS joints are drawn with another seed and simulated. A value of FILE misses if the interval of its
-difference from these excludes zero, recovered from the intervals of both (Zou and Donner 2008). COUNTS, a JSON file,
-keeps the counts after each batch of all changes; the same command goes on, also with more JOINTS.
+each change of it, JOINTS joints are drawn with another seed and simulated. A value of FILE misses if the interval of
+its difference from these excludes zero, recovered from the intervals of both (Zou and Donner 2008). COUNTS, a JSON
+file, keeps the counts after each batch of all changes; the same command goes on, also with more JOINTS.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def count(path: Path, joints: int, kept: Path) -> dict[str, list[int]]:
             ]
             for job, counts in zip(jobs, pool.map(partial(simulate, path), jobs), strict=True):
                 old = found[f"{job.line}|{job.step}"]
-                found[f"{job.line}|{job.step}"] = (np.array(old) + [*counts, len(job.numbers)]).tolist()
+                found[f"{job.line}|{job.step}"] = (np.array(old) + np.array([*counts, len(job.numbers)])).tolist()
             kept.write_text(json.dumps(found))
             print(f"{end} joints of each of {len(changes)} changes", file=sys.stderr, flush=True)
     return found
@@ -112,10 +112,10 @@ def compare(path: Path, found: dict[str, list[int]]) -> None:
                 own = f"{100 * row['share']:.1f} ({100 * row['share_lower']:.1f} .. {100 * row['share_upper']:.1f})"
                 line = f"| `{row['line']}` | {row['words']} | {row['n']} | {own} | {n} | {100 * share:.2f} |"
                 print(f"{line} {'misses' if missed else ''} |")
-    allowed = int(scipy.stats.binom.ppf(0.999, values, 0.05))
-    print(f"\n{values} values for each load; 99.9 % of binomial counts with 5 % misses are at most {allowed}")
-    for name, missed in misses.items():
-        print(f"{name}: {missed} {'miss' if missed != 1 else 'misses'}")
+    one, every = (int(scipy.stats.binom.ppf(0.999, n, 0.05)) for n in (values, values * len(names)))
+    print(f"\nvalues that miss, of {values} for each load; 99.9 % of binomial counts with 5 % are at most {one}:")
+    print(", ".join(f"{name} {missed}" for name, missed in misses.items()))
+    print(f"together {sum(misses.values())} of {values * len(names)}, {every} if they were independent")
 
 
 def main() -> None:

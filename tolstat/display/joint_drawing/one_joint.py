@@ -14,11 +14,11 @@ from tolstat.display.joint_drawing.geometry import ALONG_T, ALONG_Z, KINDS, Arra
 HEADS = (("e", "µm"), ("t", "µm"), ("z", "µm"), ("tilt t", "deg"), ("tilt z", "deg"), ("⌀", "µm"))
 """Heads of the columns of numbers: names of `KINDS`, and units."""
 WAYS = {"along_z": ALONG_Z, "along_t": ALONG_T}
-HEAD, FOOT, VIEW = 0.12, 0.1, 0.225
+HEAD, FOOT, VIEW = 0.12, 0.1, 0.215
 """Shares of the drawing: height of head and foot, width of a view."""
-PLACES = (0.0, 0.235, 0.375, 0.515, 0.68, 0.845, 1.0)
+PLACES = (0.0, 0.24, 0.37, 0.5, 0.675, 0.85, 1.0)
 """Places of names and numbers, relative to the width left for them."""
-SIZE = 7.2
+SIZE = 6.8
 
 
 def enlargement(pairs: Sequence[Pair], pin: float, z: float) -> float:
@@ -128,7 +128,7 @@ def _numbers(ax: Axes, pair: Pair) -> None:
 
 def _written(kind: str, value: float) -> str:
     if kind.startswith("tilt"):
-        number = f"{np.degrees(value):.3f}"
+        number = f"{np.degrees(value):.4f}"
     else:
         number = f"{1e6 * value:.{0 if abs(value) >= 1e-4 else 1}f}"
     return number.replace("-", "−") if float(number) else "0"

@@ -49,9 +49,9 @@ def _blocks(found: Pairs) -> list[Block]:
     table = Table("The best combinations", head, rows, frozenset({0, 1}))
     how = (
         "Chosen, and in the order of the table, on the joints with an even number; picture and correlations are of the "
-        "others. Errors are those of a hole less those of its pin; a tilt counts by what it takes at the ends of the pin. Offsets along z: what is "
-        "left of the four after the cross has moved and turned, the middle of pins 1 and 2 against that of pins 3 and "
-        "4."
+        "others. Errors are those of a hole less those of its pin; a tilt counts by what it takes at the ends of the "
+        "pin. Offsets along z: what is left of the four after the cross has moved and turned, the middle of pins 1 and "
+        "2 against that of pins 3 and 4."
     )
     return [Text(said), Panels([_panel(found)]), table, Text(how, small=True)]
 

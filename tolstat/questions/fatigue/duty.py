@@ -46,7 +46,7 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
 
 
 def described(views: Sequence[View], shares: Sequence[float]) -> tuple[tuple[str, float], ...]:
-    """Name and share of the revolutions of each of the `members`: its operating point, or its file if it has no name."""
+    """Name and share of the revolutions of each of the `members`: its operating point or, without a name, its file."""
     return tuple((view.points[0] or view.path.name, share) for view, share in zip(views, shares, strict=True))
 
 

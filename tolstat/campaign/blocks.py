@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign import executors
 from tolstat.campaign.executors import Lost
+from tolstat.common.solver_options import from_names
 from tolstat.common.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
 from tolstat.store import Reader
 from tolstat.store.provenance import versions
@@ -227,7 +228,7 @@ def _blocks(
 ) -> Iterator[Block]:
     """Yield the pending file slots below `stop_slot` as blocks whose joints have the same solver options."""
     variant_options = [settings(solver, store.fidelity) for solver in study.solvers]
-    retry_options = [Options(**retry["options"]) for retry in store.retries]
+    retry_options = [from_names(retry["options"]) for retry in store.retries]
     distinct = list(dict.fromkeys(variant_options + retry_options))
     for slots in pending(store, stop_slot):
         read = slice(slots[0], slots[-1] + 1)

@@ -18,7 +18,7 @@ from tolstat.common.errors import Fault, InputError
 if TYPE_CHECKING:
     from tolstat.campaign.progress import Display
 
-LOG = logging.getLogger("tolstat.cli")
+LOG = logging.getLogger("tolstat")
 LOG.propagate = False
 
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print warnings and errors only on standard error.")]

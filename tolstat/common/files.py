@@ -1,15 +1,22 @@
-"""Directory of the package's data, and atomic writing of files."""
+"""Directory of the package's data, reading of input files, and atomic writing of files."""
 
 from __future__ import annotations
 
 import errno
 import os
 import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from tolstat.common.errors import Fault, InputError
+
+MAX_INPUT_BYTES = 64_000_000
+"""Largest size of a text file that is read, bytes."""
+_ONLY_BELOW: ContextVar[Path | None] = ContextVar("only_below", default=None)
+"""Folder that input files must be in, if they are named by a file that is not trusted."""
 
 
 def data_dir() -> Path:
@@ -17,6 +24,43 @@ def data_dir() -> Path:
     package = Path(__file__).parent.parent
     inside = package / "data"
     return inside if inside.is_dir() else package.parent / "data"
+
+
+@contextmanager
+def only_below(folder: Path) -> Iterator[None]:
+    """Let `read_input` read files in `folder` and in the package's data only: a result file may come from anybody."""
+    token = _ONLY_BELOW.set(folder.resolve())
+    try:
+        yield
+    finally:
+        _ONLY_BELOW.reset(token)
+
+
+def read_input(path: Path, encoding: str = "utf-8") -> str:
+    """Read a text file that a user names.
+
+    Raises
+    ------
+    OSError
+        When it is missing, not permitted, not a regular file (a pipe would wait for ever, a device may have no end),
+        larger than `MAX_INPUT_BYTES`, or outside the folder of `only_below`.
+    UnicodeDecodeError
+        When it is not text.
+    """
+    allowed = _ONLY_BELOW.get()
+    if allowed is not None and not any(path.resolve().is_relative_to(top) for top in (allowed, data_dir().resolve())):
+        raise PermissionError(errno.EPERM, "a result file may name files in its own folder only", str(path))
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    with open(handle, "rb") as file:
+        held = os.fstat(handle)
+        if stat.S_ISDIR(held.st_mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not stat.S_ISREG(held.st_mode):
+            raise OSError(errno.EINVAL, "is a pipe or a device, not a file", str(path))
+        content = file.read(MAX_INPUT_BYTES + 1)
+    if len(content) > MAX_INPUT_BYTES:
+        raise OSError(errno.EFBIG, f"is larger than {MAX_INPUT_BYTES / 1e6:g} MB", str(path))
+    return content.decode(encoding)
 
 
 def check_target(path: Path, *inputs: Path) -> None:

@@ -331,6 +331,7 @@ DESIGN_FIELDS = (
 LEDGER_FIELDS = (
     Field("attempt", "1", "what gave the results: 0 the study's settings, k those of entry k - 1 of `retries`", "i4"),
     Field("errors_check", "1", "checksum of the joint's row, errors and design", "u8"),
+    Field("attempt_check", "1", "checksum of `errors_check` and `attempt`: also pending joints have it", "u8"),
     Field("results_check", "1", "checksum of `errors_check`, `attempt` and the joint's results, status included", "u8"),
 )
 """Origin of each joint's results, and checksums of its rows."""

@@ -16,7 +16,7 @@ from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Options
 from tolstat.store import meanings
-from tolstat.store.integrity import errors_hash, seal
+from tolstat.store.integrity import attempt_hash, errors_hash, seal
 from tolstat.store.meanings import Meanings
 from tolstat.store.provenance import git_commit, versions
 from tolstat.store.result_file import BLOCK, FILETYPE, check_column, descriptions, link_rows, put_attributes
@@ -184,7 +184,9 @@ def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -
             for c in columns:
                 c.of(table)[:] = file[group][c.name][here]
             described.append((columns, table))
-        file["ledger/errors_check"][here] = errors_hash(rows.start + first, block, described)
+        checks = errors_hash(rows.start + first, block, described)
+        file["ledger/errors_check"][here] = checks
+        file["ledger/attempt_check"][here] = attempt_hash(checks, np.zeros(len(block), np.int32))
         yield block
         first = here.stop
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import logging
+import time
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -13,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
-from tolstat.common.errors import StoreError
+from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import limits_in_words
 from tolstat.common.shown import table
 from tolstat.common.tables import Status, Variant
-from tolstat.store import checks, integrity
+from tolstat.store import checks, integrity, metadata
 from tolstat.store.checked_tables import CheckedTables
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
@@ -29,6 +30,13 @@ from tolstat.store.view import View
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
+
+ONE_EACH = ("random", "sobol", "lhs", "importance", "subset")
+"""Sampling methods whose number of joints is ``sampling.n``."""
+
+MAX_TOLD = 5
+"""Most damaged rows that a warning lists."""
+LOG = logging.getLogger("tolstat.store")
 
 
 class Session(NamedTuple):
@@ -122,24 +130,30 @@ class Reader(CheckedTables):
         self._read_study_attributes()
         self.created = text(attrs, "created")
         self.git_commit = text(attrs, "git_commit")
-        self.identity = checks.mapping(file, "identity")
+        self.identity = metadata.read(file, "identity")
         self.columns = selected_results.columns(self.identity)
-        self.options = checks.mapping(file, "options")
-        self.sampling = checks.mapping(file, "sampling")
-        self.fidelity = checks.mapping(file, "fidelity") if "fidelity" in attrs else {}
-        self.versions: dict[str, str] = checks.mapping(file, "versions")
-        self.retries: list[dict[str, Any]] = json.loads(text(attrs, "retries"))
-        self.stop: dict[str, Any] = checks.mapping(file, "stop") if "stop" in attrs else {}
-        design = checks.mapping(file, "design")
+        self.options = metadata.read(file, "options")
+        self.sampling = metadata.read(file, "sampling")
+        self.fidelity = metadata.read(file, "fidelity", {})
+        self.versions: dict[str, str] = metadata.read(file, "versions")
+        self.retries: list[dict[str, Any]] = metadata.read(file, "retries")
+        self.stop: dict[str, Any] = metadata.read(file, "stop", {})
+        design = metadata.read(file, "design")
         self.case_names: tuple[str, ...] = tuple(design["cases"])
         self.variants = tuple(Variant(**variant) for variant in design["variants"])
         self.history_specs = checks.history_specs(file)
         self.n = checks.check_tables(file)
+        self._left_out = np.zeros(self.n, bool)
         first = checks.integer(file, "first_row", 0)
         self.rows = range(first, first + self.n)
         self.campaign_rows = checks.integer(file, "campaign_rows", self.n)
         if self.rows.stop > self.campaign_rows:
             raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
+        if (
+            self.sampling["method"] in ONE_EACH
+            and self.sampling["n"] + self.sampling["nominal_first"] != self.campaign_rows
+        ):
+            raise ValueError(f"sampling.n is {self.sampling['n']} in a campaign of {self.campaign_rows} rows")
         checks.check_histories(file, self.history_specs, self.n)
         self._parts = HistoryParts(parts_folder(path), self.n, self.history_specs, campaign_digest(file))
 
@@ -171,8 +185,19 @@ class Reader(CheckedTables):
         self.close()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; joints that were left out because their results are damaged are told as a warning."""
+        if self._file and self._file.mode == "r":
+            self._tell_damage("are left out", f"simulate these joints again: tolstat run STUDY --out {self.path}")
         self._file.close()
+
+    def _tell_damage(self, done: str, remedy: str) -> None:
+        slots = np.flatnonzero(self._left_out)
+        if slots.size:
+            joints = "1 joint" if slots.size == 1 else f"{slots.size} joints"
+            rows = ", ".join(map(str, self.row(slots[:MAX_TOLD]).tolist())) + ", ..." * (slots.size > MAX_TOLD)
+            found = f"the results of {joints} are damaged and {done}: row {rows}"
+            LOG.warning("warning: %s", Fault(str(self.path), found, remedy))
+            self._left_out[:] = False
 
     def view(self, study_path: Path | None = None) -> View:
         """View of the file that questions read, while the file is open.
@@ -218,8 +243,9 @@ class Reader(CheckedTables):
         """Return the run under way; None if no process is writing the file."""
         if "session" not in self._file or not is_locked(self.path):
             return None
-        started, done = (self._file["session"][name][()] for name in ("started", "done"))
-        return Session(float(started), int(done)) if started > 0 else None
+        started, done = (float(self._file["session"][name][()]) for name in ("started", "done"))
+        # beyond these bounds the record is damaged: a rate would mean nothing
+        return Session(started, int(done)) if 0 < started <= time.time() and 0 <= done <= self.n else None
 
     def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Read the histories of one kind.
@@ -304,8 +330,8 @@ class Reader(CheckedTables):
         attrs = self._file.attrs
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
-        self.limits: dict[str, float] = json.loads(text(attrs, "limits"))
-        self.joint = checks.mapping(self._file, "joint")
+        self.limits: dict[str, float] = metadata.read(self._file, "limits")
+        self.joint = metadata.read(self._file, "joint")
 
     def _reopen(self) -> bool:
         """Switch to the file that has replaced this one and includes the histories; return whether there is one."""

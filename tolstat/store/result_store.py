@@ -23,7 +23,7 @@ from tolstat.common import selected_results
 from tolstat.common.files import atomic_write, check_disk_space, make_parent
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store.histories import HISTORY_BYTES
-from tolstat.store.integrity import history_checks, results_hash
+from tolstat.store.integrity import attempt_hash, history_checks, results_hash
 from tolstat.store.new_file import attributes, fill, size_of_new, study_attributes
 from tolstat.store.reader import Reader, parts_folder
 from tolstat.store.result_file import copy_open, get, is_at, put, put_attributes, replace, store_error, text
@@ -119,7 +119,10 @@ class ResultStore(Reader):
             process.
         """
         store = cls._opened(Path(path), "r+")
-        store._make_pending(store.damaged())
+        damaged = store.damaged()
+        store._left_out[damaged] = True
+        store._tell_damage("pending again", "run its study to simulate these joints: tolstat run STUDY")
+        store._make_pending(damaged)
         store._reset_rows_without_histories()
         return store
 
@@ -235,7 +238,9 @@ class ResultStore(Reader):
 
         def change(file: h5py.File) -> None:
             put_attributes(file, {"retries": json.dumps(retries, allow_nan=False)})
-            put(file["ledger/attempt"], rows, np.full(rows.size, len(retries), np.int32))
+            attempt = np.full(rows.size, len(retries), np.int32)
+            put(file["ledger/attempt"], rows, attempt)
+            put(file["ledger/attempt_check"], rows, attempt_hash(get(file["ledger/errors_check"], rows), attempt))
             put(file["results/status"], rows, np.full(rows.size, Status.PENDING, np.uint8))
             if "histories" in file:
                 del file["histories"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from io import StringIO
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,6 +16,7 @@ from pydantic import Field
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import read_input
 from tolstat.common.strict import refuse
 from tolstat.study.axes import ORIENTATIONS, columns_of
 from tolstat.study.tolerances import distributions as tolerance
@@ -238,13 +240,14 @@ class MeasuredEntry(SingleEntry):
 
     def _column(self, path: Path) -> list[float]:
         try:
-            with path.open(encoding="utf-8-sig", newline="") as file:
-                rows = csv.DictReader(line for line in file if line.strip() and not line.startswith("#"))
-                cells = [row.get(self.column) for row in rows]
-                columns = rows.fieldnames or ()
+            lines = StringIO(read_input(path, "utf-8-sig"), newline="")
+            rows = csv.DictReader(line for line in lines if line.strip() and not line.startswith("#"))
+            cells = [row.get(self.column) for row in rows]
+            columns = rows.fieldnames or ()
         except (OSError, UnicodeDecodeError, csv.Error) as error:
+            reason = getattr(error, "strerror", None) or str(error)
             raise refuse(
-                f"{path} cannot be read: {error}", "give a CSV file; its path starts from the study's folder"
+                f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"
             ) from error
         if self.column not in columns:
             raise refuse(f"{path} has no column {self.column!r}", strict.did_you_mean(self.column, list(columns)))

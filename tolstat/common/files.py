@@ -36,6 +36,11 @@ def only_below(folder: Path) -> Iterator[None]:
         _ONLY_BELOW.reset(token)
 
 
+def may_quote() -> bool:
+    """Whether messages may quote contents of files that `read_input` has read: not inside `only_below`."""
+    return _ONLY_BELOW.get() is None
+
+
 def read_input(path: Path, encoding: str = "utf-8") -> str:
     """Read a text file that a user names.
 

@@ -8,12 +8,13 @@ functions of HDF5 are called directly: a file has some 200 datasets, and h5py's 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TypeAlias
 
 import h5py
 import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5l, h5o, h5t, h5z
 
-ObjectID = h5d.DatasetID | h5g.GroupID
+ObjectID: TypeAlias = h5d.DatasetID | h5g.GroupID
 
 FILTERS = [h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE]
 """Filters of histories, in their order; other datasets have none."""

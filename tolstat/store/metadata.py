@@ -44,18 +44,18 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 LoadName = Annotated[str, AfterValidator(_load)]
 Steps = Annotated[int, Field(ge=12, le=max(20_000, 2 * FINEST_STEPS))]
 
-SolverOptions: Any = create_model(
-    "SolverOptions",
-    __base__=_File,
-    **{
-        name: (Literal[tuple(code.name.lower() for code in CODES[name])], ...)
-        if name in CODES
-        else (Annotated[(Solver.model_fields[name].annotation, *Solver.model_fields[name].metadata)], ...)
-        if name in Solver.model_fields
-        else (Annotated[float, Field(ge=0, lt=1)], ...)
-        for name in Options._fields
-    },
-)
+
+def _option(name: str) -> Any:
+    if name in CODES:
+        return Literal[tuple(code.name.lower() for code in CODES[name])]
+    if name in Solver.model_fields:
+        known = Solver.model_fields[name]
+        return Annotated[(known.annotation, *known.metadata)]
+    return Annotated[float, Field(ge=0, lt=1)]  # rtol, atol
+
+
+_OPTIONS: dict[str, Any] = {name: (_option(name), ...) for name in Options._fields}
+SolverOptions: Any = create_model("SolverOptions", __base__=_File, **_OPTIONS)
 """Options of the solver, with the bounds of a study's ``[solver]``."""
 
 
@@ -111,7 +111,8 @@ class VariantRecord(_File):
     """A joint that the study lists."""
 
     family: str
-    values: dict[str, Any]
+    values: dict[str, str | float | bool | list[float]]
+    note: str
 
 
 class DesignRecord(_File):

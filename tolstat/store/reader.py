@@ -130,11 +130,11 @@ class Reader(CheckedTables):
         self._read_study_attributes()
         self.created = text(attrs, "created")
         self.git_commit = text(attrs, "git_commit")
-        self.identity = metadata.read(file, "identity")
+        self.identity: dict[str, Any] = metadata.read(file, "identity")
         self.columns = selected_results.columns(self.identity)
-        self.options = metadata.read(file, "options")
-        self.sampling = metadata.read(file, "sampling")
-        self.fidelity = metadata.read(file, "fidelity", {})
+        self.options: dict[str, Any] = metadata.read(file, "options")
+        self.sampling: dict[str, Any] = metadata.read(file, "sampling")
+        self.fidelity: dict[str, Any] = metadata.read(file, "fidelity", {})
         self.versions: dict[str, str] = metadata.read(file, "versions")
         self.retries: list[dict[str, Any]] = metadata.read(file, "retries")
         self.stop: dict[str, Any] = metadata.read(file, "stop", {})
@@ -331,7 +331,7 @@ class Reader(CheckedTables):
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
         self.limits: dict[str, float] = metadata.read(self._file, "limits")
-        self.joint = metadata.read(self._file, "joint")
+        self.joint: dict[str, Any] = metadata.read(self._file, "joint")
 
     def _reopen(self) -> bool:
         """Switch to the file that has replaced this one and includes the histories; return whether there is one."""

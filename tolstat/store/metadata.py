@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
 import h5py
-from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationError, create_model
+from pydantic import AfterValidator, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError, create_model
 
 from tolstat.common.loads import LOADS
 from tolstat.common.solver_options import CODES
@@ -111,7 +111,7 @@ class VariantRecord(_File):
     """A joint that the study lists."""
 
     family: str
-    values: dict[str, str | float | bool | list[float]]
+    values: dict[str, JsonValue]
     note: str
 
 

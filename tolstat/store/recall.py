@@ -45,7 +45,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         When the study does not have the identity of the campaign in the file.
     """
     held = store.sampling["n"]
-    source = path if path is not None else store.path.parent / f"{store.study_name}.toml"
+    source = path if path is not None else store.path.parent / f"{Path(store.study_name).name}.toml"
     text = None if path is not None else store.study_text
     joint = None if path is not None or store.variants else joint_of(store, 0)
     try:

@@ -112,7 +112,7 @@ def odd_number(path: Path, rng: np.random.Generator) -> str:
     """Replace a plain attribute, with a valid checksum."""
     with h5py.File(path, "r+") as file:
         name = ("first_row", "campaign_rows", "study", "study_name", "created", "filetype")[rng.integers(6)]
-        odd = (0, 1, -1, 2**62, 0.5, "", "\x1b[2J\u202e", "[" * 20_000, "\x00x", [1, 2])[rng.integers(10)]
+        odd = (0, 1, -1, 2**62, 0.5, "", "\x1b[2J\u202e", "[" * 20_000, [1, 2])[rng.integers(9)]
         file.attrs[name] = odd
         integrity.seal(file)
         return f"{name} = {repr(odd)[:40]}"

@@ -6,16 +6,11 @@ passes each to one of the commands below in turn and prints every traceback, sig
 
 from __future__ import annotations
 
-import contextlib
-import shutil
 import sys
 import tempfile
 from pathlib import Path
 
-from typer.testing import CliRunner
-
 from tests.support import corruption
-from tolstat import cli
 
 COMMANDS = (
     ("status", "FILE", "--json"),
@@ -33,22 +28,13 @@ COMMANDS = (
 def main(path: Path, count: int, first: int = 0) -> None:
     """Corrupt a file `count` times; print the faults and how many commands ended how."""
     with tempfile.TemporaryDirectory() as folder:
-        warm(path, Path(folder))
+        corruption.warm(path, Path(folder), COMMANDS)
         for k, words in enumerate(COMMANDS):
             numbers = range(first + k, first + count, len(COMMANDS))
             found, kinds = corruption.search(path, Path(folder) / "x", numbers, [words])
             print(" ".join(words), kinds, flush=True)
             for one in found:
                 print(f"  {one.fault}: {one.corruption}\n{one.ended.err[-1500:]}", flush=True)
-
-
-def warm(path: Path, folder: Path) -> None:
-    """Run the commands once in this process, so that its children inherit loaded modules and kernels."""
-    copied = folder / path.name
-    shutil.copy(path, copied)
-    with contextlib.chdir(folder):
-        for words in COMMANDS:
-            CliRunner().invoke(cli.app, [str(copied) if word == "FILE" else word for word in words])
 
 
 if __name__ == "__main__":

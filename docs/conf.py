@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import shutil
 import sys
 from pathlib import Path
@@ -42,11 +43,22 @@ nb_merge_streams = True
 def setup(app: Any) -> None:
     """Connect the hook that makes the tree of pages; make the folder for pages of notebooks and README's drawing."""
     app.connect("source-read", add_tree)
+    app.connect("source-read", add_estimators)
     pages = Path(app.outdir, "docs")
     pages.mkdir(parents=True, exist_ok=True)
     os.environ["SITE_PAGES"] = str(pages)
     for drawing in (ROOT / "docs").glob("joint*.svg"):  # in HTML of the README, where Sphinx does not see it
         shutil.copy(drawing, pages)
+    list_questions(ROOT / "docs" / "api")
+
+
+def list_questions(folder: Path) -> None:
+    """Write the page of the functions of the questions, from their registry, where autosummary writes its pages."""
+    public = runpy.run_path(str(ROOT / "tolstat" / "questions" / "__init__.py"))["PUBLIC"]  # autodoc imports tolstat
+    folder.mkdir(exist_ok=True)
+    listed = "\n".join(f"   tolstat.{name}" for name in public)
+    text = f"# Questions\n\n```{{eval-rst}}\n.. autosummary::\n   :toctree: .\n\n{listed}\n```\n"
+    (folder / "questions.md").write_text(text, encoding="utf-8")
 
 
 def add_tree(app: Any, docname: str, source: list[str]) -> None:
@@ -61,3 +73,13 @@ def add_tree(app: Any, docname: str, source: list[str]) -> None:
         listed = "\n".join(f"/{page}" for page in pages if page in app.env.found_docs)
         branches.append(f"```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{listed}\n```")
     source[0] += "\n\n" + "\n\n".join(branches) + "\n"
+
+
+def add_estimators(app: Any, docname: str, source: list[str]) -> None:
+    """Add to the page of the estimators a section for each module of `tolstat.analysis`."""
+    if docname != "docs/estimators":
+        return
+    names = sorted(path.stem for path in (ROOT / "tolstat" / "analysis").glob("[!_]*.py"))
+    directive = "```{{eval-rst}}\n.. automodule:: tolstat.analysis.{0}\n   :members:\n   :exclude-members: Ends\n```"
+    listed = "\n\n".join(f"## analysis.{name}\n\n{directive.format(name)}" for name in names)
+    source[0] = source[0].replace("<!-- modules of tolstat.analysis -->", listed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import pytest
 import tolstat
 from tests.support.environment import ROOT
 from tolstat import joint as joints
+from tolstat.campaign import blocks
 from tolstat.common.tables import PARAM
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -30,14 +31,14 @@ steps_per_rev = 15
 UNIFORM = 'upper = "0.030 mm", distribution = "uniform"'
 
 Params = Callable[..., np.recarray]
+DEFAULT_KIND = blocks.default_kind
 
 
 def with_law(par: np.recarray, law: str) -> np.recarray:
     """Give joints of PARAM the contact stations that `law` names; returns them."""
     stations = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
-    own = joints.perturb(
-        stations, joints.nominal_errors(1, joints.Operation.model_construct(alpha=0, speed=1, torque=0))
-    )
+    still = joints.Operation.model_construct(alpha=0, speed=1, torque=0)
+    own = joints.perturb(stations, still, joints.nominal_errors(1))
     for name in ("n_stations", "station_s", "station_k1", "station_k2", "station_weight"):
         par[name] = own[name][0]
     return par
@@ -55,10 +56,11 @@ def params(cirelli: joints.Joint) -> Params:
     def make(
         alpha: float = 0.0, speed: float = 500 * np.pi / 30, torque: float = 100.0, **errors: float
     ) -> np.recarray[Any, np.dtype[np.void]]:
-        table = joints.nominal_errors(1, joints.Operation.model_construct(alpha=alpha, speed=speed, torque=torque))
+        operation = joints.Operation.model_construct(alpha=alpha, speed=speed, torque=torque)
+        table = joints.nominal_errors(1)
         for name, value in errors.items():
             table[name.replace("__", ".")] = value
-        row = joints.perturb(cirelli, table)
+        row = joints.perturb(cirelli, operation, table)
         assert row.dtype == PARAM
         return row.view(np.recarray)
 
@@ -83,6 +85,27 @@ def random_errors() -> Callable[[int], dict[str, float]]:
         return errors
 
     return draw
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _small_campaigns_in_this_process() -> Iterator[None]:
+    """Simulate campaigns of one worker or block here: starting a worker takes longer than the joints of most tests.
+
+    Tests of what joints do to their processes ask for ``"processes"``, or for the fixture `supervised`.
+    """
+
+    def quick(workers: int, blocks: int) -> str:
+        return "processes" if workers > 1 and blocks > 1 else "serial"
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tolstat.campaign.blocks.default_kind", quick)
+        yield
+
+
+@pytest.fixture
+def supervised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulate all campaigns in supervised processes, as users do."""
+    monkeypatch.setattr("tolstat.campaign.blocks.default_kind", DEFAULT_KIND)
 
 
 @pytest.fixture

@@ -25,7 +25,8 @@ def make(folder: Path) -> Path:
     path = folder / f"schema{SCHEMA_VERSION}.h5"
     rows = np.arange(3)
     with ResultStore.create(path, study, errors, fakes.specs_of("full"), {"pin1.offset_e": 0}) as store:
-        store.write(rows, fakes.simulate(fakes.perturb(study.joint, errors), fakes.Options(), "full", 0))
+        params = fakes.perturb(study.joint, study.operation, errors)
+        store.write(rows, fakes.simulate(params, fakes.Options(), "full", 0))
         store.finish()
     with h5py.File(path, "r+") as file:
         file.attrs["git_commit"] = ""

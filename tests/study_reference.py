@@ -10,15 +10,17 @@ from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.loads import LOADS
 from tolstat.common.selected_results import OPTIONAL_FIELDS
 from tolstat.common.tables import ERROR_FIELDS, LOAD_KINDS
+from tolstat.joint import Operation
 from tolstat.joint.contact import Station
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry
 from tolstat.study.listed import Range
 from tolstat.study.model import SweepEntry
+from tolstat.study.points import PointEntry
 from tolstat.study.schema import files
 from tolstat.study.schema.parts import of_model
 from tolstat.study.selection import TOLERANCED
-from tolstat.study.stress_point import PointEntry
+from tolstat.study.stress_point import StressPointEntry
 from tolstat.study.tolerances.entry import Banded
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
@@ -47,7 +49,8 @@ def of_unit(own: Mapping[str, Any]) -> str:
 
 
 def _first(own: Mapping[str, Any]) -> Mapping[str, Any]:
-    return (own.get("prefixItems") or [{}])[0]  # type: ignore[no-any-return]
+    items: list[Mapping[str, Any]] = own.get("prefixItems") or [{}]
+    return items[0]
 
 
 def kind(own: Mapping[str, Any]) -> str:
@@ -83,6 +86,11 @@ def model_table(model: Any) -> str:
     """Table of the keys of a model."""
     made = of_model(model)
     return key_table(made["properties"], made.get("required", ()))
+
+
+def _own(model: Any, base: Any) -> dict[str, Any]:
+    """Keys of a model that the model it is based on does not have."""
+    return {key: own for key, own in of_model(model)["properties"].items() if key not in of_model(base)["properties"]}
 
 
 def sections() -> str:
@@ -189,7 +197,7 @@ def tables() -> dict[str, str]:
         "sweep": SweepEntry,
         "range": Range,
         "line": LineEntry,
-        "point": PointEntry,
+        "point": StressPointEntry,
         "cost": CostEntry,
         "fit": FitEntry,
     }
@@ -198,6 +206,7 @@ def tables() -> dict[str, str]:
         | {name: model_table(model) for name, model in entries.items()}
         | {
             "sections": sections(),
+            "points": key_table(_own(PointEntry, Operation), ("name",)),
             "joint file": "\n\n".join(joint_tables()),
             "band": key_table(of_model(Banded)["properties"]),
             "distributions": "\n\n".join(distributions()),

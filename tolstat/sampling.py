@@ -16,10 +16,9 @@ from scipy.special import ndtr, ndtri
 
 from tolstat.common import draw_records
 from tolstat.common.tables import ERROR_FIELDS
-from tolstat.joint import nominal_errors
+from tolstat.joint import Operation, nominal_errors
 from tolstat.study import Study, axes
 from tolstat.study.design import Design, sobol
-from tolstat.study.model import SweepAxis
 from tolstat.study.proposal import component, weights
 from tolstat.study.tolerances.distributions import score
 from tolstat.study.tolerances.radial import plane_scores
@@ -50,13 +49,13 @@ def draw(study: Study, rows: range | None = None) -> Table:
         other rows are samples 0, 1, 2, ...
     """
     rows = range(study.rows) if rows is None else rows
-    table = nominal_errors(len(rows), study.operation)
+    table = nominal_errors(len(rows))
     numbers = study.sampling.samples(rows)
     samples = table[len(rows) - len(numbers) :]
     for name, value in study.errors.items():
         samples[name] = value
     if study.sampling.method == "sweep":
-        _fill_grid(samples, study.sweep, numbers)
+        _fill_grid(samples, study, numbers)
     elif study.listed is not None:
         _fill_listed(samples, study.listed, numbers)
     elif study.groups:
@@ -133,7 +132,7 @@ def from_scores(study: Study, scores: Array) -> Table:
     -------
     ndarray, (n,), dtype ERROR
     """
-    table = nominal_errors(len(scores), study.operation)
+    table = nominal_errors(len(scores))
     for name, value in study.errors.items():
         table[name] = value
     _fill_from(table, study, {name: _probability(z) for name, z in zip(streams(study), scores.T, strict=True)})
@@ -210,25 +209,30 @@ def dimensions() -> dict[str, int]:
     return {field.name: number for number, field in enumerate(ERROR_FIELDS)}
 
 
-def _fill_grid(samples: Table, axes: Sequence[SweepAxis], numbers: range) -> None:
+def _fill_grid(samples: Table, study: Study, numbers: range) -> None:
     """Set the points of the product grid of the axes, the last of which varies fastest; dimensions are no errors."""
-    index = np.unravel_index(np.arange(numbers.start, numbers.stop), [axis.points for axis in axes])
-    for axis, at in zip(axes, index, strict=True):
+    index = np.unravel_index(np.arange(numbers.start, numbers.stop), [axis.points for axis in study.sweep])
+    for axis, at in zip(study.sweep, index, strict=True):
         for name in set(axis.names).intersection(ERROR_NAMES):
-            samples[name] = np.linspace(axis.start, axis.stop, axis.points)[at]
+            samples[name] = np.linspace(axis.start, axis.stop, axis.points)[at] - _nominal(study.operation, name)
+
+
+def _nominal(operation: Operation, name: str) -> float:
+    """Value that an error is a deviation from, where a file gives the value itself: that of the operating point."""
+    section, _, key = name.partition(".")
+    return float(getattr(operation, key)) if section == "operation" else 0.0
 
 
 def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
-    """Set each row's operating point (of its variant), grid point and errors (of its case)."""
+    """Set each row's grid point and errors (of its case)."""
     here = slice(numbers.start, numbers.stop)
     variant, case, point = design.table["variant"][here], design.table["case"][here], design.point()[here]
-    for number, operation in enumerate(design.operations):
-        for key, value in operation.model_dump().items():
-            samples[f"operation.{key}"][variant == number] = value
     for values, index in ((design.points, point), (tuple(design.cases.values()), case)):
         for number, fixed in enumerate(values):
             for name, value in fixed.items():
                 samples[name][index == number] = value
+    for name in {name for values in design.points for name in values}:
+        samples[name] -= np.array([_nominal(operation, name) for operation in design.operations])[variant]
 
 
 def _fill_frozen(samples: Table, study: Study, numbers: range) -> None:
@@ -284,14 +288,24 @@ def _uniforms(names: Sequence[str], numbers: range, study: Study, stream: str = 
     Random probabilities of different `stream` are independent too; `sobol` and `lhs` ignore `stream`.
     """
     seed, n, first = study.sampling.seed, len(numbers), numbers.start
-    if study.sampling.method == "sobol":
-        points = sobol(n, len(ERROR_FIELDS), seed, first)
-        return {name: points[:, dimensions()[name]] for name in names}
-    if study.sampling.method == "lhs":
-        here = slice(first, numbers.stop)
-        return {name: _stratified(study.samples, _stream(seed, f"lhs {name}"))[here] for name in names}
+    if study.sampling.method in ("sobol", "lhs"):
+        size = study.samples // study.sampling.replicates
+        ends = range(first // size * size, numbers.stop, size)
+        parts = [_design(names, study, i // size, range(max(first, i) - i, min(numbers.stop - i, size))) for i in ends]
+        return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in names}
     # a stream may give 0 itself, once in 2^53 draws
     return {name: np.maximum(_stream(seed, name + stream, first).random(n), 2.0**-54) for name in names}
+
+
+def _design(names: Sequence[str], study: Study, replicate: int, numbers: range) -> dict[str, Array]:
+    """Sobol' points, or points of a Latin hypercube, of one replicate; the first is that of a study without others."""
+    seed, n = study.sampling.seed, study.samples // study.sampling.replicates
+    if study.sampling.method == "sobol":
+        points = sobol(len(numbers), len(ERROR_FIELDS), [seed, replicate] if replicate else seed, numbers.start)
+        return {name: points[:, dimensions()[name]] for name in names}
+    own = f" {replicate}" if replicate else ""
+    here = slice(numbers.start, numbers.stop)
+    return {name: _stratified(n, _stream(seed, f"lhs {name}{own}"))[here] for name in names}
 
 
 def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[str, Array], NDArray[np.intp]]:

@@ -147,7 +147,9 @@ def mobility(study: PaperStudy) -> list[tuple[str, str, int, int, str, str]]:
     match = [m for m in study.matches if m.printed.startswith("Ang")][-1]
     for pairs in ("RRRR", "RCCC"):
         for row, name in ((study.ideal(match.alpha), "ideal"), (match.row, match.case)):
-            found = rccc.mobility(rccc.solve(study.joint, study.main.errors[row], theta).lines, pairs)
+            found = rccc.mobility(
+                rccc.solve(study.joint, study.main.operation, study.main.errors[row], theta).lines, pairs
+            )
             rows.append((pairs, name, found.kutzbach, found.equations, _span(found.rank), _span(found.dof)))
     return rows
 
@@ -158,7 +160,7 @@ def linkage(study: PaperStudy) -> list[Linkage]:
     for alpha in paper.printed().alpha:
         own = [(m.printed, m.row) for m in study.matches if abs(m.alpha - alpha) < paper.SAME_ALPHA and m.row >= 0]
         for printed, row in (("ideal", study.ideal(float(alpha))), *own):
-            rigid = rccc.solve(study.joint, study.main.errors[row], study.main.theta)
+            rigid = rccc.solve(study.joint, study.main.operation, study.main.errors[row], study.main.theta)
             numbers: list[Any] = [np.abs(rigid.psi).max(), study.main.results["psi_max"][row], rigid.couple.max()]
             numbers += [np.abs(study.main.rigid_couple(row)).max(), np.abs(study.main.couple[row]).max()]
             name = study.cases[study.main.case[row]]

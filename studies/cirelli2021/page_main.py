@@ -11,8 +11,9 @@ from studies.cirelli2021 import spectra as paper_spectra
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.evidence import Evidence
 from tolstat.common.tables import Status
-from tolstat.joint import Joint, rccc
+from tolstat.joint import Joint, Operation, operating, rccc
 from tolstat.store import Reader
+from tolstat.store.recorded import operation_of
 
 Array = NDArray[np.float64]
 
@@ -25,6 +26,8 @@ class Main:
     ----------
     joint : Joint
         The joint of the variant.
+    operation : Operation
+        Operating point of the variant, from which that of each joint deviates.
     case : ndarray of int, shape (m,)
         Index of the errors in `PaperStudy.cases`.
     alpha : ndarray, shape (m,)
@@ -44,6 +47,7 @@ class Main:
     """
 
     joint: Joint
+    operation: Operation
     case: NDArray[np.int32]
     alpha: Array
     errors: NDArray[np.void]
@@ -65,17 +69,18 @@ class Main:
 
     def rigid_couple(self, row: int) -> Array:
         """Couple that the rigid RCCC linkage passes, the inertia of the output side with it: (samples,), N m."""
-        motion = rccc.solve(self.joint, self.errors[row], self.theta)
+        motion = rccc.solve(self.joint, self.operation, self.errors[row], self.theta)
         samples = len(motion.speed_ratio)
         spectrum = 1j * np.fft.rfftfreq(samples, 1.0 / samples) * np.fft.rfft(motion.speed_ratio)
         spectrum[-1] *= samples % 2  # the highest order of an even number of samples has no slope
-        speed, torque = (float(self.errors[f"operation.{name}"][row]) for name in ("speed", "torque"))
+        point = operating(self.operation, self.errors[row])
+        speed, torque = float(point["speed"]), float(point["torque"])
         inertial = output_inertia(self.joint) * speed**2 * np.fft.irfft(spectrum, samples)
         return np.asarray(motion.couple * (1.0 + inertial / torque))
 
     def evidence(self, cases: tuple[str, ...], printed: Array) -> Evidence:
         """What the statements are tested on; `printed`: revolutions with c_d as printed, (k,)."""
-        torque = self.errors["operation.torque"]
+        torque = operating(self.operation, self.errors)["torque"]
         away = [float(np.abs(self.couple[i] - self.rigid_couple(i)).max()) for i in range(len(self.case))]
         return Evidence(
             tuple(cases[i] for i in self.case),
@@ -93,10 +98,12 @@ class Main:
 def read(store: Reader, joint: Joint, rows: NDArray[np.intp], gamma: Array) -> Main:
     """Take rows of one variant, whose joint is `joint`, from the file; `gamma` is that of all rows of the file."""
     errors, loads = store.errors()[rows], store.histories("loads", rows).astype(np.float64)
+    operation = operation_of(store, int(rows[0]))
     return Main(
         joint,
+        operation,
         store.design()["case"][rows],
-        errors["operation.alpha"].copy(),
+        operating(operation, errors)["alpha"],
         errors,
         store.results()[rows],
         gamma[rows],

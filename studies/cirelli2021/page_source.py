@@ -19,8 +19,9 @@ from studies.cirelli2021.page_main import Main, revolutions
 from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.tables import Status, Variant
-from tolstat.joint import Joint, varied
+from tolstat.joint import Joint, operating, varied
 from tolstat.store import Reader
+from tolstat.store.recorded import operating_points
 
 Array = NDArray[np.float64]
 AS_PRINTED = 1e7
@@ -153,7 +154,7 @@ class PaperStudy:
 
     def _loads(self, result: np.void, joint: Joint) -> paper_statics.Loads:
         force, torque = (float(result[name][:4].max()) for name in ("F_max", "T_max"))
-        resisting = float(self.main.errors["operation.torque"][0])
+        resisting = float(operating(self.main.operation, self.main.errors)["torque"][0])
         return paper_statics.Loads(force, torque, resisting, joint.cross.r_b)
 
 
@@ -163,7 +164,7 @@ def matching(store: Reader) -> bool:
         return False
     if not {"loads", "contact", "tau"} <= set(store.history_specs):
         return False
-    design, alpha = store.design(), store.errors()["operation.alpha"]
+    design, alpha = store.design(), operating_points(store)["alpha"]
     rows = _kept(design, alpha)
     rows = rows[design["variant"][rows] == 0]
     names = tuple(store.case_names[i] for i in np.unique(design["case"][rows]))
@@ -184,7 +185,7 @@ def _kept(design: NDArray[np.void], alpha: Array) -> NDArray[np.intp]:
 def read(store: Reader) -> PaperStudy:
     """Take the study from its file; see `matching`."""
     design, results = store.design(), store.results()
-    alpha = store.errors()["operation.alpha"]
+    alpha = operating_points(store)["alpha"]
     gamma = relative_errors(results, design["group"])
     base = Joint.model_validate(store.joint)
     rows = _kept(design, alpha)

@@ -35,6 +35,24 @@ def test_estimates_agree_with_maximum_likelihood():
         assert tail.scale.estimate == pytest.approx(best[2], rel=0.01)
 
 
+def test_a_uniform_load_is_refused_and_the_others_are_not():
+    rng = np.random.default_rng(12)
+    for draw, refused in ((rng.random, True), (rng.exponential, False), (rng.standard_normal, False)):
+        found = [bool(fit(draw(size=2000)).region[:, 1].min() <= -0.5 + 1e-9) for _ in range(10)]
+        assert np.mean(found) == refused
+    assert "-0.5 or less" in fit(rng.random(2000)).refusal
+
+
+def test_the_fit_tested_is_the_fit_used():
+    rng = np.random.default_rng(13)
+    samples = genpareto.rvs(0.1, scale=2.0, size=(3, 200), random_state=rng)
+    for row, k, sigma in zip(samples, *pareto.most_likely(samples), strict=True):
+        tail = fit(np.concatenate([np.zeros(1800), row]), share=0.1)
+        assert (tail.shape.estimate, tail.scale.estimate) == pytest.approx((k, sigma), rel=1e-6)
+        grid = pareto.log_likelihood(tail.excesses, *tail.region[:, 1:].T)
+        assert pareto.log_likelihood(tail.excesses, k, sigma) >= grid.max() - 1e-6
+
+
 def test_the_end_of_a_tail_has_no_likelihood_beyond_it():
     assert pareto.log_likelihood(np.array([1.0, 2.5]), -0.5, 1.0) == -np.inf
     assert pareto.upper_share(2.5, -0.5, 1.0) == 0.0

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scipy.stats import sobol_indices
+from scipy.stats import norm, sobol_indices
 from typer.testing import CliRunner
 
 from tests.analysis.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
@@ -22,6 +22,33 @@ from tolstat.store import Reader
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+
+
+def test_indices_of_a_rare_event_cover_with_few_points_and_normal_intervals_do_not():
+    rng, n, level = np.random.default_rng(4), 300, 1.6448536  # a share of 0.05
+    x = np.linspace(-8.0, 8.0, 4001)
+    density = norm.pdf(x) / norm.pdf(x).sum()
+    truth = float(density @ (norm.sf((level - 0.6 * x) / 0.8) - 0.05) ** 2) / (0.05 * 0.95)
+    missed = {pick_freeze.of_event: [], pick_freeze.indices: []}
+    for _ in range(200):
+        a, b = rng.standard_normal((2, n, 2))
+        loads = [part @ [0.6, 0.8] > level for part in (a, b, np.stack([np.column_stack([b[:, 0], a[:, 1]])], axis=1))]
+        for estimate, own in missed.items():
+            found = estimate(*loads)
+            own.append([found.first.lower[0] > truth, found.first.upper[0] < truth])
+        np.testing.assert_allclose(pick_freeze.of_event(*loads)[0][0], pick_freeze.indices(*loads)[0][0], atol=1e-12)
+        np.testing.assert_allclose(pick_freeze.of_event(*loads)[1][0], pick_freeze.indices(*loads)[1][0], atol=1e-12)
+    counted, normal = (np.mean(own, axis=0).max() for own in missed.values())
+    assert counted < 0.025 + 3.0 * np.sqrt(0.025 * 0.975 / 200)
+    assert normal > 0.1
+
+
+def test_an_error_without_effect_on_an_event_has_an_interval_that_is_no_point():
+    a, b = np.random.default_rng(5).standard_normal((2, 200, 1))
+    found = pick_freeze.of_event(a[:, 0] > 1.0, b[:, 0] > 1.0, (a > 1.0))
+    assert found.first.estimate.tolist() == found.total.estimate.tolist() == [0.0]
+    assert found.first.lower[0] < 0.0 < found.first.upper[0] < 0.3
+    assert 0.0 < found.total.upper[0] < 0.1
 
 
 def ishigami(x):

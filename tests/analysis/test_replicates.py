@@ -52,3 +52,38 @@ def test_estimates_of_any_kind():
 def test_too_few_and_equal_replicates_are_refused(estimates):
     with pytest.raises(ValueError, match=r"sampling\.seed"):
         replicates.interval(estimates)
+
+
+def loads_of(seed, joints, number):
+    """Load 2 z1 + z2 of scrambled Sobol' points in independent blocks."""
+    rng = np.random.default_rng(seed)
+    z = [norm.ppf(qmc.Sobol(2, rng=rng).random(joints // number)) for _ in range(number)]
+    return np.concatenate([2.0 * part[:, 0] + part[:, 1] for part in z])
+
+
+def sample_of(values):
+    return exceedance.sort_out(values, np.ones(len(values), int))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.2, 0.01])
+def test_shares_and_quantiles_of_blocks_cover_over_seeds(share):
+    level, found, few = norm.isf(share) * np.sqrt(5.0), [], []
+    for seed in range(150):
+        loads = loads_of(seed, 1024, 8)
+        whole, parts = sample_of(loads), [sample_of(block) for block in np.split(loads, 8)]
+        row = replicates.curve_of(whole, parts, [level])[0]
+        quantile = replicates.quantile_of(whole, parts, 1.0 - share)
+        found.append([row["lower"] <= share <= row["upper"], quantile.lower <= level <= quantile.upper])
+        few.append(exceedance.curve_of(whole, [level])["upper"][0] - row["upper"])
+    assert np.mean(found, axis=0).min() >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 150)
+    assert (np.mean(few) > 0) == (share == 0.2)  # narrower than those of independent joints, where joints are many
+
+
+def test_no_joint_above_in_any_block_does_not_mean_none():
+    loads = np.arange(800.0) % 100
+    whole, parts = sample_of(loads), [sample_of(block) for block in np.split(loads, 8)]
+    row = replicates.curve_of(whole, parts, [99.0])[0]
+    assert (row["estimate"], row["lower"]) == (0.0, 0.0)
+    assert row["upper"] == exceedance.clopper_pearson(0, 800)[1]
+    assert row["outer_upper"] >= row["upper"]

@@ -20,7 +20,7 @@ def test_any_rows_are_those_of_the_campaign(method, tmp_path):
     base = study.load(path)
     assert base.sampling.method == method
     rows = np.array([7, 0, 3])
-    expected = joint.perturb(base.joint, sampling.draw(base)[rows])
+    expected = joint.perturb(base.joint, base.operation, sampling.draw(base)[rows])
     assert parameters(base, rows).tobytes() == expected.tobytes()
 
 
@@ -36,7 +36,7 @@ def test_chosen_joints_are_nominal_and_random_ones_then_a_block():
     base = study.load(STUDIES / "iso2768_f.toml")
     params, count = choose(base, 6, 4, 64)
     assert (len(params), count) == (64, 7)
-    nominal = joint.perturb(base.joint, joint.nominal_errors(1, base.operation))
+    nominal = joint.perturb(base.joint, base.operation, joint.nominal_errors(1))
     assert params[:1].tobytes() == nominal.tobytes()
     assert len(np.unique(params["pin_axis"], axis=0)) == len(params)
     few, count = choose(base, 6, 4, 1)

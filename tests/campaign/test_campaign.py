@@ -25,6 +25,7 @@ from tolstat.campaign import progress, signals
 from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import Options
 from tolstat.solver import simulation
 from tolstat.store import Counts, Reader, ResultStore
 from tolstat.store.recall import differing_keys
@@ -49,7 +50,7 @@ def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     """Run a study in one go with one worker; gives it and the datasets of its campaign."""
     study = fakes.Study(output=fakes.Output(request.param))
     path = tmp_path_factory.mktemp("reference") / "a.h5"
-    counts = campaign.run(study, path, workers=1, stages=fakes.stages())
+    counts = fakes.run(study, path, workers=1)
     assert counts == Counts(total=40, done=40, unsettled=4, failed=4)
     expected = datasets(path)
     assert ("histories/loads" in expected) == (request.param == "full")
@@ -60,7 +61,7 @@ def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
 @pytest.mark.parametrize(("workers", "block"), [(1, 1), (1, 7), (1, 40), (1, 1000), (2, None), (2, 3), (3, 1)])
 def test_workers_and_blocks_change_no_byte(tmp_path: Path, reference, workers: int, block: int | None) -> None:
     study, expected = reference
-    campaign.run(study, tmp_path / "a.h5", workers, block, stages=fakes.stages())
+    fakes.run(study, tmp_path / "a.h5", workers, block)
     assert datasets(tmp_path / "a.h5") == expected
     assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
 
@@ -70,7 +71,7 @@ def test_order_of_blocks_changes_no_byte(tmp_path: Path, reference, monkeypatch:
     study, expected = reference
     blocks = execution._blocks
     monkeypatch.setattr(execution, "_blocks", lambda *args: reversed(list(blocks(*args))))
-    campaign.run(study, tmp_path / "a.h5", 1, 3, stages=fakes.stages())
+    fakes.run(study, tmp_path / "a.h5", 1, 3)
     assert datasets(tmp_path / "a.h5") == expected
 
 
@@ -85,12 +86,12 @@ def test_interrupted_in_progress_and_resumed(tmp_path: Path, reference, workers:
             raise KeyboardInterrupt
 
     with pytest.raises(campaign.Interrupted, match="to resume, run the same command again") as caught:
-        campaign.run(study, path, workers, 4, progress=interrupt, stages=fakes.stages())
+        fakes.run(study, path, workers, 4, progress=interrupt)
     assert caught.value.counts.done == 12
     assert caught.value.path == path
     with Reader.open(path) as store:
         assert store.pending().size == 28
-    campaign.run(study, path, 3 - workers, 5, stages=fakes.stages())
+    fakes.run(study, path, 3 - workers, 5)
     assert datasets(path) == expected
 
 
@@ -123,16 +124,20 @@ def test_resume_simulates_pending_rows_only(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_progress_hears_the_start_and_every_block(tmp_path: Path) -> None:
     heard: list[Counts] = []
-    campaign.run(fakes.Study(), tmp_path / "a.h5", 2, 8, progress=heard.append, stages=fakes.stages())
+    fakes.run(fakes.Study(), tmp_path / "a.h5", 2, 8, progress=heard.append)
     assert [counts.done for counts in heard] == [0, 8, 16, 24, 32, 40]
     assert heard[-1] == Counts(40, 40, 4, 4)
+
+
+def warm(calls: list[str], options: Options) -> None:
+    calls.append("warm")
 
 
 @pytest.mark.slow
 def test_the_kernel_is_compiled_before_there_are_workers(tmp_path: Path) -> None:
     calls: list[str] = []
-    stages = fakes.stages()._replace(warm_up=partial(calls.append, "warm"))
-    campaign.run(fakes.Study(), tmp_path / "a.h5", 2, progress=lambda c: calls.append("block"), stages=stages)
+    stages = fakes.stages()._replace(warm_up=partial(warm, calls))
+    fakes.run(fakes.Study(), tmp_path / "a.h5", 2, progress=lambda c: calls.append("block"), stages=stages)
     assert calls[:2] == ["warm", "block"]
     assert calls.count("warm") == 1
 
@@ -178,8 +183,8 @@ def test_a_request_to_stop_keeps_finished_blocks(tmp_path: Path, workers: int, n
         counts = store.counts()
     assert said.startswith(f"stopped: {path} holds the results of {counts.done} of 40 joints\n  hint: to resume")
     assert 2 <= counts.done < 40
-    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
-    campaign.run(fakes.Study(), tmp_path / "b.h5", 1, stages=fakes.stages())
+    fakes.run(fakes.Study(), path, 1)
+    fakes.run(fakes.Study(), tmp_path / "b.h5", 1)
     assert datasets(path) == datasets(tmp_path / "b.h5")
 
 
@@ -206,7 +211,7 @@ def long_reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.Temp
     """Run a study of many joints; gives it and its datasets."""
     study = fakes.Study(n=300, output=fakes.Output(request.param))
     path = tmp_path_factory.mktemp("reference") / "a.h5"
-    campaign.run(study, path, 1, stages=fakes.stages())
+    fakes.run(study, path, 1)
     return study, datasets(path)
 
 
@@ -227,7 +232,7 @@ def test_kill_loses_at_most_the_blocks_in_work(tmp_path: Path, long_reference, m
     np.testing.assert_array_equal(results["psi_max"][done], kept["psi_max"][done])
     # Blocks are begun in the order of the rows: what is missing below the last one done was in work.
     assert np.setdiff1d(np.arange(done.max()), done).size <= 2 * workers * block
-    campaign.run(study, path, 1, stages=fakes.stages())
+    fakes.run(study, path, 1)
     assert datasets(path) == expected
 
 
@@ -235,7 +240,7 @@ def test_kill_loses_at_most_the_blocks_in_work(tmp_path: Path, long_reference, m
 @pytest.mark.slow
 def test_stopped_while_histories_are_taken_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
     study, path = fakes.Study(output=fakes.Output("full")), tmp_path / "a.h5"
-    campaign.run(study, tmp_path / "b.h5", 1, stages=fakes.stages())
+    fakes.run(study, tmp_path / "b.h5", 1)
 
     def interrupt(*args: object) -> None:
         raise KeyboardInterrupt
@@ -243,19 +248,19 @@ def test_stopped_while_histories_are_taken_in(tmp_path: Path, monkeypatch: pytes
     with monkeypatch.context() as patch:
         patch.setattr(f"tolstat.store.histories.HistoryParts.{step}", interrupt)
         with pytest.raises(campaign.Interrupted, match="40 of 40"):
-            campaign.run(study, path, 1, stages=fakes.stages())
-    campaign.run(study, path, 1, stages=fakes.stages())
+            fakes.run(study, path, 1)
+    fakes.run(study, path, 1)
     assert datasets(path) == datasets(tmp_path / "b.h5")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "b.h5"]
 
 
 def test_another_study_is_refused_with_the_keys(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
-    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    fakes.run(fakes.Study(), path, 1)
     before = path.read_bytes()
     other = fakes.Study(seed=8, solver=fakes.Solver(60), limits={}, text="# another comment")
     with pytest.raises(StoreError) as caught:
-        campaign.run(other, path, 1, stages=fakes.stages())
+        fakes.run(other, path, 1)
     assert str(caught.value) == (
         f"{path}: is the result file of another study\n"
         "    sampling.seed: 7 in the file, 8 in the study\n"
@@ -267,20 +272,20 @@ def test_another_study_is_refused_with_the_keys(tmp_path: Path) -> None:
 
 def test_edited_limits_are_taken_over_and_nothing_is_simulated_again(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
-    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    fakes.run(fakes.Study(), path, 1)
     before, stages = datasets(path), fakes.stages(fakes.simulate_and_raise)
     same = fakes.Study(limits={"fork1.T": 40.0}, text="# another comment", name="moved")
-    assert campaign.run(same, path, 1, stages=stages).done == 40
+    assert fakes.run(same, path, 1, stages=stages).done == 40
     with Reader.open(path) as store:
         assert (store.limits, store.study_text, store.study_name) == ({"fork1.T": 40.0}, "# another comment", "moved")
     assert datasets(path) == before
 
 
 def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+    fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
     monkeypatch.setattr("tolstat.__version__", "99.0")
     with pytest.raises(StoreError, match=r"tolstat: version .* in the file, 99.0 now"):
-        campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+        fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
 
 
 def test_differing_keys_names_missing_ones() -> None:
@@ -296,15 +301,15 @@ def test_differing_keys_names_missing_ones() -> None:
 @pytest.mark.slow
 def test_a_bug_in_every_joint_comes_through(tmp_path: Path, workers: int) -> None:
     with pytest.raises(ZeroDivisionError):
-        campaign.run(fakes.Study(), tmp_path / "a.h5", workers, 2, stages=fakes.stages(fakes.simulate_and_raise))
-    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+        fakes.run(fakes.Study(), tmp_path / "a.h5", workers, 2, stages=fakes.stages(fakes.simulate_and_raise))
+    fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
 
 
 def test_runs_outside_the_main_thread(tmp_path: Path) -> None:
     done: list[Counts] = []
 
     def run() -> None:
-        done.append(campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages()))
+        done.append(fakes.run(fakes.Study(), tmp_path / "a.h5", 1))
 
     thread = threading.Thread(target=run)
     thread.start()
@@ -314,7 +319,7 @@ def test_runs_outside_the_main_thread(tmp_path: Path) -> None:
 
 def test_signals_mean_the_same_as_before_afterwards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = [signal.getsignal(number) for number in signals.CAUGHT]
-    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+    fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
     assert [signal.getsignal(number) for number in signals.CAUGHT] == before
     with pytest.raises(KeyboardInterrupt), signals.caught():
         signal.raise_signal(signal.SIGTERM)
@@ -336,7 +341,7 @@ def test_an_ignored_hang_up_stays_ignored() -> None:
 
 def test_workers_and_block_must_be_positive(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
-        campaign.run(fakes.Study(), tmp_path / "a.h5", workers=0, block=-1, stages=fakes.stages())
+        fakes.run(fakes.Study(), tmp_path / "a.h5", workers=0, block=-1)
     assert [fault.place for fault in caught.value.faults] == ["workers", "block"]
     assert list(tmp_path.iterdir()) == []
 
@@ -376,7 +381,7 @@ def test_real_joints_give_the_same_bytes(tmp_path: Path, kind: str) -> None:
     with Reader.open(tmp_path / "a.h5") as store:
         # A row can be run again from the file alone, in any company.
         again = simulation.simulate_rows(
-            joint.perturb(plan.joint, store.errors()[[4, 2]]),
+            joint.perturb(plan.joint, plan.operation, store.errors()[[4, 2]]),
             plan.solver.options(),
             kind,
             plan.output.harmonics,

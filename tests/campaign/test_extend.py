@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common import files, tables
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import Reader, ResultStore
+from tolstat.store import Reader, ResultStore, provenance
 from tolstat.study import Study
 
 KINDS = ("none", "full")
@@ -44,20 +45,22 @@ STAGES = campaign.Stages(
 )
 
 
+def small(folder: Path, n: int, method: str = "random", kind: str = "none", seed: int = 2021) -> Study:
+    """Write ``small.toml``, a study of n joints, and load it."""
+    path = folder / "small.toml"
+    body = BODY.replace("n = 60", f'n = {n}\nmethod = "{method}"').replace("KIND", kind)
+    path.write_text(body.replace("seed = 2021", f"seed = {seed}"), encoding="utf-8")
+    return studies.load(path)
+
+
 @pytest.fixture
 def make(tmp_path: Path) -> Make:
-    def made(n: int, method: str = "random", kind: str = "none", seed: int = 2021) -> Study:
-        path = tmp_path / "small.toml"
-        body = BODY.replace("n = 60", f'n = {n}\nmethod = "{method}"').replace("KIND", kind)
-        path.write_text(body.replace("seed = 2021", f"seed = {seed}"), encoding="utf-8")
-        return studies.load(path)
-
-    return made
+    return partial(small, tmp_path)
 
 
 def run(study: Study, path: Path, check: bool = False, **choices: object) -> Path:
-    """Without checks of the numerical error, which slices and what is put together of them do not have."""
-    campaign.run(study, path, 1, stages=STAGES, check=check, **choices)
+    """Run in one block without checks of the numerical error, which merged slices do not have."""
+    campaign.run(study, path, 1, 1000, stages=STAGES, check=check, **choices)
     return path
 
 
@@ -66,7 +69,7 @@ def slices(study: Study, folder: Path, *edges: int) -> list[Path]:
     return [run(study, folder / f"{a}-{b}.h5", rows=range(a, b)) for a, b in pairwise(edges)]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [pytest.param("none", marks=pytest.mark.slow), "full"])
 @pytest.mark.parametrize("method", ["random", pytest.param("sobol", marks=pytest.mark.slow)])
 def test_an_extended_campaign_is_one_of_that_size(tmp_path: Path, make: Make, method: str, kind: str) -> None:
     whole = run(make(101, method, kind), tmp_path / "whole.h5")
@@ -115,6 +118,19 @@ def test_what_cannot_grow_is_refused(tmp_path: Path, make: Make, method: str, n:
     with pytest.raises(InputError, match=message):
         extend.extend(path, n)
     assert path.read_bytes() == before
+
+
+def test_a_file_of_other_code_does_not_grow(tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = run(make(40), tmp_path / "a.h5")
+    before = path.read_bytes()
+    monkeypatch.setattr(provenance, "source_hash", lambda: "0")
+    says = (
+        r"another version of the code\n    sources: hash \w+ in the file, 0 now\n  hint: .*STUDY --n 80 --out OTHER.h5"
+    )
+    with pytest.raises(InputError, match=says):
+        extend.extend(path, 80)
+    assert path.read_bytes() == before
+    assert list(tmp_path.glob("*.h5*")) == [path]
 
 
 def test_slices_and_changed_studies_do_not_grow(tmp_path: Path, make: Make) -> None:

@@ -21,7 +21,7 @@ from tolstat.common.tables import LOAD_KINDS, Method, Options, Simulation, Start
 from tolstat.questions.accuracy import query as tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.exceedance import query as exceedance
-from tolstat.store import Reader, ResultStore, recorded, verification
+from tolstat.store import Reader, ResultStore, provenance, recorded, verification
 from tolstat.store.verification import Check, Verification
 
 REAL = """
@@ -93,7 +93,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
 
 @pytest.mark.slow
 def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
-    params = joint.perturb(plan.joint, sampling.draw(plan)[coarse.rows[-1:]])
+    params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows[-1:]])
     here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
     for name in ("F_max", "T_max"):  # with other threads LAPACK rounds otherwise, and Radau takes other steps
         np.testing.assert_allclose(coarse.checks["reference"].results[name][-1], here[name][0], rtol=1e-6)
@@ -107,7 +107,7 @@ def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):
     assert np.median(true) > 1e-3
     for name in ("newton", "settling"):
         assert force_and_torque(coarse.base, coarse.checks[name].results).max() < 1e-3 * np.median(true)
-    params = joint.perturb(plan.joint, sampling.draw(plan)[coarse.rows])
+    params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows])
     fine = verify.run_checks(params, [Options(steps_per_rev=90)] * len(params), ("half_step",))["half_step"]
     assert fine.options["steps_per_rev"] == 180
     assert np.median(force_and_torque(fine.results, reference)) < 0.05 * np.median(true)
@@ -291,7 +291,8 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
         found = recorded.parameters(store, np.array([0, 3]))
         settings = [recorded.options_of(store, row) for row in (0, 3)]
     for k, row in enumerate((0, 3)):
-        own = joint.perturb(listed.joints[listed.design["variant"][row]], errors[row : row + 1])
+        variant = listed.design["variant"][row]
+        own = joint.perturb(listed.joints[variant], listed.operations[variant], errors[row : row + 1])
         assert found[k] == own[0]
     assert (found["clearance"][0] != found["clearance"][1]).all()
     assert settings == [solver.options() for solver in listed.solvers]
@@ -332,6 +333,7 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
             assert word in done.stderr
     with pytest.raises(InputError, match="less than one"):
         verify.check_study(study.load(written(tmp_path)), joints=-1)
-    monkeypatch.setattr(verify, "versions", lambda: {"tolstat": "9.9", "sources": "0"})
+    other = synthetic.store(tmp_path, name="other")
+    monkeypatch.setattr(provenance, "source_hash", lambda: "0")
     with pytest.raises(StoreError, match="was made by another version of the code"):
-        verify.check_file(synthetic.store(tmp_path, name="other"))
+        verify.check_file(other)

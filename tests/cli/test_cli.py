@@ -23,6 +23,7 @@ from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.tables import BUSHINGS, Simulation, Status
 from tolstat.display import text
+from tolstat.questions import QUESTIONS
 from tolstat.store import Reader
 
 COMMANDS = (
@@ -35,6 +36,11 @@ HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
 def call(*args):
     """Run the command in this process."""
     return CliRunner().invoke(cli.app, [str(arg) for arg in args])
+
+
+def unwrapped(text):
+    """Prose with lines that were broken at 80 characters put together again."""
+    return re.sub(r"\n {4,}", " ", text)
 
 
 def shell(*args, **env):
@@ -89,6 +95,13 @@ def test_help_lists_the_commands_in_order_each_with_its_whole_summary():
     assert headings == [*cli.COMMANDS, "Measure tolstat itself"]
     assert max(map(len, shown.splitlines())) <= 80
     assert "..." not in groups
+
+
+def test_commands_of_questions_stand_under_their_headings_once():
+    listed = [(heading, name) for heading, names in cli.COMMANDS.items() for name in names]
+    assert len(set(listed)) == len(listed)
+    assert {(question.heading, name) for question in QUESTIONS for name in question.commands} <= set(listed)
+    assert [question.name for question in QUESTIONS if bool(question.heading) != bool(question.commands)] == []
 
 
 def test_a_file_may_be_named_like_an_instrument(tmp_path, monkeypatch):
@@ -169,6 +182,7 @@ def test_status_of_a_file_in_any_state(tmp_path, simulated, pending):
         assert (found["newton_failed"], found["not_settled"]) == (2, 1)
     head, _, table = call("status", path).stdout.partition("\n\n")
     shares = found.pop("exceedance")
+    head = unwrapped(head)
     lines = head.splitlines()
     counts = [f"{state.label}: {found[state.label]}" for state in Status if found[state.label]]
     assert lines[: 2 + len(counts)] == ["study: small", "joints: 61", *counts]
@@ -373,7 +387,7 @@ def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatc
     with Reader.open(path) as store:
         counts = store.counts()
     monkeypatch.setattr(campaign, "run", lambda *_, **__: counts)
-    told = call("run", "small.toml", "--no-report").stderr.splitlines()
+    told = unwrapped(call("run", "small.toml", "--no-report").stderr).splitlines()
     assert told[0] == "small.h5: 61 joints, 3 failed, 1 not settled"
     assert told[1].startswith("3 joints newton_failed: ")
     assert told[2].startswith("  hint, for row 57: failed at step 0 (")

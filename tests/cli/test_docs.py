@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 import webbrowser
 from importlib import import_module
 from pathlib import Path
@@ -62,5 +64,46 @@ def test_an_installed_package_finds_the_clone_around_the_current_folder(
     assert CliRunner().invoke(cli.app, ["docs"]).stdout.splitlines() == list(own.BUILD)
     monkeypatch.chdir("/")
     done = CliRunner().invoke(cli.app, ["docs"])
-    assert (done.exit_code, done.stdout) == (0, "")
-    assert "folder docs/ of the repository" in done.stderr
+    assert done.exit_code == 0
+    titles = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    assert {"study", "tolerances", "causes", "time-above"} <= titles.keys()
+    assert titles["tutorial"] == "Your own joint"
+    assert "next: tolstat docs study" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["study", "study.md", "time_above", "time-above"])
+def test_a_page_is_printed(name: str) -> None:
+    done = CliRunner().invoke(cli.app, ["docs", name])
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert done.stdout.rstrip("\n") == own.pages()[own.page_name(name)].read_text(encoding="utf-8").rstrip("\n")
+    assert done.stdout.startswith("# ")
+
+
+def test_a_page_has_no_settings_of_the_site() -> None:
+    shown = CliRunner().invoke(cli.app, ["docs", "tutorial"]).stdout
+    assert shown.startswith("# Your own joint")
+    assert "tolstat new shaft --joint own" in shown
+    assert not re.search(r"code-cell|:tags:|IPython|subprocess", shown)
+
+
+def test_an_unknown_page_is_refused() -> None:
+    done = CliRunner().invoke(cli.app, ["docs", "studi"])
+    assert done.exit_code == 2
+    assert "did you mean 'study'?" in done.stderr
+
+
+def test_the_wheel_has_the_pages_that_users_need() -> None:
+    """And every page that a help page or an input file of the package names."""
+    included = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    included = included["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    held = {source: target for source, target in included.items() if source.startswith("docs/")}
+    assert all(target == f"tolstat/{source}" and (ROOT / source).exists() for source, target in held.items())
+    names = {Path(source).stem.replace("_", "-") for source in held} | {
+        file.stem.replace("_", "-") for file in (ROOT / "docs" / "questions").glob("*.md")
+    }
+    named = set()
+    for folder, kinds in (("tolstat", ("*.py", "*.toml")), ("data", ("*.toml",))):
+        for file in (file for kind in kinds for file in (ROOT / folder).rglob(kind)):
+            named |= set(re.findall(r"tolstat docs ([a-z][a-z-]+)", file.read_text(encoding="utf-8")))
+    assert {"study", "causes", "tutorial"} <= names
+    assert named <= names

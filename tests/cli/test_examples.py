@@ -47,6 +47,19 @@ def made(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def too_wide(done: Result) -> list[str]:
+    """Lines above 80 characters of what a command says; a table of TOML, and a path that is longer, have any width."""
+    lines = [*done.stdout.partition("[tolerances]")[0].splitlines(), *done.stderr.splitlines()]
+    return [line for line in lines if len(line) > 80 and "/tmp" not in line]
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
+def test_help_has_plain_words_for_arguments(command: str) -> None:
+    shown = call(*command.split(), "--help").stdout
+    arguments = shown.partition("\nArguments:\n")[2].partition("\nOptions:\n")[0]
+    assert not re.search(r"<\w|\[Path|list\[", arguments)
+
+
 @pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
@@ -58,8 +71,7 @@ def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch:
     assert done.exit_code == 0, done.stderr
     assert "Traceback" not in done.stderr
     if command not in bench.INSTRUMENTS:
-        table = done.stdout.partition("[tolerances]")[0]
-        assert [line for line in table.splitlines() if len(line) > 80] == []
+        assert too_wide(done) == [] or command == "docs"  # whose pages have lines of any length
 
 
 TABLES = {
@@ -91,7 +103,7 @@ def test_tables_fit_80_columns_and_wide_ones_have_all(
         lines = lines[lines.index("") :]
     assert len(lines) > 1
     assert [line for line in lines if len(line) > 80] == []
-    named = re.findall(r"^with --wide also: (.*)$", done.stderr, flags=re.MULTILINE)
+    named = re.findall(r"^with --wide also: (.*)$", done.stderr.replace("\n    ", " "), flags=re.MULTILINE)
     heads = [head for line in named for head in line.split(", ")]
     assert all(head in wide.stdout for head in heads)
     assert "--wide" not in wide.stderr

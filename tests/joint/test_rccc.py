@@ -13,6 +13,7 @@ from tolstat.joint import Operation, ideal, nominal_errors, rccc
 
 THETA = np.linspace(0, 2 * np.pi, 73) + 0.03
 TORQUE = 100.0
+AT = Operation.model_construct(alpha=0.0, speed=50.0, torque=TORQUE)
 KEPT = [(3, 1), (3, 2), (4, 1), (4, 2)]
 FEATURES = [f"{kind}{i}" for kind in ("pin", "hole") for i in (1, 2, 3, 4)]
 
@@ -20,8 +21,8 @@ FEATURES = [f"{kind}{i}" for kind in ("pin", "hole") for i in (1, 2, 3, 4)]
 @pytest.fixture
 def errors():
     def make(alpha=15.0, seed=None, offset=2e-4, tilt=1e-2, **given):
-        operation = Operation.model_construct(alpha=np.radians(alpha), speed=50.0, torque=TORQUE)
-        table = nominal_errors(1, operation)
+        table = nominal_errors(1)
+        table["operation.alpha"] = np.radians(alpha)
         rng = np.random.default_rng(seed)
         for feature in FEATURES if seed is not None else ():
             for axis in "etz":
@@ -58,8 +59,8 @@ def links(alpha, theta, output_angle):
 
 def twists(joint, row, theta, h=1e-5, **kept):
     """Twists of the three links about O for a unit input speed, (k, 3, 6), by differences of their poses."""
-    after, before = (rccc.solve(joint, row, theta + s, **kept).pose for s in (h, -h))
-    now = rccc.solve(joint, row, theta, **kept).pose
+    after, before = (rccc.solve(joint, AT, row, theta + s, **kept).pose for s in (h, -h))
+    now = rccc.solve(joint, AT, row, theta, **kept).pose
     turned = after.attitude @ np.swapaxes(before.attitude, -1, -2)
     spin = Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_rotvec().reshape(-1, 3, 3) / (2 * h)
     velocity = (after.origin - before.origin) / (2 * h)
@@ -76,7 +77,7 @@ def test_kutzbach_counts_as_the_paper_does():
 
 @pytest.mark.parametrize("alpha", [0.0, 15.0, 40.0])
 def test_ideal_revolute_joint_turns_because_its_constraints_are_dependent(cirelli, errors, alpha):
-    lines = rccc.solve(cirelli, errors(alpha), THETA).lines
+    lines = rccc.solve(cirelli, AT, errors(alpha), THETA).lines
     revolute, cylindrical = rccc.mobility(lines, "RRRR"), rccc.mobility(lines, "RCCC")
     assert (revolute.kutzbach, revolute.equations) == (-2, 20)
     assert_array_equal([revolute.rank, revolute.dof, revolute.redundant], np.outer([17, 1, 3], np.ones(73)))
@@ -88,7 +89,7 @@ def test_ideal_revolute_joint_turns_because_its_constraints_are_dependent(cirell
 
 @pytest.mark.parametrize("seed", range(3))
 def test_errors_lock_the_revolute_joint_and_leave_the_rccc_linkage_its_freedom(cirelli, errors, seed):
-    lines = rccc.solve(cirelli, errors(seed=seed), THETA).lines
+    lines = rccc.solve(cirelli, AT, errors(seed=seed), THETA).lines
     assert_array_equal(rccc.mobility(lines, "RRRR").dof, 0)
     assert_array_equal(rccc.mobility(lines).dof, 1)
 
@@ -106,7 +107,7 @@ def test_errors_lock_the_revolute_joint_and_leave_the_rccc_linkage_its_freedom(c
 def test_rigid_revolute_pairs_lock_where_an_error_makes_axes_miss_each_other(cirelli, errors, freedoms, names):
     for name in names:
         size = 1e-4 if "offset" in name else np.radians(0.5)
-        lines = rccc.solve(cirelli, errors(**{name: size}), [1.0]).lines
+        lines = rccc.solve(cirelli, AT, errors(**{name: size}), [1.0]).lines
         assert rccc.mobility(lines, "RRRR").dof == [freedoms], name
         assert rccc.mobility(lines).dof == [1], name
 
@@ -114,7 +115,7 @@ def test_rigid_revolute_pairs_lock_where_an_error_makes_axes_miss_each_other(cir
 @pytest.mark.parametrize(("pairs", "seed"), [("RRRR", None), ("RRRR", 4), ("RCCC", None), ("RCCC", 4), ("RCCR", 4)])
 def test_freedoms_are_those_of_the_loop_of_screws(cirelli, errors, pairs, seed):
     """Freedoms of a closed loop: screws less the rank of their 6 x n matrix, in Plücker coordinates."""
-    lines = rccc.solve(cirelli, errors(seed=seed), THETA).lines
+    lines = rccc.solve(cirelli, AT, errors(seed=seed), THETA).lines
     dof = []
     for points, axes in zip(lines.point / lines.length, lines.axis, strict=True):
         screws = [[*u, *np.cross(p, u)] for p, u in zip(points, axes, strict=True)]
@@ -125,7 +126,7 @@ def test_freedoms_are_those_of_the_loop_of_screws(cirelli, errors, pairs, seed):
 
 @pytest.mark.parametrize("pairs", ["RCC", "RCCP", ""])
 def test_unknown_pairs_are_refused(cirelli, errors, pairs):
-    lines = rccc.solve(cirelli, errors(), [0.0]).lines
+    lines = rccc.solve(cirelli, AT, errors(), [0.0]).lines
     with pytest.raises(ValueError, match="four letters"):
         rccc.mobility(lines, pairs)
 
@@ -136,7 +137,7 @@ def test_unknown_pairs_are_refused(cirelli, errors, pairs):
 @pytest.mark.parametrize(("input_pin", "output_pin"), KEPT)
 @pytest.mark.parametrize("alpha", [0.0, 15.0, -30.0])
 def test_misalignment_alone_gives_the_ideal_joint(cirelli, errors, alpha, input_pin, output_pin):
-    found = rccc.solve(cirelli, errors(alpha), THETA, input_pin=input_pin, output_pin=output_pin)
+    found = rccc.solve(cirelli, AT, errors(alpha), THETA, input_pin=input_pin, output_pin=output_pin)
     a = np.radians(alpha)
     ratio = np.cos(a) / (1 - np.sin(a) ** 2 * np.cos(THETA) ** 2)  # eq. (2)
     assert_allclose(found.speed_ratio, ratio, rtol=1e-13)
@@ -151,7 +152,7 @@ def test_misalignment_alone_gives_the_ideal_joint(cirelli, errors, alpha, input_
 @pytest.mark.parametrize("seed", range(3))
 def test_every_kept_pin_lies_in_its_hole(cirelli, errors, seed, input_pin, output_pin):
     row = errors(25.0, seed)
-    found = rccc.solve(cirelli, row, THETA, input_pin=input_pin, output_pin=output_pin)
+    found = rccc.solve(cirelli, AT, row, THETA, input_pin=input_pin, output_pin=output_pin)
     shaft = np.array([np.sin(np.radians(25)), 0, np.cos(np.radians(25))])
     fork, follower = links(np.radians(25), THETA, found.output_angle)
     assert_allclose(found.pose.attitude[:, 0], fork, atol=1e-12)
@@ -173,7 +174,7 @@ def test_every_kept_pin_lies_in_its_hole(cirelli, errors, seed, input_pin, outpu
 def test_output_angle_is_that_of_the_spherical_four_bar_linkage(cirelli, errors, seed):
     """The directions of the axes make a spherical linkage: u1 . u2 is the cross's own, which is quadratic in tan."""
     row = errors(20.0, seed, tilt=0.03)
-    found = rccc.solve(cirelli, row, THETA)
+    found = rccc.solve(cirelli, AT, row, THETA)
     angle, _, _ = four_bar(row, cirelli.cross.R, np.radians(20), THETA)
     assert_allclose(np.exp(1j * found.output_angle), np.exp(1j * angle), atol=1e-11)
     assert np.ptp(found.output_angle - ideal.output_angle(THETA, np.radians(20))) > 1e-3
@@ -197,54 +198,56 @@ def four_bar(row, radius, alpha, theta):
 @pytest.mark.parametrize("seed", range(3))
 def test_speed_ratio_is_the_slope_of_the_output_angle(cirelli, errors, seed):
     row, h = errors(20.0, seed), 1e-4
-    found = rccc.solve(cirelli, row, THETA)
-    ahead, behind = (rccc.solve(cirelli, row, THETA + s).output_angle for s in (h, -h))
+    found = rccc.solve(cirelli, AT, row, THETA)
+    ahead, behind = (rccc.solve(cirelli, AT, row, THETA + s).output_angle for s in (h, -h))
     assert_allclose(found.speed_ratio, (ahead - behind) / (2 * h), atol=1e-8)
     ratio = ideal.speed_ratio(THETA, np.radians(20))
     assert_allclose(found.psi, (found.speed_ratio - ratio) / found.speed_ratio, atol=1e-14)
-    first = rccc.solve(cirelli, row, [0.1, 0.1 + 2 * np.pi]).output_angle
+    first = rccc.solve(cirelli, AT, row, [0.1, 0.1 + 2 * np.pi]).output_angle
     assert first[1] - first[0] == pytest.approx(2 * np.pi)
 
 
 def test_position_errors_slide_the_pairs_and_turn_nothing(cirelli, errors):
     row = errors(seed=5, tilt=0.0)
-    found = rccc.solve(cirelli, row, THETA)
+    found = rccc.solve(cirelli, AT, row, THETA)
     assert_allclose(found.psi, 0, atol=1e-12)
     assert np.ptp(found.slide, axis=0).min() > 5e-6
-    moved = rccc.solve(cirelli, errors(0.0, hole4__offset_t=1e-4), THETA).slide  # t of arm 4 is -x: along the input pin
+    moved = rccc.solve(
+        cirelli, AT, errors(0.0, hole4__offset_t=1e-4), THETA
+    ).slide  # t of arm 4 is -x: along the input pin
     assert_allclose(moved, np.outer(np.ones(73), [-1e-4, 0, 0]), atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["pin1__tilt_z", "hole4__tilt_t"])
 def test_psi_grows_with_alpha_and_vanishes_for_coaxial_shafts(cirelli, errors, name):
     size = {name: np.radians(0.5)}
-    largest = [np.abs(rccc.solve(cirelli, errors(a, **size), THETA).psi).max() for a in (0.0, 5.0, 15.0, 30.0)]
+    largest = [np.abs(rccc.solve(cirelli, AT, errors(a, **size), THETA).psi).max() for a in (0.0, 5.0, 15.0, 30.0)]
     assert largest[0] < 1e-14
     assert np.all(np.diff(largest) > 1e-5)
 
 
 @pytest.mark.parametrize("name", ["pin1__tilt_t", "hole4__tilt_z"])
 def test_a_tilt_that_leaves_every_angle_between_axes_a_right_one_leaves_psi_zero(cirelli, errors, name):
-    found = rccc.solve(cirelli, errors(**{name: np.radians(0.5)}), THETA)
+    found = rccc.solve(cirelli, AT, errors(**{name: np.radians(0.5)}), THETA)
     assert_allclose(found.psi, 0, atol=1e-12)
 
 
 def test_half_a_turn_exchanges_opposite_pins(cirelli, errors):
     one = errors(pin1__tilt_t=0.01, hole4__tilt_z=0.02, pin3__offset_z=1e-4, hole1__tilt_t=-0.01)
     other = errors(pin2__tilt_t=0.01, hole3__tilt_z=0.02, pin4__offset_z=1e-4, hole2__tilt_t=-0.01)
-    found = rccc.solve(cirelli, one, THETA, input_pin=3, output_pin=1)
-    turned = rccc.solve(cirelli, other, THETA + np.pi, input_pin=4, output_pin=2)
+    found = rccc.solve(cirelli, AT, one, THETA, input_pin=3, output_pin=1)
+    turned = rccc.solve(cirelli, AT, other, THETA + np.pi, input_pin=4, output_pin=2)
     for name in ("speed_ratio", "slide", "couple", "cross_loads", "pair_angle"):
         sign = np.array([-1, -1]) if name == "pair_angle" else 1
         assert_allclose(getattr(turned, name), sign * getattr(found, name), atol=1e-10, err_msg=name)
-    left_out = rccc.solve(cirelli, other, THETA, input_pin=3, output_pin=1)
+    left_out = rccc.solve(cirelli, AT, other, THETA, input_pin=3, output_pin=1)
     assert_allclose(left_out.psi, 0, atol=1e-13)
 
 
 def test_no_pose_where_the_spherical_linkage_has_none(cirelli, errors):
     row = errors(89.0, pin1__tilt_t=np.radians(3), hole4__tilt_t=np.radians(3))
     theta = np.linspace(-np.pi, np.pi, 400)
-    found = rccc.solve(cirelli, row, theta)
+    found = rccc.solve(cirelli, AT, row, theta)
     closes = np.isfinite(found.output_angle)
     _, d, branches = four_bar(row, cirelli.cross.R, np.radians(89), theta)
     assert 0 < closes.sum() < 400
@@ -264,7 +267,7 @@ def test_no_pose_where_the_spherical_linkage_has_none(cirelli, errors):
 @pytest.mark.parametrize(("input_pin", "output_pin"), KEPT)
 @pytest.mark.parametrize("alpha", [0.0, 15.0, 30.0])
 def test_ideal_joint_passes_the_couple_of_the_closed_form(cirelli, errors, alpha, input_pin, output_pin):
-    found = rccc.solve(cirelli, errors(alpha), THETA, input_pin=input_pin, output_pin=output_pin)
+    found = rccc.solve(cirelli, AT, errors(alpha), THETA, input_pin=input_pin, output_pin=output_pin)
     couple = ideal.cross_couple(THETA, np.radians(alpha), TORQUE)
     assert_allclose(found.couple, couple, rtol=1e-12)
     shares = found.couple / (2 * cirelli.cross.R)
@@ -277,7 +280,7 @@ def test_ideal_joint_passes_the_couple_of_the_closed_form(cirelli, errors, alpha
 
 @pytest.mark.parametrize("seed", range(3))
 def test_torque_alone_goes_through_as_a_couple_normal_to_both_pins(cirelli, errors, seed):
-    found = rccc.solve(cirelli, errors(seed=seed), THETA)
+    found = rccc.solve(cirelli, AT, errors(seed=seed), THETA)
     u1, u2, a = (found.lines.axis[:, k] for k in (1, 2, 3))
     normal = np.cross(u1, u2)
     expected = TORQUE * normal / np.sum(normal * a, axis=1, keepdims=True)
@@ -291,7 +294,7 @@ def test_torque_alone_goes_through_as_a_couple_normal_to_both_pins(cirelli, erro
 def loaded(cirelli, errors):
     """A linkage with errors, and arbitrary forces and moments on every link."""
     row = errors(20.0, seed=7)
-    found = rccc.solve(cirelli, row, THETA, input_pin=4, output_pin=2)
+    found = rccc.solve(cirelli, AT, row, THETA, input_pin=4, output_pin=2)
     external = np.random.default_rng(8).normal(0, [[[300.0] * 3 + [20.0] * 3]], (73, 3, 6))
     return row, found, external, rccc.react(found.lines, external)
 
@@ -330,7 +333,7 @@ def test_motion_is_the_one_that_the_constraints_leave(cirelli, errors):
     row = errors(20.0, seed=9)
     moving = twists(cirelli, row, THETA)
     moving[..., :3] /= cirelli.cross.R
-    jacobian = rccc.constraint_jacobian(rccc.solve(cirelli, row, THETA).lines)
+    jacobian = rccc.constraint_jacobian(rccc.solve(cirelli, AT, row, THETA).lines)
     assert_allclose(np.einsum("kij,kj->ki", jacobian, moving.reshape(-1, 18)), 0, atol=1e-7)
 
 
@@ -346,7 +349,7 @@ def test_elastic_reference_joints_carry_the_couple_of_the_linkage(cirelli, error
         force, torque = loads[:, k, :3] @ local, loads[:, k, 3:] @ local
         couple += torque + np.cross(cirelli.cross.r_b * local[0], force)
 
-    linkage = rccc.solve(cirelli, errors(**error), theta)
+    linkage = rccc.solve(cirelli, AT, errors(**error), theta)
     mass, inertia = cirelli.arm.mass, cirelli.arm.inertia
     about_shaft = cirelli.shaft.Js + 2 * (mass * cirelli.cross.R**2 + inertia[2])
     slope = -np.cos(alpha) * np.sin(alpha) ** 2 * np.sin(2 * theta) / (1 - (np.sin(alpha) * np.cos(theta)) ** 2) ** 2
@@ -362,7 +365,7 @@ def test_elastic_reference_joints_carry_the_couple_of_the_linkage(cirelli, error
 
 def test_one_row_may_come_as_a_scalar_or_as_a_table_of_one(cirelli, errors):
     row = errors(seed=1)
-    assert_array_equal(rccc.solve(cirelli, row[0], 0.3).psi, rccc.solve(cirelli, row, [0.3]).psi)
+    assert_array_equal(rccc.solve(cirelli, AT, row[0], 0.3).psi, rccc.solve(cirelli, AT, row, [0.3]).psi)
 
 
 @pytest.mark.parametrize(
@@ -376,9 +379,9 @@ def test_one_row_may_come_as_a_scalar_or_as_a_table_of_one(cirelli, errors):
 )
 def test_what_cannot_be_a_cardan_joint_is_refused(cirelli, errors, change, kept, message):
     with pytest.raises(ValueError, match=message):
-        rccc.solve(cirelli, errors(**change), THETA, **kept)
+        rccc.solve(cirelli, AT, errors(**change), THETA, **kept)
 
 
 def test_one_joint_at_a_time(cirelli, errors):
     with pytest.raises(ValueError, match="2 joints"):
-        rccc.solve(cirelli, np.repeat(errors(), 2), THETA)
+        rccc.solve(cirelli, AT, np.repeat(errors(), 2), THETA)

@@ -97,15 +97,15 @@ def mixed(cirelli):
         joint = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
         n = 7
         operation = joints.Operation.model_construct(alpha=0.3, speed=52.0, torque=100.0)
-        errors = joints.nominal_errors(n, operation)
+        errors = joints.nominal_errors(n)
         for name in errors.dtype.names:
             if "offset" in name or "diameter" in name:
                 errors[name] = rng.normal(0, 2e-5, n)
             elif "tilt" in name:
                 errors[name] = rng.normal(0, 2e-3, n)
-        errors["operation.torque"][3], errors["operation.speed"][4] = 5.0, 300.0
-        errors["operation.alpha"][5] = 0.9
-        rows.append(joints.perturb(joint, errors))
+        errors["operation.torque"][3], errors["operation.speed"][4] = 5.0 - 100.0, 300.0 - 52.0
+        errors["operation.alpha"][5] = 0.9 - 0.3
+        rows.append(joints.perturb(joint, operation, errors))
     params = np.concatenate(rows)
     params["clearance"][6] = -1e-5
     params["clearance"][9], params["c_t"][16] = 0.0, 0.0

@@ -18,6 +18,7 @@ from tests.support.environment import ROOT
 from tolstat.analysis.exceedance import clopper_pearson
 from tolstat.common.tables import Status
 from tolstat.display import style
+from tolstat.joint import operating
 from tolstat.questions.bearing_life.rendering import curve
 from tolstat.questions.fatigue import parts_rendering
 
@@ -116,12 +117,12 @@ def kind(status: np.ndarray) -> np.ndarray:
 def fuzz(folder: Path) -> None:
     """Draw the status of each joint by angle and speed."""
     with tolstat.open(folder / "fuzz.h5") as store:
-        errors, status = store.errors()[1:], store.status()[1:]
+        point, status = operating(store.operation, store.errors()[1:]), store.status()[1:]
     figure, ax = plt.subplots(figsize=(7, 3.8), layout="constrained")
     kinds = kind(status)
     for name, marker in (("ok", "o"), ("stationary", "s"), ("other", "x")):
         at = kinds == name
-        speed, angle = errors["operation.speed"][at] / RPM, np.degrees(errors["operation.alpha"][at])
+        speed, angle = point["speed"][at] / RPM, np.degrees(point["alpha"][at])
         label = "another status" if name == "other" else name
         ax.plot(speed, angle, marker, color=COLOURS[name], label=f"{label}: {at.sum()}", ms=5, alpha=0.8)
     ax.set(xlabel="speed of the input shaft (1/min)", ylabel="misalignment α (°)")

@@ -1,4 +1,4 @@
-"""``NUMBA_CACHE_DIR=FOLDER python -m tests.measure.never_repeating``: joints that never repeat, watched longer.
+"""``python -m tests.measure.never_repeating``: joints that never repeat, watched longer.
 
 Stationary joints at 15 deg, 3000 rpm and 100 N m go on for a thousand revolutions: how many of the largest loads of
 each hundred lie in the intervals that 48 revolutions gave. Ten chaotic ones are integrated by scipy's RK45 (rtol 1e-6)
@@ -7,7 +7,6 @@ beside a neighbour: exponent, and largest loads of one revolution after the othe
 
 from __future__ import annotations
 
-import os
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +16,8 @@ from numpy.typing import NDArray
 
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
+from tolstat.common import tables
 from tolstat.common.tables import RESULT, SPAN, Motion, Options, Status
-from tolstat.kernel.revolution import resolve
 from tolstat.solver import refinement
 from tolstat.solver.reference import first_order
 from tolstat.solver.simulation import _together, explicit_steps, simulate_rows
@@ -40,7 +39,7 @@ class Exponent(NamedTuple):
 def rattling(n: int) -> NDArray[np.void]:
     """Joints of the first study where the torque reverses, (n,) PARAM."""
     plan = study.load(STUDY, n=n)
-    params = joint.perturb(plan.joint, sampling.draw(plan)[1:])
+    params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[1:])
     params["alpha"], params["omega"], params["torque"] = np.radians(15), 3000 * np.pi / 30, 100.0
     return params
 
@@ -50,7 +49,8 @@ def watch(params: NDArray[np.void], revolutions: int) -> tuple[NDArray[np.void],
     options = refinement.settings(Options())._replace(max_revs=revolutions)
     results = np.zeros(len(params), RESULT).view(np.recarray)
     blocks = np.zeros((len(params), revolutions), RESULT).view(np.recarray)
-    list(_together(params, options, False, results, blocks, explicit_steps(params, Options())))
+    left = np.full(len(params), 2**62)
+    list(_together(params, options, left, False, results, blocks, explicit_steps(params, Options())))
     return results.view(np.ndarray), blocks.view(np.ndarray)
 
 
@@ -126,9 +126,7 @@ def compare(params: NDArray[np.void], told: NDArray[np.void]) -> None:
 
 
 if __name__ == "__main__":
-    if "NUMBA_CACHE_DIR" not in os.environ:
-        raise SystemExit("set NUMBA_CACHE_DIR to an empty folder: the kernels are compiled with another bound")
-    resolve.MOST_ITERATIONS = 10**9
+    tables.MOST_ITERATIONS = 10**9
     params = rattling(512)
     told = simulate_rows(params, Options()).results
     never = np.flatnonzero((told["status"] == Status.STATIONARY) & (told["motion"] != Motion.SUBHARMONIC))

@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 
 from tolstat.common.tables import Status
-from tolstat.joint import ideal, perturb
+from tolstat.joint import ideal, operating, perturb
 from tolstat.store import Reader
 from tolstat.store.recorded import joint_of
 
@@ -25,13 +25,14 @@ def draw(source: Path, target: Path) -> None:
         errors, status = store.errors(), store.status()
         rows = np.arange(store.first_sample, len(errors))
         errors, status = errors[rows], status[rows]
-        params = perturb(joint_of(store, 1), errors)
-    speeds, torques = (np.unique(errors[f"operation.{name}"].round(6)) for name in ("speed", "torque"))
+        params = perturb(joint_of(store, 1), store.operation, errors)
+        point = operating(store.operation, errors)
+    speeds, torques = (np.unique(point[name].round(6)) for name in ("speed", "torque"))
     figure, ax = plt.subplots(figsize=(7.5, 5.2), layout="constrained")
     shares = np.full((len(torques), len(speeds)), np.nan)
     for i, torque in enumerate(torques):
         for k, speed in enumerate(speeds):
-            here = np.isclose(errors["operation.speed"], speed) & np.isclose(errors["operation.torque"], torque)
+            here = np.isclose(point["speed"], speed) & np.isclose(point["torque"], torque)
             ok, stationary = (np.mean(status[here] == s) for s in (Status.OK, Status.STATIONARY))
             shares[i, k] = ok + stationary
             more = f"\n+ {100 * stationary:.0f} % stat." if stationary > 0 else ""

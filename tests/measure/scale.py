@@ -66,7 +66,8 @@ def measure(n: int, folder: Path, block: int = 4096, results: Sequence[str] = ()
     with Reader.open(path) as store:
         assert store.complete
         last = store.results(slice(n, n + 1))["F_max"][0, 0]
-    expected = 600.0 + 1e6 * joint.perturb(plan.joint, sampling.draw(plan, range(n, n + 1)))["pin_point"][0, 0, 1]
+    params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan, range(n, n + 1)))
+    expected = 600.0 + 1e6 * params["pin_point"][0, 0, 1]
     assert last == expected
     made, half, resumed, rest = np.diff(times)
     found = {

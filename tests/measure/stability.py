@@ -59,7 +59,7 @@ def rows_of(path: Path, n: int, law: str, torque: float | None) -> Table:
     """The first `n` joints of a study, all with one contact law, at a torque (N m) or their own."""
     plan = study.load(path, n=n)
     changed = joint.load("cirelli2021", {"contact": {"law": law}}, str(path))
-    params = joint.perturb(changed, sampling.draw(plan)[1:])
+    params = joint.perturb(changed, plan.operation, sampling.draw(plan)[1:])
     if torque is not None:
         params["torque"] = torque
     return params

@@ -73,7 +73,7 @@ def test_what_the_joints_cannot_show_needs_new_runs(path):
     assert not found.holds
     assert found.verdict.startswith("needs new runs")
     assert found.aim == "step"
-    assert found.weights.usable
+    assert found.limits["usable"].all()
     assert found.tolerances.set_index("tolerance").loc["pin[12].offset_t", "factor"] < 1.0
 
 
@@ -102,6 +102,7 @@ def test_search_finds_the_optimum_of_a_problem_with_a_known_one():
     problem = allocation.Problem(
         lambda f: (norm.logpdf(x, 0, f) - norm.logpdf(x)).sum(axis=1),
         lambda f: float(-np.log(f * np.sqrt(2 - f**2)).sum()),
+        lambda f: True,
         (x.sum(axis=1) > limit)[:, None],
         np.array([target]),
         lambda f: float((prices / f).sum()),
@@ -116,14 +117,33 @@ def test_search_finds_the_optimum_of_a_problem_with_a_known_one():
     assert found.factors == pytest.approx([2 ** (1 / 3) * f2, f2], rel=0.03)
 
 
+def test_a_mean_off_centre_moves_with_its_band(tmp_path):
+    mean = '"pin*.offset_t" = { plus_minus = "0.1 mm", mean = "0.045 mm", distribution = "normal", cpk = 0.8 }\n#'
+    text = TWO.replace('"pin[12].offset_t" =', mean)
+    tolerance = next(t for t in scaling.tolerances(load(tmp_path, text)) if "offset" in t.pattern)
+    for factor in (0.25, 0.8, 2.0):
+        found = tolerance.distribution(tolerance.scaled(factor))
+        assert (found.mean, found.sigma) == pytest.approx((factor * 4.5e-5, factor * 5.5e-5 / 2.4))
+    with Reader.open(campaign(tmp_path, text, "off")) as store:
+        found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 0.5"])
+    row = found.tolerances.set_index("tolerance").loc["pin*.offset_t"]
+    assert 0.5 < row["factor"] < 1.0
+    new = load(tmp_path, found.text, "new").tolerances["pin1.offset_t"]
+    assert new.mean / new.sigma == pytest.approx(4.5e-5 / (5.5e-5 / 2.4), rel=0.01)
+
+
 def test_mean_square_is_of_the_scaled_distribution_where_the_mean_is_not_in_the_middle(tmp_path):
     mean = '"pin*.offset_t" = { lower = "-0.1 mm", upper = "0.2 mm", mean = "0.02 mm", distribution = "normal" }\n#'
     plan = load(tmp_path, synthetic.STUDY.replace('"pin*.offset_t" =', mean))
     ratios = DensityRatios(plan, scaling.tolerances(plan), sampling.draw(plan))
-    # the band from -0.115 to 0.215 mm has its nearer end 0.135 mm from the mean in place of 0.12 mm
-    ratio = 0.135 / 0.12
+    # the mean, 0.75 sigma below the middle of the band, moves with the band: by a tenth of that
+    shift, room = 0.1 * 0.03 / 0.04, 2.0 - 1.1**2
     found = ratios.log_mean_square(np.array([1.1]))
-    assert found == pytest.approx(-4 * np.log(ratio * np.sqrt(2 - ratio**2)))
+    assert found == pytest.approx(4 * (shift**2 / room - np.log(1.1 * np.sqrt(room))))
+    exact = ratios.exact(np.array([1.1]))
+    assert exact == (pytest.approx(found), pytest.approx(found), np.inf)
+    bounded = ratios.exact(np.array([0.8]))
+    assert bounded.largest == pytest.approx(4 * (0.5 * (0.2 * 0.75) ** 2 / (1 - 0.8**2) - np.log(0.8)))
 
 
 def test_entries_are_scaled_about_the_middle_and_texts_keep_their_comments(tmp_path):
@@ -138,7 +158,11 @@ def test_entries_are_scaled_about_the_middle_and_texts_keep_their_comments(tmp_p
     plan = load(tmp_path, text)
     tilt, hole, radial, offset = scaling.tolerances(plan)
     assert tilt.scaled(0.5, 3)["plus_minus"] == "0.25 deg"
-    assert hole.scaled(0.5) == hole.entry | {"lower": "0.0075 mm", "upper": "22.5 um", "peak": "12.5 um"}
+    # a limit at zero stays there, as that of H7
+    assert hole.scaled(0.5) == hole.entry | {"upper": "15.0 um", "peak": "5.0 um"}
+    hole = hole._replace(entry=hole.entry | {"lower": "-10 um"})
+    assert hole.scaled(0.5) == hole.entry | {"lower": "0.0 um", "upper": "20.0 um"}
+    hole = hole._replace(entry=hole.entry | {"lower": "0 mm"})
     assert radial.width == pytest.approx(9e-5)
     assert (radial.widens, hole.widens) == (True, False)
     new = scaling.rewritten(plan, {t.pattern: t.scaled(0.5) for t in (hole, radial)}, 7)

@@ -12,13 +12,16 @@ from tests.support import synthetic, views
 from tolstat import joint
 from tolstat.analysis.exceedance import clopper_pearson
 from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.errors import StoreError
+from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PINS, Mode, Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table, Text
+from tolstat.joint import Operation
 from tolstat.questions.bearing_life import query, rendering
 from tolstat.questions.bearing_life.lives import PLACES, lives_of
 from tolstat.questions.bearing_life.section import sections
+from tolstat.store.recorded import operating_points
+from tolstat.study.points import Point
 
 BEARING = {"C": "22 kN", "needles": 32, "needle_diameter": "4 mm", "pitch_diameter": "42 mm", "required_life": "8e6 h"}
 
@@ -38,14 +41,86 @@ def answer(made):
 
 
 def test_lives_in_hours():
-    made = view(alpha=np.radians(15))
+    made = view()
     lives, loads = lives_of(made), made.read_results(("equivalent_load",))["equivalent_load"]
-    rpm = 52.36 * 30 / np.pi
-    pins = 1.5e6 / (15 * rpm) * (22e3 / loads) ** (10 / 3)  # the formula of catalogues
+    rpm, angle = 52.36 * 30 / np.pi, np.degrees(views.OPERATION.alpha)
+    pins = 1.5e6 / (angle * rpm) * (22e3 / loads) ** (10 / 3)  # the formula of catalogues
     np.testing.assert_allclose(lives.hours[:, :4], pins, rtol=1e-12)
     np.testing.assert_allclose(lives.hours[:, 4], (pins**-1.125).sum(axis=1) ** (-1 / 1.125), rtol=1e-12)
-    assert lives.nominal_hours[0] == pytest.approx(1.5e6 / (15 * rpm) * (22e3 / 600.0) ** (10 / 3))
+    assert lives.nominal_hours[0] == pytest.approx(1.5e6 / (angle * rpm) * (22e3 / 600.0) ** (10 / 3))
     assert lives.required == pytest.approx(8e6)
+
+
+def duty(shares=(0.75, 0.25), change=None, loads=(1000.0, 2000.0)):
+    """Bearings at two points: 15 deg and 600 rpm; 30 deg and 100 rpm. A constant equivalent load at each."""
+    tables = {"cruise": synthetic.results(4), "climb": synthetic.results(4)}
+    for table, load in zip(tables.values(), loads, strict=True):
+        table["equivalent_load"] = load
+    if change:
+        change(tables)
+    points = [
+        Point(name, Operation.model_construct(alpha=np.radians(angle), speed=rpm * np.pi / 30, torque=100.0), share)
+        for name, angle, rpm, share in zip(tables, (15.0, 30.0), (600.0, -100.0), shares, strict=True)
+    ]
+    return views.at_points(tables, joint=held(), points=points)
+
+
+def test_a_duty_cycle_is_a_miner_sum_over_its_points():
+    """By hand: L10 at a point is (C/P)^(10/3) million turns, 4 alpha/2 pi of them a revolution of the shaft.
+
+    Cruise: 600 rpm and 15 deg are 600*60/6 = 6000 turns an hour, 22^(10/3) = 29 836.11 million last 4 972 686 h.
+    Climb: 100 rpm and 30 deg are 2000 turns an hour, 11^(10/3) = 2960.1175 million last 1 480 059 h.
+    An hour uses 0.75/4 972 686 + 0.25/1 480 059 = 3.197362e-7 of a bearing, which so lasts 3 127 579 h.
+    """
+    lives = lives_of(duty())
+    cruise, climb = 1e6 * 22 ** (10 / 3) / 6000, 1e6 * 11 ** (10 / 3) / 2000
+    expected = 1.0 / (0.75 / cruise + 0.25 / climb)
+    assert (cruise, climb, expected) == pytest.approx((4_972_686, 1_480_059, 3_127_579), rel=1e-6)
+    np.testing.assert_allclose(lives.hours[:, :4], expected, rtol=1e-12)
+    np.testing.assert_allclose(lives.hours[:, 4], expected * 4 ** (-8 / 9), rtol=1e-12)
+    # the mean load of 4500 turns at 1000 N and 500 at 2000 N
+    np.testing.assert_allclose(lives.loads, (0.9 * 1000 ** (10 / 3) + 0.1 * 2000 ** (10 / 3)) ** 0.3, rtol=1e-12)
+    np.testing.assert_allclose(lives.nominal_hours[0], expected)
+    assert lives.duty == {"cruise": 0.75, "climb": 0.25}
+    assert any(n.startswith("over a duty cycle: 75 % at cruise, 25 % at climb") for n in rendering.notes(lives, []))
+
+
+def test_one_point_of_a_duty_cycle_alone():
+    made = duty()
+    np.testing.assert_allclose(lives_of(made.at("climb")).hours[:, 0], 1e6 * 11 ** (10 / 3) / 2000)
+    assert lives_of(made.at("climb")).duty == {"climb": 1.0}
+
+
+def test_a_bearing_without_load_at_one_point_lasts_by_the_other():
+    np.testing.assert_allclose(lives_of(duty(loads=(1000.0, 0.0))).hours[:, 0], 1e6 * 22 ** (10 / 3) / 6000 / 0.75)
+    assert np.isinf(lives_of(duty(loads=(0.0, 0.0))).hours).all()
+
+
+def test_shares_of_the_time_are_needed():
+    with pytest.raises(InputError, match=r"without a share of the time\n.*--point cruise"):
+        lives_of(duty(shares=(np.nan, np.nan)))
+
+
+def test_a_joint_that_fails_at_one_point_has_no_life():
+    def failing(tables):
+        tables["climb"]["status"][2] = Status.NEWTON_FAILED
+        tables["climb"]["equivalent_load"][2] = np.nan
+
+    made = duty(change=failing)
+    assert np.isnan(lives_of(made).hours).all(axis=1).tolist() == [False, True, False]
+    assert query.below(lives_of(made)).iloc[-1]["n_failed"] == 1
+
+
+def test_contact_modes_count_by_the_revolutions_of_a_point():
+    """Revolutions are 0.75*600 to 0.25*100, so climb has a nineteenth of them."""
+
+    def at_one_end(tables):
+        for table, mode in zip(tables.values(), (Mode.UNIFORM, query.LOADED["one_end"]), strict=True):
+            table["mode_share"] = 0.0
+            table["mode_share"][:, :, mode] = 1.0
+
+    assert query.contacts(duty(change=at_one_end))["one_end"].tolist() == [0.0] * 5
+    assert query.contacts(duty((0.1, 0.9), at_one_end))["one_end"].tolist() == [1.0] * 5  # 90 to 60 of 150
 
 
 def test_shares_and_quantiles_are_those_of_the_lives():
@@ -197,7 +272,7 @@ def test_bearings_may_be_edited_after_the_run(tmp_path):
     tolstat.run(tolstat.load(file), target, workers=1)
     with tolstat.open(target) as store:
         first, created = tolstat.lives_of(store.view()), store.created
-        torque = store.errors()["operation.torque"][1:]
+        torque = operating_points(store)["torque"][1:]
     assert (first.status == Status.OK).all()
     # without inertia to speak of, forces and equivalent loads are in proportion to the torque
     np.testing.assert_allclose(

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from tests.support import synthetic
 from tolstat.analysis import exceedance, sensitivity
 from tolstat.cli import app
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.tables import SIMULATED, Simulation, Status
 from tolstat.display.asked import Asked
 from tolstat.display.text import value
@@ -188,12 +189,12 @@ def test_capability_of_each_limit_and_of_all_together(path):
         known = store.view()
         table = capability.limits(known).set_index("load")
         loads = known.loads(list(known.limits))
-    assert list(table.index) == [*known.limits, capability.TOGETHER]
+    assert list(table.index) == [*known.limits, ALL_LIMITS]
     share = exceedance.exceedance(known.load("cross1.F").values, known.status, known.limits["cross1.F"])
     assert table.loc["cross1.F", "ppm"] == pytest.approx(1e6 * share.estimate)
     above = pd.DataFrame({load.name: load.values > load.limit for load in loads})
-    assert table.loc[capability.TOGETHER, "count"] == above[known.status == Status.OK].any(axis=1).sum()
-    assert table.loc[capability.TOGETHER, "good"] <= table["good"].min()
+    assert table.loc[ALL_LIMITS, "count"] == above[known.status == Status.OK].any(axis=1).sum()
+    assert table.loc[ALL_LIMITS, "good"] <= table["good"].min()
     assert (table["ppm_lower"] <= table["ppm"]).all()
     assert (table["ppm"] < table["ppm_upper"]).all()
 

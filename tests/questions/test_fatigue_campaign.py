@@ -152,7 +152,7 @@ def test_a_campaign_without_a_valid_joint(tmp_path):
     tolstat.run(tolstat.load(source, n=3), out, workers=1)
     done = call("fatigue", out)
     assert done.exit_code == 0, done.output
-    assert len(done.stdout.splitlines()) == 1 + 64 + 3 + 8
+    assert len(done.stdout.splitlines()) == 1 + 64 + 3 + 9
     page = rendering.figure(load_cycles([out]))
     assert all("no joint" in ax.texts[0].get_text() for ax in page.axes)
 
@@ -243,7 +243,7 @@ def test_command_prints_loads_and_damage(campaign, tmp_path):
     out = tmp_path / "loads.csv"
     done = call("fatigue", campaign(), campaign("cycles", 5.0), "--share", 0.5, "--share", 0.5, "--out", out)
     assert done.exit_code == 0, done.stderr
-    assert len(done.stdout.splitlines()) == 1 + 16 + 3 + 8
+    assert len(done.stdout.splitlines()) == 1 + 16 + 3 + 9
     assert "share of joints whose damage sum exceeds 1" in done.stdout
     frame = pd.read_csv(out)
     assert len(frame) == 64 * 3

@@ -153,6 +153,22 @@ def test_two_files_of_the_same_joints_stopped_and_gone_on_with(tmp_path, plan):
     assert simulated == []
 
 
+@pytest.mark.slow
+def test_progress_names_the_fidelity_and_counts_its_joints(tmp_path, plan):
+    seen, names = [], []
+    multifidelity.two_fidelities(
+        study.load(plan),
+        *("quasistatic:36", "dynamic", tmp_path, 0.05),
+        pilot=16,
+        workers=1,
+        tell=lambda _: None,
+        stage=names.append,
+        progress=lambda c: seen.append((names[-1], c.done, c.total)),
+    )
+    assert names[:3] == ["high fidelity", "low fidelity", "cost of a joint"]
+    assert {("high fidelity", 17, 17), ("low fidelity", 17, 17)} <= set(seen)
+
+
 def test_every_fault_is_told(tmp_path, plan):
     done = CliRunner().invoke(app, ["multifidelity", str(plan), "--low", "auto", "--high", "dynamic:x"])
     assert done.exit_code == 2

@@ -19,10 +19,12 @@ from tolstat import sampling, study
 from tolstat.analysis import subset
 from tolstat.analysis.subset import Settings, Walk
 from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
 from tolstat.questions.rare import query as rare
+from tolstat.questions.rare import rendering
 from tolstat.store import Reader, ResultStore
 from tolstat.store.recall import recall
 
@@ -100,11 +102,11 @@ def load(folder, text=PLAN, name="plan"):
 
 def asked(plan, beta=2.5, **more):
     above = 700.0 + 100.0 * beta
-    question = {"load": "cross1.F", "above": above, "per_level": 100, "p0": 0.5}
+    question = {"load": "cross1.F", "levels": {"cross1.F": above}, "per_level": 100, "p0": 0.2}
     return study.subset_of(plan, question | more)
 
 
-def perturb(joint, errors):
+def perturb(joint, operation, errors):
     params = np.zeros(len(errors), PARAM)
     params["R"] = sum(errors[f"pin{i}.offset_t"] for i in (1, 2, 3, 4)) * 3e4 / SIGMA
     params["alpha"] = errors["pin1.offset_t"] * 3e4
@@ -132,6 +134,8 @@ def stages(simulate=simulate):
 
 
 RUN = campaign.run
+SEEN = []
+"""Counts that `once` reports."""
 
 
 @pytest.fixture(autouse=True)
@@ -146,7 +150,7 @@ def once(tmp_path_factory):
     plan, path = asked(load(folder)), folder / "whole.h5"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(campaign, "run", partial(RUN, stages=stages()))
-        return plan, rare.run(plan, path, tell=lambda _: None), path
+        return plan, rare.run(plan, path, tell=lambda _: None, progress=SEEN.append), path
 
 
 @pytest.fixture
@@ -170,6 +174,16 @@ def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
     assert (loads[origin["parent"][last]] > found.levels[-1].threshold).all()
     moved = np.corrcoef(errors["pin3.offset_t"][last], errors["pin3.offset_t"][origin["parent"][last]])[0, 1]
     assert 0.3 < moved < 0.95
+
+
+@pytest.mark.slow
+def test_progress_counts_joints_of_all_levels(whole):
+    _, found, _ = whole
+    seen = [(counts.done, counts.total) for counts in SEEN]
+    assert seen[0] == (0, 101)
+    assert seen[-1] == (found.joints + 1, found.joints + 1)
+    assert sorted(seen) == seen
+    assert len({total for _, total in seen}) > 2
 
 
 @pytest.mark.slow
@@ -231,7 +245,7 @@ def test_joints_without_a_load_are_counted_on_the_side_asked_for(tmp_path, whole
 @pytest.mark.slow
 def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
     plan, _, path = whole
-    with pytest.raises(StoreError, match=r"sampling.above: 950.0 in the file, 960.0 in the study"):
+    with pytest.raises(StoreError, match=r"sampling.levels.cross1.F: 950.0 in the file, 960.0 in the study"):
         rare.run(asked(load(tmp_path), 2.6), path)
     with ResultStore.open_to_write(path) as store:
         results = store.results()
@@ -248,10 +262,13 @@ def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, 
     assert done.exit_code == 0, done.stderr
     said = json.loads(done.stdout)
     assert said["probability"] == found.estimate.probability
-    assert len(said["levels"]) == len(found.levels)
+    assert len(said["seeds"][0]["levels"]) == len(found.levels)
+    assert said["seeds"][0]["ancestors"] == found.ancestors
     assert "failed or not settled" in done.stderr
     table = CliRunner().invoke(app, ["rare", str(path)])
-    assert table.stdout.splitlines()[-1].startswith("P(cross1.F > 950 N) = ")
+    assert "P(cross1.F > 950 N) = " in table.stdout
+    assert "of 100 joints of level 0" in table.stdout
+    assert "--near" in table.stderr
     for command in (["report"], ["capability"], ["reweight", "--set", "pin1.offset_t.cpk=1.1"]):
         refused = CliRunner().invoke(app, [command[0], str(path), *command[1:]])
         assert refused.exit_code == 2
@@ -260,6 +277,7 @@ def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, 
     assert CliRunner().invoke(app, ["rare", str(path), "--n", "300"]).exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
     plan, found, path = whole
     monkeypatch.setattr(campaign, "versions", lambda: dict.fromkeys(("tolstat", "sources"), "other"))
@@ -289,3 +307,62 @@ def test_every_fault_of_a_question_is_told(tmp_path):
     assert not (tmp_path / "no.h5").exists()
     with pytest.raises(InputError, match="is set by tolstat rare"):
         load(tmp_path, PLAN.replace("seed = 2021", 'seed = 2021\nmethod = "subset"'))
+
+
+def test_limits_by_pattern_and_all_limits_together(tmp_path):
+    plan = load(tmp_path)
+    several = rare.subset_study(plan, "cross*.F > 950 N", 100, 0.5).sampling.limit
+    assert several.loads == ("cross1.F", "cross2.F", "cross3.F", "cross4.F")
+    every = rare.subset_study(plan, "any limit", 100, 0.5).sampling.limit
+    assert dict(zip(every.loads, every.levels, strict=True)) == plan.limits
+
+
+def seeds_of(load, limit, n=200, seeds=4):
+    return [walk_of(load, n, limit, seed, dimensions=2) for seed in range(seeds)]
+
+
+def test_ancestors_are_the_joints_of_level_0_that_the_last_descend_from():
+    walk = walk_of(linear, 200, 3.5, 1)
+    assert 1 <= walk.ancestors <= 200 * 0.1
+    assert walk_of(linear, 200, 0.5, 1).ancestors == round(200 * walk_of(linear, 200, 0.5, 1).levels[0].share)
+
+
+def test_seeds_that_miss_a_way_disagree_and_their_interval_holds_both():
+    """A way by error 0 that all seeds see; a steep one by error 1, more probable, that few take."""
+
+    def two_ways(z):
+        return np.maximum(z[:, 0], np.where(z[:, 1] > 2.6, 3.0 * z[:, 1] - 1.0, -9.0))
+
+    walks = [walk_of(two_ways, 100, 4.2, seed, dimensions=2) for seed in range(8)]
+    found, agree = rendering.together([walk.estimate() for walk in walks])
+    truth = 1.0 - norm.cdf(4.2) * norm.cdf(2.6)
+    assert not agree
+    assert found.lower < truth < found.upper
+    same, agree = rendering.together([walk.estimate() for walk in seeds_of(linear, 3.5)])
+    assert agree
+    assert same.lower < norm.sf(3.5) < same.upper
+
+
+def test_intervals_of_four_seeds_cover():
+    found = [
+        rendering.together([walk_of(linear, 100, 2.5, 4 * k + i, 3).estimate() for i in range(4)])[0] for k in range(60)
+    ]
+    assert np.mean([one.lower < norm.sf(2.5) < one.upper for one in found]) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / 60)
+
+
+def hang_together(params, options, histories="none", n_harmonics=0):
+    while len(params) > 6:
+        pass
+    return simulate(params, options)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("supervised")
+def test_a_stage_whose_blocks_outlast_their_limit_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr(rare, "Execution", partial(Execution, joint_timeout=0.01))
+    plan, whole, parts = asked(load(tmp_path), beta=-1.0, per_level=20), tmp_path / "a.h5", tmp_path / "b.h5"
+    rare.run(plan, whole, tell=lambda _: None)
+    monkeypatch.setattr(campaign, "run", partial(RUN, stages=stages(hang_together)))
+    found = rare.run(plan, parts, tell=lambda _: None)
+    assert (found.reached, found.joints) == (True, 20)
+    assert datasets(parts) == datasets(whole)

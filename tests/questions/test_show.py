@@ -38,6 +38,8 @@ SLIM = {
     "arm": {"l_f": "30 mm"},
 }
 """A joint with pins a quarter as thick as those of the paper's."""
+SHORT = {"pin": {"l": "15 mm"}}
+"""A joint whose hub reaches nearly to the holes."""
 
 
 def drawn(draw, *args, size=(4.9, 4.9), **kwargs):
@@ -115,9 +117,9 @@ def arrows(cirelli):
 def test_arrow_of_an_error_has_the_sense_that_perturb_gives_it(cirelli, arrows, kind, name):
     """A small positive error of pin 1 or hole 4, in axes of its frame, against the arrow on the drawing."""
     feature = {"pin": "pin1", "hole": "hole4"}[name]
-    errors = nominal_errors(1, OPERATION)
+    errors = nominal_errors(1)
     errors[f"{feature}.{kind}"] = 1e-5
-    row, before = (perturb(cirelli, table)[0] for table in (errors, nominal_errors(1, OPERATION)))
+    row, before = (perturb(cirelli, OPERATION, table)[0] for table in (errors, nominal_errors(1)))
     if kind == "diameter":
         wider = (row["clearance"][0] - before["clearance"][0]) * (1.0 if name == "hole" else -1.0)
         for i, sign in ((1, -1.0), (2, 1.0)):
@@ -134,10 +136,10 @@ def test_arrow_of_an_error_has_the_sense_that_perturb_gives_it(cirelli, arrows, 
 
 
 def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_errors):
-    errors = nominal_errors(1, OPERATION)
+    errors = nominal_errors(1)
     for name, value in random_errors(5).items():
         errors[name.replace("__", ".")] = value
-    par, (pin, z) = perturb(cirelli, errors)[0], (cirelli.contact.D_P, cirelli.contact.z)
+    par, (pin, z) = perturb(cirelli, OPERATION, errors)[0], (cirelli.contact.D_P, cirelli.contact.z)
     pairs = query.pairs(cirelli, errors)
     factor = one_joint.enlargement(pairs, pin, z)
     found, _ = drawn(one_joint.draw, pairs, pin, z)
@@ -161,13 +163,13 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
 def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
     contact = {"D_H": "76 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"}
     fitting = joints.load("cirelli2021", {"contact": contact}, "test")
-    pairs = query.pairs(fitting, nominal_errors(1, OPERATION))
+    pairs = query.pairs(fitting, nominal_errors(1))
     assert one_joint.enlargement(pairs, 0.076, 0.022) == 1.0
     assert drawn(one_joint.draw, pairs, 0.076, 0.022)
 
 
 @pytest.mark.parametrize("alpha", [-20.0, 0.0, 15.0, 32.0])
-@pytest.mark.parametrize("over", [{}, SLIM], ids=["paper", "slim"])
+@pytest.mark.parametrize("over", [{}, SLIM, SHORT], ids=["paper", "slim", "short"])
 def test_labels_are_inside_and_apart(over, alpha):
     d = query.dimensions(joints.load("cirelli2021", over, "test"), np.radians(alpha))
     for view in (front, side):
@@ -181,6 +183,11 @@ def test_labels_are_inside_and_apart(over, alpha):
             assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1, name
         over_each_other = [(a, b) for a, b in combinations(boxes, 2) if boxes[a].overlaps(boxes[b])]
         assert over_each_other == []
+        if view is front:
+            corners = np.array([(-d.root, -d.root), (d.root, d.root)])
+            hub = mpl.transforms.Bbox(figure.axes[0].transData.transform(corners))
+            for name, box in boxes.items():
+                assert not name.startswith("cross") or not box.overlaps(hub), name
 
 
 @pytest.fixture
@@ -293,4 +300,4 @@ def test_figures_of_the_package(cirelli):
     figure = tolstat.draw_joint(cirelli, ALPHA)
     assert figure.texts[0].get_text() == cirelli.description
     assert tolstat.draw_errors is rendering.draw_errors
-    assert len(tolstat.draw_row(cirelli, nominal_errors(1, OPERATION), "one").axes) == 1
+    assert len(tolstat.draw_row(cirelli, nominal_errors(1), "one").axes) == 1

@@ -11,7 +11,6 @@ import pytest
 from tests.report.test_page import TEXT
 from tests.support import synthetic
 from tolstat.analysis import exceedance
-from tolstat.questions.exceedance import query
 from tolstat.report import html, page
 from tolstat.store import Reader
 
@@ -39,7 +38,7 @@ PROBE = """
   choose(part("slider"), 0, "input");
   found.first = said();
   found.cursors = [...document.querySelectorAll(".cursor")].filter((line) => line.style.display !== "none").length;
-  const svg = document.querySelector("figure[data-reads~='cross1.F'] svg"), box = svg.getBoundingClientRect();
+  const svg = document.querySelector("figure[data-reads^='cross1.F,'] svg"), box = svg.getBoundingClientRect();
   svg.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + 0.6 * box.width, clientY: box.top + 50 }));
   found.hovered = said();
   found.kept = document.querySelector("#limits td").getBoundingClientRect().right;
@@ -114,7 +113,7 @@ def test_reader_reads_what_is_counted_and_the_page_keeps_its_width(made, tmp_pat
         assert f": {share.count} of {share.n - 27}." in said
         assert f"95 % interval {100 * share.lower:.3g} % to {100 * share.upper:.3g} %" in said
         assert f"below and above: {100 * share.outer_lower:.3g} % to {100 * share.outer_upper:.3g} %" in said
-    first = view.load(query.most_exceeded(view))
+    first = view.load(view.most_exceeded)
     assert found["start"].startswith(f"{100 * first.above(first.limit).estimate:.3g} %")
     assert found["first"].startswith("100 % ")
     assert found["cursors"] == 1

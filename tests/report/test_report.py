@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,14 +12,17 @@ from matplotlib.text import Text
 from tests.support import synthetic
 from tests.support.environment import ROOT
 from tests.support.views import swept, view
-from tolstat import report
+from tolstat import joint, report
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import BUSHINGS, Status
 from tolstat.display import style
 from tolstat.display.table import as_text
+from tolstat.joint.derived import DERIVED
 from tolstat.questions.exceedance import query, sweep
 from tolstat.questions.exceedance import rendering as exceedance
 from tolstat.questions.exceedance.swept_axes import swept_axes
+from tolstat.report import joint_values
+from tolstat.store import Reader
 
 
 def texts(figure):
@@ -235,10 +239,14 @@ def test_report_of_a_sweep_into_another_folder(tmp_path):
     assert table["pin*.diameter [mm]"].iloc[[0, -1]].tolist() == pytest.approx([-0.1, 0.1])
 
 
+@pytest.mark.slow
 def test_same_file_same_bytes(tmp_path):
     path = synthetic.store(tmp_path)
     first = [file.read_bytes() for file in report.write_report(path)]
     assert [file.read_bytes() for file in report.write_report(path)] == first
+    with Reader.open(path) as store:
+        for source in (store, store.view()):
+            assert [file.read_bytes() for file in report.write_report(source)] == first
 
 
 def test_folder_that_cannot_be_made_and_file_that_is_not_ours(tmp_path):
@@ -275,3 +283,16 @@ def test_colours_differ_for_dichromats():
         seen = np.clip(linear @ (np.linalg.inv(to_lms) @ loss @ to_lms).T, 0, 1) ** (1 / 2.2)
         apart = [np.linalg.norm(seen[i] - seen[j]) for i in range(4) for j in range(i)]
         assert min(apart) > 0.25
+
+
+def test_values_of_the_joint_that_differ_from_the_one_that_comes_along():
+    file = SimpleNamespace(path="x.h5", joint=joint.load("cirelli2021", {}, "x").given("json"))
+    assert joint_values.listing(file).text == "none: it is cirelli2021"
+    file.joint = joint.load("cirelli2021", {"contact": {"clearance": "0.05 mm", "law": "point"}}, "x").given("json")
+    rows = [line.split("  ") for line in joint_values.listing(file).text.splitlines()]
+    rows = {row[0]: [cell.strip() for cell in row[1:] if cell.strip()] for row in rows}
+    assert rows["contact.clearance"] == ["0.05 mm", "0.1 mm", "given"]
+    assert rows["contact.law"] == ["point", "mode", "given"]
+    assert rows["contact.D_P"][:2] == ["76.1 mm", "76 mm"]
+    assert rows["contact.k1p"][2] == DERIVED["contact.k1p"].formula
+    assert "pin.d" not in rows

@@ -173,7 +173,7 @@ def test_a_joint_does_not_depend_on_the_others(method: str) -> None:
     loaded = read(SIZES.format("pin", "normal") + SINGLE.format("pin", "(M)", "normal", ""), method=method)
     whole = sampling.draw(loaded)
     np.testing.assert_array_equal(whole[100:103], sampling.draw(loaded, range(100, 103)))
-    assert joint.perturb(loaded.joint, whole)["clearance"].min() > 0.0
+    assert joint.perturb(loaded.joint, loaded.operation, whole)["clearance"].min() > 0.0
 
 
 def test_a_bonus_belongs_to_the_identity() -> None:

@@ -16,8 +16,11 @@ from tolstat.campaign import extend
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Simulation, Status
+from tolstat.questions.exceedance import query as exceeded
 from tolstat.questions.reweight import query as reweighting
+from tolstat.report import headline
 from tolstat.store import Reader, ResultStore
+from tolstat.store.sample_load import SampleLoad
 from tolstat.study.proposal import Proposal, component, weights
 
 SEEDS = 500
@@ -205,3 +208,51 @@ def test_every_fault_of_the_proposals_is_told(tmp_path):
         load(tmp_path, PLAN.replace("widen = 1.2", ""))
     with pytest.raises(InputError, match="proposal: missing table"):
         load(tmp_path, PLAN.partition("[[proposal]]")[0])
+
+
+def two_ways(seeds, n, beta=3.0):
+    """Loads of joints of which the proposals know one of two equally probable ways to the limit `beta`, and weights.
+
+    The ways are errors 0 and 1; a fifth of the joints is drawn from the tolerances, the others with error 0 shifted.
+    """
+    rng = np.random.default_rng(seeds)
+    own = rng.random((seeds, n)) < 0.2
+    x = rng.standard_normal((2, seeds, n))
+    x[0] += np.where(own, 0.0, beta)
+    weight = 1.0 / (0.2 + 0.8 * np.exp(beta * x[0] - 0.5 * beta**2))
+    return np.maximum(x[0], x[1]), weight, own
+
+
+def loads_of(values, w, own):
+    status = np.full(values.size, Status.OK)
+    return SampleLoad("x", "N", 3.0, np.nan, values, (values, values), status, w, True, 5.0, 1, own)
+
+
+def test_an_upper_end_covers_a_way_that_the_proposals_do_not_know_and_that_of_the_weights_does_not():
+    truth = 1.0 - norm.cdf(3.0) ** 2
+    values, weight, own = two_ways(400, 400)
+    made = [loads_of(*one) for one in zip(values, weight, own, strict=True)]
+    found = [(load.above(3.0).upper >= truth, load.unsearched(3.0) >= truth, load.supports(3.0)) for load in made]
+    of_weights, whatever, supported = np.mean(found, axis=0)
+    assert supported > 0.8  # the weights look as if all were well
+    assert of_weights < 0.8
+    assert whatever >= 0.975 - 3.0 * np.sqrt(0.975 * 0.025 / 400)
+
+
+def test_a_verdict_is_kept_only_if_nothing_that_is_missed_could_change_it():
+    row = dict.fromkeys(("total_lower", "total_upper"), np.nan) | {"outer_lower": 0.0, "outer_upper": 0.001}
+    row |= {"n": 1000, "bound_lower": 0.0, "bound_upper": 0.0, "unsearched_upper": 0.02}
+    assert [headline.verdict(row, share) for share in (0.0005, 0.01, 0.05)] == ["open", "searched", "yes"]
+    assert headline.verdict(row | {"unsearched_upper": np.nan}, 0.01) == "yes"
+
+
+def test_the_report_of_importance_sampling_has_both_ends(stored):
+    with Reader.open(stored) as store:
+        row = exceeded.limits(store.view()).iloc[0]
+        own = store.origin()["component"][1:] == 0
+        count = (store.results()["F_max"][1:, 0][own] > 700.0).sum()
+    assert row["unsearched_upper"] == pytest.approx(exceedance.clopper_pearson(count, own.sum())[1])
+    assert row["unsearched_upper"] > row["upper"]
+    done = CliRunner().invoke(app, ["report", str(stored), "--wide", "--out", str(stored.parent)])
+    assert done.exit_code == 0, done.output
+    assert "at most, if ways are missed" in done.output

@@ -55,7 +55,7 @@ def test_rows(make: Make, method: str) -> None:
     assert errors.shape == (s.rows,) == (6,)
     nominal = errors[0]
     assert all(nominal[f.name] == 0 for f in ERROR_FIELDS if f.name[:3] in ("pin", "hol"))
-    assert nominal["operation.torque"] == 100.0
+    assert nominal["operation.torque"] == 0.0
     assert nominal["material.E_factor"] == 1.0
     assert (errors["hole2.tilt_t"][1:] == np.radians(0.2)).all()
     assert (errors["pin1.offset_t"][1:] != 0).all()
@@ -112,7 +112,7 @@ def test_draws_follow_the_distributions(make: Make, method: str) -> None:
     for name, dist in [
         ("pin1.offset_t", stats.norm(0, 1e-4 / 3)),
         ("pin3.diameter", stats.uniform(-2e-5, 2e-5)),
-        ("operation.torque", stats.triang(0.5, 70, 60)),
+        ("operation.torque", stats.triang(0.5, -30, 60)),
     ]:
         assert stats.kstest(errors[name], dist.cdf).pvalue > 0.01, name
     independent = np.corrcoef([errors[name] for name in ("pin1.offset_t", "pin3.diameter", "operation.torque")])
@@ -165,7 +165,7 @@ def test_sweep_is_a_grid(make: Make, tmp_path: Path) -> None:
     assert errors.size == 7
     np.testing.assert_allclose(errors["pin3.diameter"], [0, 1e-4, 1e-4, 0, 0, -1e-4, -1e-4], atol=1e-19)
     np.testing.assert_array_equal(errors["pin3.diameter"], errors["pin1.diameter"])
-    np.testing.assert_allclose(np.degrees(errors["operation.alpha"]), [15, 0, 10, 0, 10, 0, 10])
+    np.testing.assert_allclose(np.degrees(errors["operation.alpha"]), [0, -15, -5, -15, -5, -15, -5])
     assert (errors["hole2.tilt_t"][1:] > 0).all()
     assert errors["hole2.tilt_t"][0] == 0
 
@@ -224,3 +224,23 @@ def test_a_slice_of_a_thousand_million_joints(make: Make) -> None:
     assert s.design[10**9]["variant"] == 0
     with pytest.raises(InputError, match="a Latin hypercube of 1000000000 joints"):
         make(OFFSET, DIAMETER, method="lhs", n=10**9)
+
+
+@pytest.mark.parametrize("method", ["sobol", "lhs"])
+def test_replicates_are_blocks_the_first_of_which_is_the_study_without_others(make: Make, method: str) -> None:
+    whole = sampling.draw(make(OFFSET, method=method, n=64, more="replicates = 4\n"))[1:]["pin1.offset_t"]
+    alone = sampling.draw(make(OFFSET, method=method, n=16))[1:]["pin1.offset_t"]
+    blocks = whole.reshape(4, 16)
+    np.testing.assert_array_equal(blocks[0], alone)
+    assert len({block.tobytes() for block in blocks}) == 4
+    strata = np.sort(np.floor(16 * stats.norm.cdf(blocks, scale=1e-4 / 3)), axis=1)
+    np.testing.assert_array_equal(strata, np.tile(np.arange(16), (4, 1)))
+    rows = sampling.draw(make(OFFSET, method=method, n=64, more="replicates = 4\n"), range(11, 45))
+    np.testing.assert_array_equal(rows["pin1.offset_t"], whole[10:44])
+
+
+def test_replicates_need_a_design_and_equal_blocks(make: Make) -> None:
+    with pytest.raises(InputError, match="replicates is given with 'random'"):
+        make(OFFSET, more="replicates = 4\n")
+    with pytest.raises(InputError, match="n = 64 is no multiple of replicates = 7"):
+        make(OFFSET, method="sobol", more="replicates = 7\n")

@@ -71,7 +71,7 @@ def _ends(point: np.ndarray, axis: np.ndarray, e: np.ndarray, half: float) -> np
 @pytest.mark.parametrize("kind", ["normal", "uniform"])
 def test_the_whole_axis_is_in_its_zone(make: Make, kind: str, second: str) -> None:
     s = make('"*.' + POSITION % kind, second, n=500)
-    params = perturb(s.joint, sampling.draw(s))
+    params = perturb(s.joint, s.operation, sampling.draw(s))
     for i in range(4):
         for name, triads in (("pin", PIN_TRIADS), ("hole", ARM_TRIADS)):
             point, axis = params[f"{name}_point"][1:, i], params[f"{name}_axis"][1:, i]
@@ -117,7 +117,7 @@ def test_both_features_of_a_common_axis_are_collinear(make: Make, pair: str, sec
     direction = f'"{pair}.' + DIRECTION % ("perpendicularity", 'normal", truncate = false, cp = "1')
     direction = direction.replace('"1"', "1").replace("20 mm", "90 mm")
     s = make(COMMON % pair if second != "alone" else "", direction if second else "", n=300)
-    params = perturb(s.joint, sampling.draw(s))
+    params = perturb(s.joint, s.operation, sampling.draw(s))
     (p1, a1, _), (p2, a2, _) = _features(params, pair, s.joint.cross.R)
     line = (p1 - p2) / np.linalg.norm(p1 - p2, axis=1)[:, None]
     assert np.abs(np.cross(line, a1)).max() < 1e-15
@@ -131,7 +131,7 @@ def test_both_features_of_a_common_axis_are_collinear(make: Make, pair: str, sec
 def test_coaxiality_turns_both_features_against_the_line_through_their_middles(make: Make) -> None:
     s = make(COMMON % "input_holes", COAXIAL % "input_holes", n=2000)
     errors = sampling.draw(s)
-    (p1, a1, _), (p2, a2, _) = _features(perturb(s.joint, errors), "input_holes", s.joint.cross.R)
+    (p1, a1, _), (p2, a2, _) = _features(perturb(s.joint, s.operation, errors), "input_holes", s.joint.cross.R)
     line = (p1 - p2) / np.linalg.norm(p1 - p2, axis=1)[:, None]
     angles = [np.linalg.norm(np.cross(line, axis), axis=1) for axis in (a1, a2)]
     for angle in angles:

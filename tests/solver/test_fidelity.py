@@ -42,7 +42,7 @@ def relative(found, expected):
 def campaign_joints():
     """Parameters of 24 joints of the study iso2768_f, the nominal one first."""
     plan = study.load(STUDIES / "iso2768_f.toml", n=23)
-    return joint.perturb(plan.joint, sampling.draw(plan))
+    return joint.perturb(plan.joint, plan.operation, sampling.draw(plan))
 
 
 class TestIdeal:

@@ -97,7 +97,7 @@ def test_the_report_writes_the_table_of_the_document(hard: Path) -> None:
 
 def test_a_fuzz_of_joints_far_outside_tolerance(tmp_path: Path) -> None:
     s = study.load(STUDIES / "fuzz.toml", n=24)
-    params = joint.perturb(s.joint, sampling.draw(s))
+    params = joint.perturb(s.joint, s.operation, sampling.draw(s))
     results = simulate_rows(params, Options(max_revs=10)).results
     assert_honest(results)
     assert (results["status"] == Status.OK).any()
@@ -154,7 +154,7 @@ def test_rows_are_simulated_with_the_settings_of_their_variant(tmp_path: Path) -
     s = load(tmp_path)
     counts = campaign.run(s, tmp_path / "s.h5", workers=1, block=4)
     assert counts.done == 6
-    params = np.concatenate([joint.perturb(s.joint, e) for e in np.split(sampling.draw(s), 6)])
+    params = np.concatenate([joint.perturb(s.joint, s.operation, e) for e in np.split(sampling.draw(s), 6)])
     with Reader.open(tmp_path / "s.h5") as store:
         results = store.results()
         assert store.variants == s.variants

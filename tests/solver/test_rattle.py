@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,7 @@ UNIFORM = Options(method=int(Method.TR_BDF2), steps_per_rev=20_000, max_refineme
 def joints(alpha: float, rpm: float, torque: float, rows: list[int]) -> np.ndarray:
     """Joints of iso2768_f.toml at another operating point (deg, 1/min, N m)."""
     made = study.load(STUDIES / "iso2768_f.toml", n=max(rows) + 1)
-    params = joint.perturb(made.joint, sampling.draw(made)[1:])[rows]
+    params = joint.perturb(made.joint, made.operation, sampling.draw(made)[1:])[rows]
     params["alpha"], params["omega"], params["torque"] = np.radians(alpha), rpm * RPM, torque
     return params
 
@@ -37,10 +38,10 @@ def joints(alpha: float, rpm: float, torque: float, rows: list[int]) -> np.ndarr
 def test_an_independent_solution() -> None:
     """Radau at rtol 1e-6 of another implementation, 7200 angles of the sixth revolution."""
     case = study.load_case(REFERENCE / "rattling" / "rattle_30.toml")
-    errors = joint.nominal_errors(1, case.operation)
+    errors = joint.nominal_errors(1)
     for key, value in case.errors.items():
         errors[key] = value
-    row = simulate_rows(joint.perturb(case.joint, errors), Options()).results[0]
+    row = simulate_rows(joint.perturb(case.joint, case.operation, errors), Options()).results[0]
     with (REFERENCE / "rattling" / "rattle_30_largest.csv").open() as file:
         lines = list(csv.DictReader(file))
     assert (row["status"], row["motion"]) == (Status.OK, Motion.PERIODIC)
@@ -72,10 +73,10 @@ def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order() -> None:
     params = np.concatenate([joints(15, 3000, 100, [0, 7, 10, 13, 19]), joints(30, 1500, 100, [10, 13])])
     options = FOLLOWING._replace(max_revs=24)
 
-    def run(how: object, these: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def run(how: Callable[..., Iterable[object]], these: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         results = np.zeros(len(these), RESULT).view(np.recarray)
         blocks = np.zeros((len(these), options.max_revs), RESULT).view(np.recarray)
-        list(how(these, options, False, results, blocks))  # type: ignore[operator]
+        list(how(these, options, False, results, blocks))
         return results.view(np.ndarray), blocks.view(np.ndarray)
 
     together, blocks = run(simulation._together, params)

@@ -17,10 +17,10 @@ OPTIONS = Options()
 
 def case(name):
     loaded = study.load_case(REFERENCE / f"{name}.toml")
-    errors = joint.nominal_errors(1, loaded.operation)
+    errors = joint.nominal_errors(1)
     for key, value in loaded.errors.items():
         errors[key] = value
-    return joint.perturb(loaded.joint, errors)
+    return joint.perturb(loaded.joint, loaded.operation, errors)
 
 
 def assert_largest(row, force, torque, tol):

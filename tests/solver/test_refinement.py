@@ -40,7 +40,7 @@ def assert_same(first: np.ndarray, second: np.ndarray) -> None:
 
 def parameters(name: str, *rows: int) -> np.ndarray:
     plan = study.load(STUDIES / name, n=max(rows))
-    return joint.perturb(plan.joint, sampling.draw(plan)[list(rows)])
+    return joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[list(rows)])
 
 
 def test_ringing_on_a_peak_is_met_by_a_closer_look() -> None:

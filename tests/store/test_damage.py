@@ -102,7 +102,7 @@ def test_attributes_of_columns_have_a_checksum(path: Path) -> None:
 
 def test_a_flipped_attempt_is_found_before_joints_are_simulated_with_other_settings(path: Path) -> None:
     with ResultStore.open_to_write(path) as store:
-        store.begin_retry(np.array([3]), {"status": ["ok"], "settings": {}, "options": store.options})
+        store.begin_retry({"": np.array([3])}, {"status": ["ok"], "settings": {}, "options": store.options})
     flip(path, place(path, "ledger/attempt", 3), 0)
     with Reader.open(path) as store, pytest.raises(StoreError, match="attempt of row 3 does not match"):
         store.attempt()

@@ -23,7 +23,7 @@ from tests.support import fakes
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import SCHEMA_VERSION, Mode, Motion, Status
-from tolstat.store import Reader, ResultStore, axes, histories, integrity, meanings, result_file, verification
+from tolstat.store import Reader, ResultStore, axes, histories, integrity, meanings, result_file, verification, what_if
 
 GOLDEN = make_golden.FOLDER / f"schema{SCHEMA_VERSION}.h5"
 OLDER = sorted(set(make_golden.FOLDER.glob("schema*.h5")) - {GOLDEN})
@@ -89,7 +89,8 @@ def test_every_group_is_described_and_opens_in_xarray_without_a_warning(whole: P
     pytest.importorskip("h5netcdf")
     verify(whole)
     names = groups(whole)
-    assert {"/", "/errors", "/results", "/ledger", "/session", "/histories", "/verify", "/verify/newton"} == {*names}
+    always = {"/", "/errors", "/results", "/ledger", "/session", "/histories"}
+    assert {*names} == always | {"/verify", "/verify/newton", "/what_if", f"/what_if/{what_if.key(CHANGE)}"}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for name in names:
@@ -102,10 +103,16 @@ def test_every_group_is_described_and_opens_in_xarray_without_a_warning(whole: P
                     assert opened["row"].to_numpy().tolist() == list(range(6))
 
 
+CHANGE = {"kind": "width", "label": "pin*.tilt_t", "step": "half", "words": "half", "seed": 1, "tolerances": {}}
+
+
 def verify(path: Path) -> None:
     with ResultStore.open_to_write(path) as store:
         check = verification.Check("finer Newton", {}, store.results()[1:3])
         verification.write(store, verification.Verification(1, np.arange(1, 3), check.results, {"newton": check}))
+        loads, status = np.arange(6.0).reshape(3, 2), np.ones(3, np.uint8)
+        changed = what_if.Altered(CHANGE, 4, ("cross1.F", "psi"), loads, status)
+        what_if.write(store, {what_if.key(CHANGE): changed})
 
 
 def test_codes_carry_their_meanings(whole: Path) -> None:

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from tests.campaign.test_campaign import datasets
-from tests.campaign.test_extend import make, run, slices  # noqa: F401  (make is a fixture)
+from tests.campaign.test_extend import run, slices, small
 from tests.report.test_report import texts
 from tests.support import fakes, synthetic
 from tests.support.views import swept, view
@@ -166,9 +166,9 @@ def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_slices_and_extensions_are_one_run(tmp_path: Path, make) -> None:  # noqa: F811
+def test_slices_and_extensions_are_one_run(tmp_path: Path) -> None:
     def selected(n: int) -> study.Study:
-        made = make(n)
+        made = small(tmp_path, n)
         source = made.text.replace(
             'histories = "none"', 'results = ["*.F_max", "fork*.T_*", "pin*.contact*", "psi_max"]'
         )
@@ -289,6 +289,6 @@ def test_what_is_not_kept_cannot_be_asked_for(tmp_path: Path) -> None:
         for by in ("fork1.T", "fork1.T_max", "psi"):
             with pytest.raises(InputError, match=r"is not kept in .*\n.*give one of: cross1\.F, "):
                 worst_joints(store.view(), by)
-    until = stop_rule.parse("P(pin1.contact > 1 N) width < 0.1")
+    until = stop_rule.parse("P(pin1.contact > 1 N) width < 0.1", {})
     with pytest.raises(InputError, match=r"leaves out pin1\.contact, .*--until.*\n.*add pin1\.contact_outer_max, pin1"):
         stop_rule.run_until(study.load(tmp_path / "small.toml"), tmp_path / "b.h5", until, lambda row: None)

@@ -28,7 +28,7 @@ from tolstat.store.result_file import text
 
 
 def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
-    params = fakes.perturb(study.joint, fakes.draw(study)[rows])
+    params = fakes.perturb(study.joint, study.operation, fakes.draw(study)[rows])
     return fakes.simulate(params, study.solver.options(), study.output.histories, study.output.harmonics)
 
 

@@ -84,12 +84,13 @@ def test_errors_of_a_row_are_its_case_at_its_point_of_the_grid(tmp_path: Path) -
     s = load(tmp_path)
     errors = sampling.draw(s)
     assert len(errors) == s.rows
-    np.testing.assert_allclose(np.degrees(errors["operation.alpha"][:18]), 9 * [0.0] + 9 * [15.0])
+    alpha = joint.operating(s.operation, errors)["alpha"]
+    np.testing.assert_allclose(np.degrees(alpha[:18]), 9 * [0.0] + 9 * [15.0])
     np.testing.assert_allclose(errors["pin3.diameter"][:9], 3 * [0.0] + 3 * [-2e-5] + 3 * [-4e-5])
     np.testing.assert_allclose(errors["hole4.offset_t"][:3], [0, 1e-4, 0])
     np.testing.assert_allclose(np.degrees(errors["pin2.tilt_z"][18:22]), [0, -0.5, 0, -0.5])
     np.testing.assert_allclose(errors["pin1.offset_z"][18:20], [0, 2e-5])
-    assert (errors["operation.torque"] == 100.0).all()
+    assert (errors["operation.torque"] == 0.0).all()
     assert (errors["pin3.tilt_z"] == 0.0).all()
 
 
@@ -134,7 +135,8 @@ def test_without_grid_and_variants_the_joint_as_it_is(tmp_path: Path) -> None:
     assert s.joints == (s.joint,)
     assert s.variants == (("joint", {}, ""),)
     assert s.design.tolist() == [(0, 0, 0), (0, 1, 0)]
-    assert sampling.draw(s)["operation.alpha"].tolist() == 2 * [np.radians(5)]
+    assert sampling.draw(s)["operation.alpha"].tolist() == [0.0, 0.0]
+    assert s.operations[0].alpha == np.radians(5)
 
 
 def test_other_methods_have_one_joint(tmp_path: Path) -> None:
@@ -225,7 +227,8 @@ def test_each_row_runs_with_its_own_joint(tmp_path: Path) -> None:
     # statics: each of four pins carries T / (2 (R + z/2)) at its outer end; centrifugal load adds little
     np.testing.assert_allclose(ideal[:, :, 0], np.outer(100 / (2 * (radius + 0.01)), np.ones(4)), rtol=2e-3)
     for row in range(s.rows):
-        own = joint.perturb(s.joints[design["variant"][row]], errors[[row]])
+        variant = design["variant"][row]
+        own = joint.perturb(s.joints[variant], s.operations[variant], errors[[row]])
         again = simulation.simulate_rows(own, s.solver.options())
         np.testing.assert_array_equal(again.results["T_max"][0], results["T_max"][row])
 
@@ -234,8 +237,8 @@ def test_each_row_runs_with_its_own_joint(tmp_path: Path) -> None:
 def test_workers_blocks_and_interruptions_change_no_byte(tmp_path: Path) -> None:
     s = load(tmp_path)
 
-    def perturb(of: joint.Joint, errors: np.ndarray) -> np.ndarray:
-        params = fakes.perturb(of, errors)
+    def perturb(of: joint.Joint, operation: joint.Operation, errors: np.ndarray) -> np.ndarray:
+        params = fakes.perturb(of, operation, errors)
         params["alpha"] = of.contact.D_P * 100 + (of.contact.law == "point") * of.cross.R
         return params
 
@@ -356,7 +359,7 @@ def test_the_paper_as_printed() -> None:
     c_d = 2 * 0.05 * 0.32 * (np.pi / 0.03641) ** 2 * np.sqrt(210e9 * 1.02e-7 / (7.70e-6 * 11.34e-4))
     assert c_d == pytest.approx(3.71e8, rel=0.01)
     assert printed.contact.c_d == 3.71e8
-    assert joint.perturb(printed, sampling.draw(s)[:1])["arm_mass"][0] == 0.3516
+    assert joint.perturb(printed, s.operations[0], sampling.draw(s)[:1])["arm_mass"][0] == 0.3516
 
 
 @pytest.mark.slow

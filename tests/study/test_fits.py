@@ -11,13 +11,16 @@ from scipy import stats
 
 from tests.support.synthetic import HEAD
 from tolstat import joint, sampling, study
+from tolstat.campaign import plan
 from tolstat.common.errors import InputError
 from tolstat.study import scaling
 from tolstat.study.change import changed
+from tolstat.study.starter import joint_text
 from tolstat.study.tolerances import distributions, fits, iso286
 
 SAMPLING = '[sampling]\nmethod = "random"\nn = 8\nseed = 1\n'
 H7_F7 = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
+OTHER = 'pin1.offset_e = { plus_minus = "1 mm", distribution = "uniform" }'
 
 
 def load(tolerances: str, contact: str = "", method: str = "random") -> study.Study:
@@ -29,6 +32,18 @@ def faults(tolerances: str, contact: str = "") -> str:
     with pytest.raises(InputError) as caught:
         load(tolerances, contact)
     return str(caught.value)
+
+
+def test_values_of_the_joint_file_that_a_fit_replaces_are_told(tmp_path: Path) -> None:
+    held = {"contact.D_H": "76.2 mm", "contact.D_P": "76.0 mm"}
+    assert load(H7_F7).joint.replaced_bearing == held
+    assert load(OTHER, 'contact.clearance = "0.1 mm"').joint.replaced_bearing == {"contact.D_P": "76.0 mm"}
+    own = tmp_path / "own.toml"
+    own.write_text(joint_text(), encoding="utf-8")
+    text = f"{HEAD}[tolerances]\n{H7_F7}\n{SAMPLING}".replace('"cirelli2021"', '"./own.toml"')
+    loaded = study.load(tmp_path / "x.toml", text=text)
+    assert plan.fit_in_words(loaded)[-1] == "fit: replaces contact.clearance = 0.03 mm of the joint file"
+    assert plan.fit_in_words(load(OTHER)) == []
 
 
 PUBLISHED = """
@@ -94,7 +109,7 @@ def test_a_fit_sets_nominal_diameters_and_their_tolerances() -> None:
 def test_drawn_clearances_lie_within_the_zones() -> None:
     loaded = load(H7_F7.replace('"normal", cpk = 1.0', '"uniform"'))
     errors = sampling.draw(loaded)
-    clearance = joint.perturb(loaded.joint, errors)["clearance"]
+    clearance = joint.perturb(loaded.joint, loaded.operation, errors)["clearance"]
     assert clearance[0] == pytest.approx(30e-6, rel=1e-9)
     assert ((clearance > 15e-6) & (clearance < 45e-6)).all()
     assert np.ptp(clearance) > 5e-6

@@ -102,6 +102,11 @@ def names(path: Path) -> str:
     return path.stem
 
 
+def faults(kind: str, text: str) -> list[str]:
+    """What an editor would mark in a file, as place and message."""
+    return [f"{fault.json_path}: {fault.message}" for fault in VALIDATORS[kind].iter_errors(tomllib.loads(text))]
+
+
 @pytest.mark.parametrize("kind", list(schema.KINDS))
 def test_schemas_are_of_draft_7_without_look_around_and_keywords_of_our_own(kind: str) -> None:
     made = schema.schema(kind)
@@ -113,23 +118,55 @@ def test_schemas_are_of_draft_7_without_look_around_and_keywords_of_our_own(kind
 
 @pytest.mark.parametrize("path", STUDIES, ids=names)
 def test_every_study_is_accepted(path: Path) -> None:
-    VALIDATORS["study"].validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    assert faults("study", path.read_text(encoding="utf-8")) == []
 
 
 def test_the_case_and_the_joints_are_accepted() -> None:
-    VALIDATORS["case"].validate(tomllib.loads((ROOT / "studies" / "tilted_pin.toml").read_text(encoding="utf-8")))
-    for path in (ROOT / "data" / "joints").glob("*.toml"):
-        VALIDATORS["joint"].validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    assert faults("case", (ROOT / "studies" / "tilted_pin.toml").read_text(encoding="utf-8")) == []
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "data" / "joints").glob("*.toml")]
+    assert texts
+    assert [fault for text in texts for fault in faults("joint", text)] == []
 
 
 def test_a_study_with_all_kinds_of_tables_is_accepted() -> None:
-    VALIDATORS["study"].validate(tomllib.loads(GOOD))
+    assert faults("study", GOOD) == []
+
+
+def test_every_vector_of_a_zone_can_be_shifted() -> None:
+    """Names of what is drawn, from studies with each kind of zone."""
+    zone, over = '{ zone = "⌀0.02 mm", distribution = "normal"', ', over = "22 mm"'
+    plane = f'{zone.replace("⌀", "")}{over}, about = "t" }}'
+    tables = {
+        "ends": f'"*.position" = {zone}{over} }}',
+        "middle": f'"*.position" = {zone.replace("0.02", "0.1")}{over} }}\n"pin*.perpendicularity" = {zone}{over} }}',
+        "components": f'"hole*.angularity" = {plane}\n"*_pins.coaxiality" = {zone}{over} }}',
+        "offsets": '"*.offset_radial" = { plus_minus = "0.1 mm", distribution = "rayleigh" }',
+    }
+    drawn = set()
+    for entries in tables.values():
+        text = f"{GOOD.partition('[errors]')[0]}[tolerances]\n{entries}\n[sampling]\nn = 8\n"
+        drawn |= study.load("x.toml", text=text).tolerances.keys()
+    assert {"pin1.position", "pin1.position_outer", "input_pins.coaxiality_pin3", "hole1.angularity_t"} <= drawn
+    for key in ("shift", "widen"):
+        proposal = {"share": 0.3, key: dict.fromkeys(sorted(drawn), 2.0)}
+        VALIDATORS["study"].validate({**tomllib.loads(GOOD), "proposal": [proposal]})
+        wrong = {"share": 0.3, key: {"pin1.position_pin3": 2.0}}
+        assert not VALIDATORS["study"].is_valid({**tomllib.loads(GOOD), "proposal": [wrong]})
+
+
+def test_several_operating_points_are_accepted_in_a_study_only() -> None:
+    points = GOOD.replace("[operation]", '[[operation]]\nname = "cruise"\nshare = "60 %"')
+    points = points.replace('"cross*.F" =', '"cross*.F at cruise" =')
+    VALIDATORS["study"].validate(tomllib.loads(points))
+    assert not VALIDATORS["study"].is_valid(tomllib.loads(points.replace("name =", "nmae =")))
+    assert not VALIDATORS["study"].is_valid(tomllib.loads(points.replace("F at cruise", "G at cruise")))
+    assert not VALIDATORS["case"].is_valid(tomllib.loads(points.partition("[tolerances]")[0]))
 
 
 @pytest.mark.parametrize(("old", "new"), BROKEN)
 def test_broken_studies_are_refused(old: str, new: str) -> None:
     assert old in GOOD
-    assert not VALIDATORS["study"].is_valid(tomllib.loads(GOOD.replace(old, new, 1)))
+    assert faults("study", GOOD.replace(old, new, 1)) != []
 
 
 @pytest.mark.parametrize(("kind", "key"), [("case", "sampling"), ("joint", "pins")])
@@ -231,7 +268,7 @@ def test_a_new_study_is_a_study_and_names_its_schemas(tmp_path: Path, own: str) 
         found = re.match(r"#:schema \./(\w+)\.schema\.json\n", text)
         assert found is not None
         assert json.loads((path.parent / f"{found[1]}.schema.json").read_text(encoding="utf-8"))["title"]
-        VALIDATORS[found[1]].validate(tomllib.loads(text))
+        assert faults(found[1], text) == []
         assert max(map(len, text.splitlines())) <= 130
 
 

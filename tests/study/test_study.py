@@ -45,7 +45,7 @@ pin3.tilt_z = "0.1 deg"
 [tolerances]
 "pin[12].offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }
 "hole*.tilt_z" = { iso2768 = "f", nominal = "50 mm", distribution = "uniform" }
-operation.torque = { mean = "100 N*m", std = "5 N*m", distribution = "normal" }
+operation.torque = { mean = "1 N*m", std = "5 N*m", distribution = "normal" }
 
 [[correlation]]
 between = ["pin1.offset_t", "pin2.offset_t"]
@@ -109,7 +109,7 @@ def test_a_study_is_read_whole(tmp_path: Path) -> None:
         "operation.torque",
     ]
     assert s.tolerances["pin1.offset_t"] == Normal(0.0, pytest.approx(1e-4 / 3))
-    assert s.tolerances["operation.torque"] == Normal(100.0, 5.0)
+    assert s.tolerances["operation.torque"] == Normal(1.0, 5.0)
     assert s.copula.names == ("pin1.offset_t", "pin2.offset_t")
     assert s.copula.matrix.tolist() == [[1.0, 0.6], [0.6, 1.0]]
     assert s.limits == {

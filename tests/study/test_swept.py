@@ -14,6 +14,7 @@ from tolstat.common.tables import Simulation
 from tolstat.joint.derived import DERIVED
 from tolstat.questions.exceedance.swept_axes import swept_axes
 from tolstat.store import Reader, ResultStore, recall, recorded
+from tolstat.study import swept
 from tolstat.study.swept import KEYS
 
 TEXT = """
@@ -95,6 +96,16 @@ def test_a_file_replays_its_sweep(tmp_path: Path) -> None:
 @pytest.mark.parametrize("change", [('to = "24 mm"', 'to = "25 mm"'), ('l = "18 mm"', 'l = "17 mm"'), ("0.03", "0.04")])
 def test_identity_tells_sweeps_apart(tmp_path: Path, change: tuple[str, str]) -> None:
     assert load(tmp_path).identity() != load(tmp_path, change).identity()
+
+
+def test_axes_of_deviations_are_told(tmp_path: Path) -> None:
+    s = load(tmp_path)
+    assert swept.meaning(s.sweep, s.joint) == [
+        "sweep of pin1.clearance and 3 others: deviations from -0.02 to 0.02 mm,",
+        "  the clearance is 0.01 to 0.05 mm; to sweep it itself: contact.clearance",
+    ]
+    s = load(tmp_path, ('"pin*.clearance"', '"hole2.diameter"'))
+    assert swept.meaning(s.sweep, s.joint)[1] == "  the diameter is 20.04 to 20.08 mm; to sweep it itself: contact.D_H"
 
 
 def test_every_quantity_of_a_joint_can_be_swept() -> None:

@@ -11,9 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from tests.support.synthetic import HEAD
+from tolstat import study
 from tolstat.common.errors import InputError
 from tolstat.common.files import data_dir
-from tolstat.study.tolerances import distributions
+from tolstat.study.tolerances import distributions, meaning, zones
+from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.kinds import KINDS, ZONE_KINDS, entry
@@ -167,11 +170,11 @@ def test_normal_entries() -> None:
     )
     shifted = build(normal | {"lower": "-0.02 mm", "upper": "0 mm", "mean": "-0.005 mm", "cpk": 1.0})
     assert shifted == distributions.Normal(pytest.approx(-5e-6), pytest.approx(5e-6 / 3))
-    assert build(normal | {"mean": "100 N*m", "std": "5 N*m"}, "operation.torque", 90.0, "N*m") == distributions.Normal(
-        100, 5
+    assert build(normal | {"mean": "1 N*m", "std": "5 N*m"}, "operation.torque", 0.0, "N*m") == distributions.Normal(
+        1, 5
     )
-    about = build(normal | {"plus_minus": "30 N*m"}, "operation.torque", 90.0, "N*m")
-    assert about == distributions.Normal(90.0, pytest.approx(10.0))
+    about = build(normal | {"plus_minus": 0.3}, "material.E_factor", 0.9, "1")
+    assert about == distributions.Normal(0.9, pytest.approx(0.1))
 
 
 def test_other_entries() -> None:
@@ -272,3 +275,46 @@ def test_every_kind_is_reachable_and_describes_itself() -> None:
         *("normal", "truncatednormal", "uniform", "triangular", "lognormal", "beta"),
         *("rayleigh", "rayleigh", "disc", "measured"),
     ]
+
+
+def test_pearson_of_correlated_errors_is_that_of_the_errors_themselves():
+    rng, n = np.random.default_rng(1), 400_000
+    z = rng.multivariate_normal([0, 0], [[1, 0.7], [0.7, 1]], n)
+    kinds = (distributions.Uniform(-1.0, 2.0), distributions.LogNormal(0.0, distributions.Normal(0.0, 0.6)))
+    x, y = (own.ppf(stats.norm.cdf(column)) for own, column in zip(kinds, z.T, strict=True))
+    found = meaning.pearson(*kinds, 0.7)
+    assert found == pytest.approx(np.corrcoef(x, y)[0, 1], abs=0.005)
+    assert found < 0.69
+    copula = Copula(("a", "b"), np.array([[1.0, 0.7], [0.7, 1.0]]))
+    row = meaning.correlations(copula, dict(zip("ab", kinds, strict=True))).iloc[0]
+    assert (row["errors"], row["pairs"], row["rho"]) == ("a, b", 1, 0.7)
+    assert row["spearman"] == pytest.approx(stats.spearmanr(x, y).statistic, abs=0.005)
+
+
+ZONES = """
+"pin*.position" = { zone = "⌀0.1 mm", over = "36.4 mm", distribution = "normal" }
+"output_holes.position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal" }
+"input_holes.position" = { zone = "⌀0.1 mm", over = "168 mm", distribution = "normal" }
+"*_holes.coaxiality" = { zone = "⌀0.02 mm", over = "22 mm", distribution = "normal" }
+"hole[12].offset_e" = { plus_minus = "0.1 mm", distribution = "uniform" }
+"""
+
+
+def test_a_common_axis_shorter_than_between_its_bearings_is_told():
+    head = f'{HEAD}\n[tolerances]\n{ZONES}\n[sampling]\nmethod = "random"\nn = 8\nseed = 1\n'
+    plan = study.load(Path("x.toml"), text=head)
+    ((key, found, remedy),) = zones.short_axes(plan.entries, plan.joint.contact.z)
+    assert key == "tolerances.output_holes.position.over"
+    assert found == "22 mm is shorter than the 146 mm between the bearings"
+    assert remedy.endswith("2 (R + z/2) = 168 mm")
+
+
+def test_position_errors_without_tolerance_are_listed():
+    head = f'{HEAD}\n[sampling]\nmethod = "random"\nn = 8\nseed = 1\n[tolerances]\n'
+    plan = study.load(Path("x.toml"), text=head + ZONES)
+    assert meaning.exact(plan.entries, plan.errors) == ["pin*.offset_e", "hole[34].offset_e"]
+    assert meaning.exact(plan.entries, ["hole4.offset_e"]) == ["pin*.offset_e", "hole3.offset_e"]
+    plan = study.load(Path("x.toml"), text=head + '"pin*.tilt_t" = { plus_minus = "1 deg", distribution = "uniform" }')
+    expected = ["pin*.offset_*", "pin*.tilt_z", "hole*.offset_*", "hole*.tilt_*"]
+    assert meaning.exact(plan.entries, plan.errors) == expected
+    assert meaning.exact([], []) == []

@@ -10,7 +10,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,8 +34,11 @@ from tolstat.common.tables import (
     Simulation,
     Status,
 )
+from tolstat.joint import Operation
 from tolstat.solver import stationary
+from tolstat.store import Counts
 from tolstat.study.model import Sampling
+from tolstat.study.points import Point
 
 SPECS = {
     "loads": HistorySpec((30, 8, 6), "f4", "N, N*m", "bushing loads"),
@@ -99,6 +102,22 @@ class Study:
     variants: tuple[()] = ()
     case_names: tuple[()] = ()
     joint: Dump = field(default_factory=lambda: Dump(material=Dump(E="2.1e11 Pa")))
+    points: tuple[Point, ...] = (Point("", Operation.model_construct(alpha=0.0, speed=1.0, torque=1.0), 1.0),)
+
+    @property
+    def operation(self) -> Operation:
+        """The first operating point."""
+        return self.points[0].operation
+
+    @property
+    def operations(self) -> tuple[Operation, ...]:
+        """Operating point of the only joint."""
+        return (self.operation,)
+
+    def at(self, name: str) -> Study:
+        """Return the study at one of its points."""
+        own = next(point for point in self.points if point.name == name)
+        return replace(self, points=(own._replace(name=""),))
 
     @property
     def sampling(self) -> Sampling:
@@ -153,9 +172,9 @@ def draw_blocks(study: Study, rows: range) -> Iterator[np.ndarray]:
     yield draw(study)[rows.start : rows.stop]
 
 
-def perturb(joint: Any, errors: np.ndarray) -> np.ndarray:
+def perturb(joint: Any, operation: Operation, errors: np.ndarray) -> np.ndarray:
     params = np.zeros(len(errors), PARAM)
-    params["alpha"] = errors["operation.alpha"]
+    params["alpha"] = operation.alpha + errors["operation.alpha"]
     params["R"] = errors["pin1.offset_t"]
     return params
 
@@ -206,12 +225,17 @@ def simulate_badly(
     return simulate(params, options, histories, n_harmonics)
 
 
-def warm_up() -> None:
+def warm_up(options: Options) -> None:
     """Compile nothing."""
 
 
 def stages(simulate: Any = simulate) -> Stages:
     return Stages(draw_blocks, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up)
+
+
+def run(study: Study, path: Path, workers: int = 1, block: int | None = 1000, **choices: Any) -> Counts:
+    """Run a campaign with these stages, in one block, without the check of the numerical error."""
+    return campaign.run(study, path, workers, block, **({"stages": stages(), "check": False} | choices))
 
 
 def main(out: str, workers: int, block: int, seconds: float, histories: str = "none", n: int = 40) -> None:
@@ -226,7 +250,7 @@ def main(out: str, workers: int, block: int, seconds: float, histories: str = "n
     study = Study(n=n, output=Output(histories))
     try:
         slow = stages(partial(simulate, seconds=seconds))
-        campaign.run(study, Path(out), workers, block, progress=say, stages=slow)
+        run(study, Path(out), workers, block, progress=say, stages=slow)
     except campaign.Interrupted as stop:
         print(stop, flush=True)
         raise SystemExit(stop.exit_code) from None

@@ -17,13 +17,12 @@ RISE = {"T": 2.5, "contact": np.array([1.0, 0.5, 1.0])}
 
 
 def errors(n, seed=7):
-    """Draw normal errors on all geometry, constant operation; row 0 is the nominal joint."""
+    """Draw normal errors on all geometry; row 0 is the nominal joint."""
     rng = np.random.default_rng(seed)
     table = np.zeros(n, ERROR)
     for name in ERROR.names:
         if name.startswith(("pin", "hole")):
             table[name][1:] = rng.normal(0.0, 5e-5 if "tilt" not in name else 3e-3, n - 1)
-    table["operation.alpha"], table["operation.speed"], table["operation.torque"] = 0.2618, 52.36, 100.0
     table["material.E_factor"] = 1.0
     return table
 

@@ -1,30 +1,48 @@
 """Views of campaigns with invented results, without a file."""
 
+from copy import copy
+
 import numpy as np
 
 from tests.support import synthetic
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.tables import Options
+from tolstat.joint import Operation
 from tolstat.store.numbering import Numbering
 from tolstat.store.view import View
+from tolstat.study.points import Point
+
+OPERATION = Operation.model_construct(alpha=0.2618, speed=52.36, torque=100.0)
+"""Operating point of all invented campaigns."""
 
 
 class FakeStore(Numbering):
-    """What a view reads of a result file, in memory; slot 0 is the nominal joint."""
+    """What a view reads of a result file, in memory; slot 0 is the nominal joint. `results` may be tables by point."""
 
     def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS, joint=None):
         self.path, self.study_name, self.study_text = "made_up.h5", "made up", study_text
         self.sampling, self.limits, self.columns = {"method": method, "nominal_first": True}, limits, columns
-        self.variants, self.joint = (), joint
+        self.variants, self.joint, self.heaviest = (), joint, 1.0
         self.options = Options()._asdict()
-        self.n, self.rows = len(results), range(len(results))
-        self._errors, self._results = errors, results
+        self._errors, self._results = errors, results if isinstance(results, dict) else {"": results}
+        self.points = {name: Point(name, OPERATION, 1.0 / len(self._results)) for name in self._results}
+        self.point = next(iter(self.points)) if len(self.points) == 1 else None
+        self.n, self.rows = len(errors), range(len(errors))
+
+    @property
+    def operation(self):
+        return self.points[self.point].operation
+
+    def at(self, point):
+        found = copy(self)
+        found.point = point
+        return found
 
     def errors(self, rows=slice(None), fields=None):
         return self._errors[rows]
 
     def results(self, rows=slice(None), fields=None):
-        return self._results[rows]
+        return self._results[self.point][rows]
 
 
 def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=None, joint=None, alpha=None, **kwargs):
@@ -38,9 +56,24 @@ def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=Non
     limits = {"cross1.F": 700.0} if limits is None else limits
     errors = synthetic.errors(n)
     if alpha is not None:
-        errors["operation.alpha"] = alpha
+        errors["operation.alpha"] = alpha - OPERATION.alpha
     made = View(FakeStore(method, limits, errors, results, columns=columns, joint=joint))
-    made.verification = None
+    made.verification, made.near, made.altered = None, None, {}
+    return made
+
+
+def at_points(results, limits=None, method="random", joint=None, points=()):
+    """View of the same joints at several operating points, from their tables of results by name of the point.
+
+    `joint` holds the sections of a joint file; `points` take the place of those with equal operation and share.
+    """
+    n = len(next(iter(results.values())))
+    store = FakeStore(method, limits or {}, synthetic.errors(n), results, joint=joint)
+    store.points |= {point.name: point for point in points}
+    made = View(store)
+    for part in made.parts:
+        part.verification = part.near = None
+    made.altered = {}
     return made
 
 
@@ -56,5 +89,5 @@ def swept(second=1, limits=None, named=True, columns=RESULT_COLUMNS, change=None
         change(results[1:])
     keys = '[sweep]\n"pin*.diameter" = { from = "-0.1 mm" }\npin1.tilt_z = { from = "0.5 deg" }\n' if named else ""
     made = View(FakeStore("sweep", limits or {}, errors, results, keys, columns))
-    made.verification = None
+    made.verification, made.near, made.altered = None, None, {}
     return made

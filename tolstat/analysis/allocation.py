@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import reweight
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.reweight import Weights
+from tolstat.analysis.weighted import Split
 
 FEWEST = 10
 """Minimum number of joints above each limit for a search that aims at the estimated shares."""
@@ -34,6 +34,8 @@ class Problem(NamedTuple):
         Maps factors to the logarithm of the mean square of that ratio under the old tolerances (1 plus Pearson's
         chi-squared divergence): n joints have n over that mean square effective ones. It is exact, because the weights
         of a sample underestimate it where no joint was drawn.
+    usable : callable
+        Maps factors to whether shares can be estimated from these joints, see `reweight.Ratios.usable`.
     above : ndarray of bool, shape (n, c)
         Which joints are above each of c limits.
     targets : ndarray, shape (c,)
@@ -50,6 +52,7 @@ class Problem(NamedTuple):
 
     log_ratios: Callable[[FloatArray], FloatArray]
     log_spread: Callable[[FloatArray], float]
+    usable: Callable[[FloatArray], bool]
     above: NDArray[np.bool_]
     targets: FloatArray
     cost: Callable[[FloatArray], float]
@@ -94,7 +97,7 @@ def search(problem: Problem) -> Choice:
     """
     share = max(REGION, reweight.LEAST_ESS / len(problem.above))
     choice = _within(problem, share)
-    while not reweight.smooth(problem.log_ratios(choice.factors)).usable and share < 0.9:
+    while not problem.usable(choice.factors) and share < 0.9:
         share = min(1.5 * share, 0.9)
         choice = _within(problem, share)
     return choice
@@ -157,16 +160,15 @@ def _minimise(
 
 
 def _shares(problem: Problem, x: FloatArray, aim: str) -> FloatArray:
-    """Share of the joints above each limit, or its upper end for ``interval``; the weights are not smoothed."""
+    """Share of the joints above each limit, or its upper end for ``interval``."""
     logs = problem.log_ratios(np.exp(x))
     if np.isneginf(logs.max()):  # none of the joints is possible with these tolerances, so that they tell nothing
         return np.ones(problem.above.shape[1])
-    raw = np.exp(logs - logs.max())
-    values = raw / raw.sum()
+    ratios = np.exp(logs - logs.max())
+    splits = [Split.by(column, ratios) for column in problem.above.T]
     if aim == "estimate":
-        return np.asarray(values @ problem.above)
-    weights = Weights(values, float(1.0 / (values**2).sum()), 0.0, 1.0)
-    return np.array([reweight.share_above(c, weights, 0.5, problem.confidence).upper for c in problem.above.T])
+        return np.array([split.share[0] for split in splits])
+    return np.array([split.interval(problem.confidence)[1][0] for split in splits])
 
 
 def joints_needed(share: float, ess: float, target: float, confidence: float = 0.95) -> float:

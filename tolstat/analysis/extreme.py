@@ -3,7 +3,8 @@
 Excesses over a high threshold are approximately generalised Pareto for nearly every distribution (Pickands 1975). The
 approximation can fail: the goodness of fit is tested, and `stability` shows whether the shape is the same at other
 thresholds. A tail with too few joints is refused, with the number of joints needed. Intervals are of profile
-likelihood, the share above the threshold included (Coles 2001, 4.3.3): extrapolate with them, not with the estimate.
+likelihood, the share above the threshold included (Coles 2001, 4.3.3): extrapolate with them, not with the estimate. A
+tail whose shape may be -1/2 or less, such as that of a uniform load, is refused: likelihood has no interval there.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ MIN_EXCESSES = 50
 """Minimum number of excesses for a fit."""
 REPLICATES = 400
 """Parametric bootstrap samples of the goodness-of-fit test."""
+NO_TAIL = 0.05
+"""p-value of the goodness of fit below which a tail is not generalised Pareto."""
 GRID, SHARES = 81, 13
 """Grid points of the likelihood: in shape and scale each, and in the share above the threshold."""
 
@@ -80,16 +83,24 @@ class Tail:
 
     @cached_property
     def p(self) -> float:
-        """p-value of the goodness of fit; below 0.05 do not extrapolate.
+        """p-value of the goodness of fit; below `NO_TAIL` do not extrapolate.
 
-        Anderson–Darling distance, by parametric bootstrap: samples of the fitted distribution, each fitted again.
+        Anderson–Darling distance, by parametric bootstrap: samples of the fitted distribution, each fitted in the same
+        way.
         """
-        k, sigma = pareto.fit(self.excesses)
+        k, sigma = self.shape.estimate, self.scale.estimate
         distance = pareto.anderson_darling(self.excesses, k, sigma)
         rng = np.random.default_rng(1975)
         drawn = pareto.quantile(rng.random((REPLICATES, self.n_above)), k, sigma)
-        distances = pareto.anderson_darling(drawn, *pareto.fit(drawn))
+        distances = pareto.anderson_darling(drawn, *pareto.most_likely(drawn))
         return float((1 + np.count_nonzero(distances >= distance)) / (1 + REPLICATES))
+
+    @property
+    def refusal(self) -> str:
+        """Reason why the tail must not be extrapolated; empty if it may be."""
+        if self.region[:, 1].min() <= pareto.LEAST_SHAPE + 1e-9:
+            return f"the shape of the tail may be {pareto.LEAST_SHAPE:g} or less, where there is no interval"
+        return f"the tail is not generalised Pareto (p < {NO_TAIL:g})" if self.p < NO_TAIL else ""
 
     @property
     def share(self) -> float:
@@ -171,7 +182,7 @@ def fit(
     Returns
     -------
     Tail
-        Maximum likelihood estimates, k > -1/2 (at smaller k the asymptotic theory does not hold).
+        Maximum likelihood estimates with k >= -1/2; see `Tail.refusal`.
 
     Raises
     ------
@@ -200,14 +211,14 @@ def of_sample(
     m, n = excesses.size, valid.size
     reach = 0.5 * float(chi2.ppf(confidence, 1))
     k, sigma, deficit = _likelihood(excesses, reach)
-    best = np.unravel_index(np.argmin(deficit), deficit.shape)
+    best = [float(value) for value in pareto.most_likely(excesses)]
     half = 5.0 * np.sqrt(m * (1.0 - m / n)) / n
     shares = np.clip(np.linspace(m / n - half, m / n + half, SHARES), 0.5 / n, 1.0 - 0.5 / n)
     binomial = xlogy(m, m / n / shares) + xlog1py(n - m, -m / n) - xlog1py(n - m, -shares)
     inside = np.argwhere(deficit[None] + binomial[:, None, None] <= reach)
     region = np.column_stack([shares[inside[:, 0]], k[inside[:, 1], inside[:, 2]], sigma[inside[:, 1], inside[:, 2]]])
     ends = [(float(v.min()), float(v.max())) if iid else (np.nan, np.nan) for v in region.T[1:]]
-    shape, scale = Estimate(float(k[best]), *ends[0]), Estimate(float(sigma[best]), *ends[1])
+    shape, scale = (Estimate(value, *own) for value, own in zip(best, ends, strict=True))
     return Tail(threshold, sample.n, sample.n_unresolved, m, shape, scale, excesses, region, iid)
 
 
@@ -246,7 +257,7 @@ def _likelihood(excesses: FloatArray, reach: float) -> tuple[FloatArray, FloatAr
     width = 6.0 / np.sqrt(excesses.size)
     low, high = np.array([k0 - 2 * width, nu0 - width]), np.array([k0 + 3 * width, nu0 + 2 * width])
     for points in (41, GRID):
-        low[0] = max(low[0], -0.5)
+        low[0] = max(low[0], pareto.LEAST_SHAPE)
         k, nu = np.meshgrid(np.linspace(low[0], high[0], points), np.linspace(low[1], high[1], points), indexing="ij")
         sigma = np.exp(nu) / (1.0 + k)
         likelihood = pareto.log_likelihood(excesses, k, sigma)

@@ -12,6 +12,10 @@ from tolstat.analysis.exceedance import FloatArray
 
 STRAIGHT = 1e-8
 """``|k|`` below which the tail counts as exponential."""
+LEAST_SHAPE = -0.5
+"""Smallest k of a fit by maximum likelihood: below it the asymptotic theory does not hold (Smith 1985)."""
+FEWEST_WEIGHTS = 50
+"""Minimum number of positive weights for the shape of their tail."""
 
 
 def fit(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -39,6 +43,39 @@ def fit(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
     mean = (b * weight).sum(axis=-1) / weight.sum(axis=-1)
     shape = np.log1p(-mean[..., None] * x).mean(axis=-1)
     return shape, -shape / mean
+
+
+def most_likely(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Estimate k and sigma of many samples by maximum likelihood, k not below `LEAST_SHAPE`.
+
+    The likelihood is that of b = -k / sigma alone, with k = mean(log(1 - b x)) (Grimshaw 1993), on the grid of `fit`,
+    then on finer ones about its maximum.
+
+    Parameters
+    ----------
+    excesses : array_like, shape (..., n)
+        Positive excesses, n of each sample, at least 2.
+
+    Returns
+    -------
+    k, sigma : ndarray, shape (...)
+        Shape, and scale in the unit of the excesses.
+    """
+    x = np.sort(np.asarray(excesses, dtype=float), axis=-1)
+    n = x.shape[-1]
+    quartile, largest = x[..., int(n / 4 + 0.5) - 1, None], x[..., -1, None]
+    part = np.linspace(0.0, 1.0, 40)
+    # from the end of the tail at the largest excess to one far beyond: equal steps of a root, as in `fit`
+    b = 1.0 / largest + (1.0 - np.sqrt(1.0 / np.linspace(1e-3, 0.999, 40)[::-1])) / (3.0 * quartile)
+    for _ in range(4):
+        b = np.where(np.abs(b) * largest < STRAIGHT, -STRAIGHT / largest, b)
+        k = np.stack([np.log1p(-b[..., j, None] * x).mean(axis=-1) for j in range(b.shape[-1])], axis=-1)
+        likelihood = np.where(k >= LEAST_SHAPE, n * (np.log(-b / k) - k - 1.0), -np.inf)
+        best = np.argmax(likelihood, axis=-1)[..., None]
+        at = [np.take_along_axis(b, np.clip(best + step, 0, b.shape[-1] - 1), axis=-1) for step in (-1, 1)]
+        shape, own = (np.take_along_axis(values, best, axis=-1)[..., 0] for values in (k, b))
+        b = at[0] + (at[1] - at[0]) * part
+    return shape, -shape / own
 
 
 def log_likelihood(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> FloatArray:
@@ -93,3 +130,35 @@ def anderson_darling(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> Fl
     odd: NDArray[np.int64] = 2 * np.arange(1, n + 1) - 1
     terms = odd * (np.log1p(-above) + np.log(above[..., ::-1]))
     return np.asarray(-n - terms.sum(axis=-1) / n)
+
+
+def shape_of_weights(weights: ArrayLike) -> float:
+    """Shape k of the tail of weights (Vehtari, Simpson, Gelman, Yao and Gabry 2024): 1 / k of their moments are finite.
+
+    Parameters
+    ----------
+    weights : array_like, shape (n,)
+        Not negative.
+
+    Returns
+    -------
+    float
+        k of the largest min(n / 5, 3 sqrt(n)) positive weights, drawn towards 1/2 as by ten observations; -inf if all
+        weights are equal, NaN if fewer than `FEWEST_WEIGHTS` are positive.
+    """
+    w = np.sort(np.asarray(weights, dtype=float))
+    w = w[w > 0]
+    if w.size < FEWEST_WEIGHTS:
+        return np.nan
+    if w[0] == w[-1]:
+        return -np.inf
+    m = min(w.size // 5, int(np.ceil(3.0 * np.sqrt(w.size))))
+    tail = w[-m:] - w[-m - 1]
+    if not tail[0] > 0:  # equal weights at the threshold: of those above it, as many as there are
+        tail = tail[tail > 0]
+    return float((fit(tail)[0] * tail.size + 0.5 * 10.0) / (tail.size + 10.0)) if tail.size >= 5 else 0.5
+
+
+def allowed_shape(n: int) -> float:
+    """Largest k at which an estimate from n weights has converged, min(1 - 1 / log10 n, 0.7) (Vehtari et al. 2024)."""
+    return float(min(1.0 - 1.0 / np.log10(max(n, 11)), 0.7))

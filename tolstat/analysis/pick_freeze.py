@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.exceedance import FloatArray, clopper_pearson
 from tolstat.analysis.sensitivity import normal_half
 from tolstat.common.shown import shown
 
@@ -84,6 +84,53 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     >>> indices(load(a), load(b), load(mixed)).total.estimate.round(1).tolist()
     [0.2, 0.8]
     """
+    x, y, mixed = _checked(a, b, ab)
+    middle = 0.5 * (x.mean() + y.mean())
+    x, y = x - middle, y - middle
+    square = 0.5 * (x**2 + y**2)
+    moved = mixed - middle - x[:, None]
+    half = normal_half(confidence)
+    first, total = (_index(term, square, half) for term in (moved * y[:, None], 0.5 * moved**2))
+    return Indices(first, total, float(square.mean()), len(x))
+
+
+def of_event(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95) -> Indices:
+    """Indices of an event, such as a load above its limit; parameters and errors raised as in `indices`.
+
+    The loads are 1 where the event happens, and 0. The estimates are those of `indices`. Their numerators are sums of
+    counts of points whose joint AB_i differs from A, which are few for rare events: the interval is recovered from
+    those of Clopper and Pearson of these counts and of the share of the event (Zou and Donner 2008).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> a, b = np.random.default_rng(1).normal(size=(2, 4000, 2))
+    >>> above = lambda x: x[..., 0] + 2.0 * x[..., 1] > 3.0
+    >>> mixed = np.stack([np.where([True, False], b, a), np.where([False, True], b, a)], axis=1)
+    >>> of_event(above(a), above(b), above(mixed)).total.estimate.round(1).tolist()
+    [0.5, 0.9]
+    """
+    x, y, mixed = _checked(a, b, ab)
+    share = float(0.5 * (x.mean() + y.mean()))
+    valid = np.isfinite(mixed)
+    counts = valid.sum(axis=0)
+    up, down = (valid & ((mixed - x[:, None]) == sign) for sign in (1.0, -1.0))
+    with_b = (y == 1.0)[:, None]
+    cells = np.array([(way & own).sum(axis=0) for way in (up, down) for own in (with_b, ~with_b)])
+    signs = np.array([1.0 - share, -share, share - 1.0, share])[:, None]
+    low, high = (float(end) for end in clopper_pearson(share * 2 * len(x), 2 * len(x), confidence))
+    of_ends = low * (1.0 - low), high * (1.0 - high)
+    variance = min(of_ends), share * (1.0 - share), 0.25 if low < 0.5 < high else max(of_ends)
+    return Indices(
+        _recovered(cells, signs, counts, variance, confidence),
+        _recovered((up | down).sum(axis=0)[None], np.array([[0.5]]), counts, variance, confidence),
+        variance[1],
+        len(x),
+    )
+
+
+def _checked(a: ArrayLike, b: ArrayLike, ab: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Loads of the points that have those of A and B."""
     x, y, mixed = (np.asarray(v, dtype=float) for v in (a, b, ab))
     if x.ndim != 1 or x.shape != y.shape or mixed.ndim != 2 or len(mixed) != len(x):
         raise ValueError(f"loads {x.shape}, {y.shape} and {mixed.shape} are not those of one design")
@@ -94,13 +141,27 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
         raise ValueError(f"{valid.sum(axis=0).min(initial=len(x))} points with valid loads are too few: give {FEWEST}")
     if np.ptp([x, y]) == 0:
         raise ValueError("the load does not scatter")
-    middle = 0.5 * (x.mean() + y.mean())
-    x, y = x - middle, y - middle
-    square = 0.5 * (x**2 + y**2)
-    moved = mixed - middle - x[:, None]
-    half = normal_half(confidence)
-    first, total = (_index(term, square, half) for term in (moved * y[:, None], 0.5 * moved**2))
-    return Indices(first, total, float(square.mean()), len(x))
+    return x, y, mixed
+
+
+def _recovered(
+    cells: NDArray[np.intp],
+    signs: FloatArray,
+    counts: NDArray[np.intp],
+    variance: tuple[float, float, float],
+    confidence: float,
+) -> Index:
+    """Weighted sum of counts, (k, d), as shares of the points, over the variance, of which both ends are given."""
+    shares = cells / counts
+    low, high = clopper_pearson(cells, counts, confidence)
+    least, estimate, most = variance
+    found = (signs * shares).sum(axis=0) / estimate
+    down, up = signs * (shares - low), signs * (high - shares)
+    lengths = []
+    for away, back in ((np.where(signs > 0, down, up), most), (np.where(signs > 0, up, down), least)):
+        of_variance = found * (estimate / back - 1.0)
+        lengths.append(np.sqrt((away**2).sum(axis=0) / estimate**2 + of_variance**2))
+    return Index(found, found - lengths[0], found + lengths[1])
 
 
 def _index(terms: FloatArray, square: FloatArray, half: float) -> Index:

@@ -1,50 +1,90 @@
 """Likelihood-ratio reweighting of the same joints to other tolerances.
 
 The weight of a joint is the ratio of the densities of its errors under the new tolerances and under those it was drawn
-from. Where a few joints have most of the weight, the estimates are unreliable without showing it; the shape k of the
-weights' tail shows it (Vehtari, Simpson, Gelman, Yao and Gabry 2024, Pareto-smoothed importance sampling). Errors where
-no joint was drawn have no weight at all.
+from. Joints with large weights that happened not to be drawn leave no trace in the sample, so that estimates look
+better than they are. A share is therefore usable under three conditions only: the mean square of the ratio, which
+follows exactly from the tolerances, is small; the weights on both sides of the limit have a tail that allows it
+(Vehtari, Simpson, Gelman, Yao and Gabry 2024); and enough effective joints are on both sides, or the ratio has a bound.
+Errors where no joint was drawn have no weight at all. The interval is that of `weighted`.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tolstat.analysis import pareto
-from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.analysis import pareto, weighted
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.weighted import Sample
 from tolstat.common.shown import shown
 
 LEAST_ESS = 50
-"""Minimum effective number of joints for usable weights."""
+"""Minimum number of joints that count, by the exact mean square of the ratio; see `Ratios.needed`."""
+LARGEST_SPREAD = 2.0
+"""Largest mean square of the part of the ratio that has no bound."""
+LEAST_BESIDE = 10.0
+"""Minimum effective number of joints on each side of a level."""
 
 
-class Weights(NamedTuple):
-    """Smoothed weights of joints.
+class Ratios(NamedTuple):
+    """Density ratios of joints, and what follows exactly from the tolerances.
 
     Attributes
     ----------
     values : ndarray, shape (n,)
-        Weights; their sum is 1.
-    ess : float
-        Effective number of joints, 1 / sum of squares (Kish 1965).
-    k : float
-        Pareto shape of the weights' tail; -inf if all weights are equal, inf if too few are positive for a fit.
-    allowed : float
-        Largest k allowed, min(1 - 1 / log10(n), 0.7): with a larger one the estimates have not converged at n joints.
+        New density over that which each joint was drawn from; its mean over all joints that could be drawn is 1. Zero
+        for a joint that is impossible under the new tolerances.
+    log_mean_square : float
+        Logarithm of the mean square of the ratio: 1 plus Pearson's chi-squared divergence.
+    log_unbounded : float
+        The same of the errors alone whose ratio has no bound; 0 without any.
+    heaviest : float
+        Largest ratio that a joint can have; inf without a bound.
     """
 
     values: FloatArray
-    ess: float
-    k: float
-    allowed: float
+    log_mean_square: float = 0.0
+    log_unbounded: float = 0.0
+    heaviest: float = np.inf
+
+    @property
+    def effective(self) -> float:
+        """Number of joints of the new tolerances that the joints count as."""
+        return self.values.size * math.exp(-self.log_mean_square)
+
+    @property
+    def needed(self) -> float:
+        """Number of effective joints needed: in proportion to the mean square, as its tail is heavier, from 2 on."""
+        return LEAST_ESS * max(1.0, 0.5 * math.exp(self.log_mean_square))
 
     @property
     def usable(self) -> bool:
-        """Whether estimates from these weights can be trusted; otherwise new runs are needed."""
-        return self.k < self.allowed and self.ess >= LEAST_ESS
+        """Whether shares can be estimated at all; otherwise new runs are needed."""
+        return self.effective >= self.needed and self.log_unbounded <= math.log(LARGEST_SPREAD)
+
+
+@shown
+class Support(NamedTuple):
+    """How well joints support the share above a level.
+
+    Attributes
+    ----------
+    above, below : float
+        Effective number of joints on each side, (sum of weights)^2 / sum of squares (Kish 1965).
+    k : float
+        Shape of the tail of the weights, the larger of both sides; NaN if unknown, see `pareto.shape_of_weights`.
+    usable : bool
+        Whether the share is usable: the ratios are, k is allowed, and `LEAST_BESIDE` effective joints are on both sides
+        or the ratio has a bound, which the interval then uses.
+    """
+
+    above: float
+    below: float
+    k: float
+    usable: bool
 
 
 @shown
@@ -55,132 +95,132 @@ class Share(NamedTuple):
     ----------
     estimate, lower, upper : float
         Share and interval; NaN ends for dependent samples.
+    bound_lower, bound_upper : float
+        Estimates with the joints without a valid load counted below, and above.
     ess : float
         Number of equally weighted joints with the same variance of the share.
+    support : Support
+        Whether these numbers are usable.
+    """
+
+    estimate: float
+    lower: float
+    upper: float
+    bound_lower: float
+    bound_upper: float
+    ess: float
+    support: Support
+
+
+@shown
+class Load(NamedTuple):
+    """Load that a share of the joints stays at or below, under the new tolerances.
+
+    Attributes
+    ----------
+    estimate, lower, upper : float
+        In the unit of the values; an end that the joints cannot support is infinite, NaN for dependent samples.
+    ess : float
+        Number of equally weighted joints with the same variance of the share below the estimate.
+    usable : bool
+        Whether the shares above both ends and above the estimate are usable.
     """
 
     estimate: float
     lower: float
     upper: float
     ess: float
+    usable: bool
 
 
-def smooth(log_ratios: ArrayLike) -> Weights:
-    """Weights from density ratios, the largest replaced by quantiles of a fitted generalised Pareto tail.
-
-    Parameters
-    ----------
-    log_ratios : array_like, shape (n,)
-        Logarithm of new density over old, up to a constant; -inf for a joint impossible under the new tolerances.
-
-    Returns
-    -------
-    Weights
-        Weights of all joints.
-
-    Raises
-    ------
-    ValueError
-        When no joint has any weight, or a ratio is NaN or +inf.
-
-    Examples
-    --------
-    >>> from scipy.stats import norm
-    >>> errors = norm.ppf([(k + 0.5) / 400 for k in range(400)])  # of normal tolerances, sigma 1
-    >>> weights = smooth(norm.logpdf(errors, 0, 0.8) - norm.logpdf(errors))  # and for sigma 0.8
-    >>> weights.usable, round(weights.ess)
-    (True, 373)
-    >>> [round(float(x), 3) for x in (share_above(errors, weights, 1.0).estimate, norm.sf(1.0 / 0.8))]
-    [0.105, 0.106]
-    """
-    logs = np.asarray(log_ratios, dtype=float)
-    if np.isnan(logs).any() or (logs == np.inf).any():
-        raise ValueError("a ratio is not a number: the joints were not drawn from the old tolerances")
-    if not np.isfinite(logs).any():
-        raise ValueError("the new tolerances make none of the joints")
-    n = logs.size
-    raw = np.exp(logs - logs.max())
-    k = -np.inf
-    m = min(n // 5, int(np.ceil(3.0 * np.sqrt(n))))
-    if np.ptp(raw) > 0:
-        order = np.argsort(raw, kind="stable")
-        tail = order[n - m :]
-        cut = raw[order[n - m - 1]] if m else 0.0
-        k = np.inf
-        if m >= 5 and raw[tail[0]] > cut > 0:
-            shape, scale = (float(v) for v in pareto.fit(raw[tail] - cut))
-            k = (shape * m + 0.5 * 10.0) / (m + 10.0)  # shrunk towards 1/2 as by ten observations
-            raw[tail] = np.minimum(cut + pareto.quantile(1.0 - (np.arange(1, m + 1) - 0.5) / m, k, scale), 1.0)
-    weights = raw / raw.sum()
-    allowed = min(1.0 - 1.0 / np.log10(max(n, 11)), 0.7)
-    return Weights(weights, float(1.0 / (weights**2).sum()), float(k), float(allowed))
+def sort_out(values: ArrayLike, status: ArrayLike, ratios: Ratios) -> Sample:
+    """Sort the joints by load for all shares and quantiles; see `weighted.sort_out`."""
+    return weighted.sort_out(values, status, ratios.values, heaviest=ratios.heaviest)
 
 
-def share_above(values: ArrayLike, weights: Weights, level: float, confidence: float = 0.95, iid: bool = True) -> Share:
+def share_above(sample: Sample, ratios: Ratios, level: float, confidence: float = 0.95, iid: bool = True) -> Share:
     """Share of the joints above a level.
 
     Parameters
     ----------
-    values : array_like, shape (n,)
-        Load of each joint that has a weight.
-    weights : Weights
-        Weights of the same joints.
+    sample : Sample
+        Loads and ratios of the joints; see `sort_out`.
+    ratios : Ratios
+        The same ratios.
     level : float
         Level, in the unit of the values.
     confidence : float
-        Confidence level of Clopper and Pearson's interval for the effective joints (Korn and Graubard 1998).
+        Confidence level of the interval.
     iid : bool
         Whether the joints are independent samples.
 
     Returns
     -------
     Share
-        Estimate and interval, which is valid only if `Weights.usable`.
+        Estimate and interval, which hold only if `Support.usable`.
 
-    Raises
-    ------
-    ValueError
-        When the lengths differ.
+    Examples
+    --------
+    >>> from scipy.stats import norm
+    >>> errors = norm.ppf([(k + 0.5) / 400 for k in range(400)])  # of a normal tolerance, sigma 1
+    >>> ratio = np.exp(norm.logpdf(errors, 0, 0.8) - norm.logpdf(errors))  # and for sigma 0.8
+    >>> ratios = Ratios(ratio, log_mean_square=0.0696, heaviest=1.25)
+    >>> found = share_above(sort_out(errors, [1] * 400, ratios), ratios, 1.0)
+    >>> [round(float(x), 3) for x in (found.lower, found.estimate, found.upper, norm.sf(1.0 / 0.8))]
+    [0.079, 0.105, 0.135, 0.106]
+    >>> found.support.usable, round(found.ess)
+    (True, 518)
     """
-    loads, w = np.asarray(values, dtype=float), weights.values
-    if loads.shape != w.shape:
-        raise ValueError(f"loads {loads.shape} and weights {w.shape} must be of one length")
-    above = loads > level
-    estimate = float(np.clip((w * above).sum(), 0.0, 1.0))
-    # variance of a ratio of sums; if all joints are on one side, the effective number of the weights
-    variance = float(((w * (above - estimate)) ** 2).sum())
-    ess = estimate * (1.0 - estimate) / variance if 0.0 < estimate < 1.0 else weights.ess
-    ess = min(ess, float(loads.size))
-    lower, upper = clopper_pearson(estimate * ess, ess, confidence) if iid else (np.nan, np.nan)
-    return Share(estimate, float(lower), float(upper), float(ess))
+    least = 0.0 if np.isfinite(ratios.heaviest) else LEAST_BESIDE
+    row = weighted.curve_of(sample, [level], confidence, least)[0]
+    estimate, (lower, upper) = float(row["estimate"]), (row["lower"], row["upper"]) if iid else (np.nan, np.nan)
+    bounds = float(row["bound_lower"]), float(row["bound_upper"])
+    return Share(
+        estimate, float(lower), float(upper), *bounds, _ess(sample, ratios, level), support(sample, ratios, level)
+    )
 
 
-def quantile(
-    values: ArrayLike, weights: Weights, share: float, confidence: float = 0.95, iid: bool = True
-) -> tuple[float, float, float]:
-    """Load that a share of the joints stays at or below, and its interval (Woodruff 1952).
+def _ess(sample: Sample, ratios: Ratios, level: float) -> float:
+    w = sample.weights / sample.weights.sum()
+    above = sample.loads > level
+    share = float(w[above].sum())
+    variance = float(((w * (above - share)) ** 2).sum())
+    return share * (1.0 - share) / variance if 0.0 < share < 1.0 and variance > 0 else ratios.effective
+
+
+def support(sample: Sample, ratios: Ratios, level: float) -> Support:
+    """Tell whether the share above a level is usable; parameters as in `share_above`."""
+    above = sample.loads > level
+    sides = weighted.Split.by(above, sample.weights)
+    effective = [float(side.effective[0]) for side in sides]
+    k = max((pareto.shape_of_weights(sample.weights[mask]) for mask in (above, ~above)), key=_rank)
+    beside = np.isfinite(ratios.heaviest) or min(effective) >= LEAST_BESIDE
+    usable = ratios.usable and bool(beside) and not k > pareto.allowed_shape(sample.weights.size)
+    return Support(effective[0], effective[1], k, usable)
+
+
+def _rank(k: float) -> float:
+    return -np.inf if np.isnan(k) else k
+
+
+def quantile(sample: Sample, ratios: Ratios, share: float, confidence: float = 0.95, iid: bool = True) -> Load:
+    """Load that a share of the joints stays at or below, and its interval, which inverts that of shares.
 
     Parameters
     ----------
-    values, weights, confidence, iid
+    sample, ratios, confidence, iid
         As in `share_above`.
     share : float
         Between 0 and 1.
 
     Returns
     -------
-    estimate, lower, upper : float
-        In the unit of the values; an end that the joints cannot support is infinite, NaN for dependent samples.
+    Load
+        It holds only if `Load.usable`.
     """
-    loads = np.asarray(values, dtype=float)
-    order = np.argsort(loads, kind="stable")
-    below = np.cumsum(weights.values[order])
-    estimate = loads[order][min(int(np.searchsorted(below, share * (1 - 1e-12))), loads.size - 1)]
-    if not iid:
-        return float(estimate), np.nan, np.nan
-    found = share_above(loads, weights, float(estimate), confidence)
-    low, high = clopper_pearson(share * found.ess, found.ess, confidence)
-    ends: list[NDArray[np.intp]] = [np.searchsorted(below, 0.0 if s <= 0 else s) for s in (low, high)]
-    lower = loads[order][ends[0]] if ends[0] < loads.size else np.inf
-    upper = loads[order][ends[1]] if ends[1] < loads.size - 1 else np.inf
-    return float(estimate), float(lower), float(upper)
+    found = weighted.quantile_of(sample, share, confidence)
+    ends = (found.lower, found.upper) if iid else (found.estimate, found.estimate)
+    beside = [support(sample, ratios, end) for end in (found.estimate, *ends) if np.isfinite(end)]
+    enough = len(beside) == 3 and all(s.usable and min(s.above, s.below) >= LEAST_BESIDE for s in beside)
+    lower, upper = (found.lower, found.upper) if iid else (np.nan, np.nan)
+    return Load(found.estimate, lower, upper, _ess(sample, ratios, found.estimate), enough)

@@ -125,17 +125,19 @@ class Estimate(NamedTuple):
 class _States(NamedTuple):
     """States of a level, in the order of their chains' steps.
 
-    `families`, (n, 1 to 1 + LAG): numbers of the chains that a state descends from at this level, the one before, ...
+    `families`, (n, 1 to 1 + LAG): numbers of the chains that a state descends from at this level, the one before, ...;
+    `first`: number of the joint of level 0 that it descends from.
     """
 
     scores: FloatArray
     loads: FloatArray
     number: NDArray[np.intp]
     families: NDArray[np.intp]
+    first: NDArray[np.intp]
 
     def part(self, rows: slice | NDArray[np.bool_]) -> _States:
         """Some of the states."""
-        return _States(self.scores[rows], self.loads[rows], self.number[rows], self.families[rows])
+        return _States(self.scores[rows], self.loads[rows], self.number[rows], self.families[rows], self.first[rows])
 
 
 class Walk:
@@ -160,6 +162,10 @@ class Walk:
     reached : bool
         Whether the last level ends at the limit. Otherwise the threshold did not rise any more, or the probability is
         below `LEAST`.
+    last : ndarray of int, shape (n,)
+        Numbers of the joints that are the states of the last complete level; a joint can be several.
+    ancestors : int
+        Number of joints of level 0 that those of them beyond the last threshold descend from.
 
     Examples
     --------
@@ -184,6 +190,7 @@ class Walk:
         self._parts: list[_States] = []
         self._sums: list[list[FloatArray]] = []
         self._variance = 0.0
+        self.last, self.ancestors = np.empty(0, np.intp), 0
         self.next = Candidates(0, noise(0, 0, settings.n), np.full(settings.n, -1))
 
     def take(self, loads: FloatArray) -> None:
@@ -198,7 +205,7 @@ class Walk:
         if self.done or loads.shape != self.next.parent.shape or np.isnan(loads).any():
             raise ValueError(f"{loads.shape} loads, NaN among them or not, for {self.next.parent.shape} joints")
         numbers = self._taken + np.arange(loads.size)
-        here = _States(self.next.scores, loads, numbers, np.arange(loads.size)[:, None])
+        here = _States(self.next.scores, loads, numbers, np.arange(loads.size)[:, None], numbers)
         self._taken += loads.size
         self._simulated += loads.size
         if self._start is not None:
@@ -210,6 +217,7 @@ class Walk:
                 np.where(moved, loads, before.loads),
                 np.where(moved, numbers, before.number),
                 before.families,
+                before.first,
             )
             self._start = here
         self._parts.append(here)
@@ -227,8 +235,7 @@ class Walk:
         return Candidates(len(self.levels), scores, self._start.number[:count])
 
     def _finish_level(self) -> None:
-        scores, loads, number, families = zip(*self._parts, strict=True)
-        states = _States(*map(np.concatenate, (scores, loads, number, families)))
+        states = _States(*map(np.concatenate, zip(*self._parts, strict=True)))
         n, limit = self.settings.n, self.settings.limit
         seeds = round(n * self.settings.p0)
         ordered = np.sort(states.loads)[::-1]
@@ -236,6 +243,7 @@ class Walk:
         # infinite loads (joints without a valid one) have no midpoint
         threshold = min(limit, middle if math.isfinite(middle) else ordered[seeds])
         beyond = states.loads > threshold
+        self.last, self.ancestors = states.number, int(np.unique(states.first[beyond]).size)
         tried = self._simulated if self.levels else 0
         acceptance = self._accepted / tried if tried else math.nan
         share = float(beyond.mean())

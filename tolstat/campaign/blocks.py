@@ -34,8 +34,9 @@ MAX_WRITE_SHARE, MAX_PARENT_SHARE = 0.05, 0.25
 """Largest share of a block's simulation time that writing it may take, and largest share of the parent's time spent on
 writing: beyond a quarter the workers begin to wait for the parent. Writing a block waits twice for the disk, 5 to 50 ms
 together, whatever the block's size."""
-JOINT_TIMEOUT_S = 300.0
-"""Default time limit of a joint, s: a thousand times what most joints take."""
+JOINT_TIMEOUT_S = 60.0
+"""Default processor time without progress after which a joint is given up, s: kernels count every iteration, so that
+only what they call in between takes time unseen, a second a block at most."""
 
 
 class Stages(NamedTuple):
@@ -48,14 +49,14 @@ class Stages(NamedTuple):
     dimensions : callable
         () -> dimension of the sampling sequence, by name of the error.
     perturb : callable
-        Joint, (m,) table ERROR -> (m,) table PARAM.
+        Joint, operating point, (m,) table ERROR -> (m,) table PARAM.
     history_specs : callable
         Options, kind of histories, number of harmonics -> HistorySpec by name of the history.
     simulate : callable
         (m,) table PARAM, Options, ``histories=``, ``n_harmonics=`` -> Simulation; pickled to other processes.
     warm_up : callable
-        Compiles what `simulate` needs. Called before workers start, because two processes that compile into one
-        cache can crash; then called in each worker, to load the compiled code.
+        Options -> None: compiles what `simulate` needs with them. Called before workers start, so that they need not
+        all compile; then called in each worker, to load the compiled code outside the time limit of a joint.
     origins : callable
         Study, rows of the campaign (range) -> which proposal or level gave each joint, consecutive tables; None if the
         sampling method has no such table (`draw_records.columns`).
@@ -66,7 +67,7 @@ class Stages(NamedTuple):
     perturb: Callable[..., NDArray[np.void]]
     history_specs: Callable[..., Mapping[str, HistorySpec]]
     simulate: Callable[..., Simulation]
-    warm_up: Callable[[], object]
+    warm_up: Callable[[Options], object]
     origins: Callable[..., Iterable[NDArray[np.void]] | None] = lambda *_: None
 
 
@@ -77,14 +78,15 @@ class Execution:
     Attributes
     ----------
     kind : {"processes", "serial", "dask"}, optional
-        Supervised worker processes, this process, or a cluster; without it processes if there are several workers
-        and blocks. With "serial" a joint that crashes or hangs takes the campaign with it.
+        Supervised worker processes, this process, or a cluster; without it processes. With "serial" a joint that
+        crashes or hangs takes the campaign with it.
     workers : int, optional
         Number of processes; without it the number of cores.
     block : int, optional
         Joints per block; without it as many as take some seconds, see `Pace`.
     joint_timeout : float
-        Time limit of a joint, s. A block that takes longer is simulated again joint by joint.
+        Processor time without progress after which a joint is given up, s. A block in which one takes longer is halved
+        and simulated again.
     scheduler : str, optional
         Address of a Dask scheduler, such as ``tcp://host:8786``; without it a cluster is started on this machine.
     """
@@ -97,15 +99,22 @@ class Execution:
 
 
 class Block(NamedTuple):
-    """File slots that are simulated together, their parameters and their solver options."""
+    """File slots that are simulated together at an operating point, their parameters and their solver options."""
 
+    point: str
     slots: NDArray[np.intp]
     params: NDArray[np.void]
     options: Options
 
     def split(self) -> list[Block]:
-        """Split into blocks of one joint each."""
-        return [Block(self.slots[i : i + 1], self.params[i : i + 1], self.options) for i in range(len(self.slots))]
+        """Split into halves; a block of one joint is its only piece."""
+        half = (len(self.slots) + 1) // 2
+        parts = [part for part in (slice(half), slice(half, None)) if self.slots[part].size]
+        return [self._replace(slots=self.slots[part], params=self.params[part]) for part in parts]
+
+    def size(self) -> int:
+        """Return the number of joints."""
+        return len(self.slots)
 
 
 class Timed(NamedTuple):
@@ -150,19 +159,26 @@ class Pace:
 
 
 class Finished(NamedTuple):
-    """File slots, their simulation, and why they were given up; empty if they were not."""
+    """Operating point, file slots, their simulation, and why they were given up; empty if they were not."""
 
+    point: str
     slots: NDArray[np.intp]
     simulation: Simulation
     trouble: str
 
 
-def pending(store: Reader, stop_slot: int) -> Iterator[NDArray[np.intp]]:
-    """Yield the pending file slots below `stop_slot`, in arrays as from `Reader.pending_blocks`."""
-    for slots in store.pending_blocks():
-        if slots[0] >= stop_slot:
-            return
-        yield slots[slots < stop_slot]
+def pending(store: Reader, stop_slot: int) -> Iterator[tuple[Reader, NDArray[np.intp]]]:
+    """Yield the pending file slots below `stop_slot` with the file at their operating point.
+
+    Of `MAX_BLOCK` rows at a time those of all points: after an interruption few joints are done at some points only.
+    """
+    each = store.each()
+    for first in range(0, stop_slot, MAX_BLOCK):
+        for one in each:
+            status = one.status(slice(first, min(first + MAX_BLOCK, stop_slot)))
+            slots = first + np.flatnonzero(status == Status.PENDING)
+            if slots.size:
+                yield one, slots
 
 
 def simulate_pending(
@@ -177,18 +193,19 @@ def simulate_pending(
     WorkerDied
         When worker processes die whichever block they work on.
     """
-    todo = sum(len(slots) for slots in pending(store, stop_slot))
+    todo = sum(len(slots) for _, slots in pending(store, stop_slot))
     workers = execution.workers or executors.available_workers()
     size = execution.block or default_block(todo, workers)
     if not todo:
         return
-    kind = execution.kind or ("processes" if workers > 1 and todo > size else "serial")
+    kind = execution.kind or default_kind(workers, -(-todo // size))
     pace = Pace(todo, workers, execution.block)
     blocks = _blocks(study, store, stop_slot, pace, stages.perturb)
     work: executors.Work[Block, Timed | Lost] = executors.Work(
         partial(_simulate, stages.simulate, study.output.histories, study.output.harmonics, store.history_specs),
         Block.split,
-        stages.warm_up,
+        Block.size,
+        partial(prepare, stages.warm_up, settings_in_use(study, store)),
         execution.joint_timeout,
     )
     results: Generator[tuple[Block, Timed | Lost], None, None]
@@ -205,12 +222,17 @@ def simulate_pending(
             if isinstance(result, Lost):
                 status = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
                 blank = without_simulation(len(block.slots), status, store.history_specs)
-                yield Finished(block.slots, blank, result.reason)
+                yield Finished(block.point, block.slots, blank, result.reason)
             else:
                 begin = time.perf_counter()
                 # the caller writes the block to the file before it asks for the next one
-                yield Finished(block.slots, result.simulation, "")
+                yield Finished(block.point, block.slots, result.simulation, "")
                 pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
+
+
+def default_kind(workers: int, blocks: int) -> Literal["processes", "serial"]:
+    """Return where to simulate without further instruction: always supervised, however few joints there are."""
+    return "processes"
 
 
 def default_block(n_pending: int, workers: int) -> int:
@@ -223,16 +245,30 @@ def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec])
     return Simulation(without_results(n, status), {name: spec.blank(n) for name, spec in specs.items()})
 
 
+def settings_in_use(study: Study, store: Reader) -> list[Options]:
+    """Return the solver options of all joints of a file, each once."""
+    retried = [from_names(retry["options"]) for retry in store.retries]
+    return list(dict.fromkeys([*(settings(solver, store.fidelity) for solver in study.solvers), *retried]))
+
+
+def prepare(warm_up: Callable[[Options], object], options: Iterable[Options]) -> None:
+    """Compile what joints with any of the options need, or load it."""
+    for one in options:
+        warm_up(one)
+
+
 def _blocks(
     study: Study, store: Reader, stop_slot: int, pace: Pace, perturb: Callable[..., NDArray[np.void]]
 ) -> Iterator[Block]:
-    """Yield the pending file slots below `stop_slot` as blocks whose joints have the same solver options."""
+    """Yield the pending file slots below `stop_slot` as blocks whose joints have the same point and solver options."""
+    studies = {point: study.at(point) for point in store.points}
     variant_options = [settings(solver, store.fidelity) for solver in study.solvers]
     retry_options = [from_names(retry["options"]) for retry in store.retries]
-    distinct = list(dict.fromkeys(variant_options + retry_options))
-    for slots in pending(store, stop_slot):
+    distinct = settings_in_use(study, store)
+    for one, slots in pending(store, stop_slot):
         read = slice(slots[0], slots[-1] + 1)
-        errors, attempt = store.errors(read), store.attempt(read)[slots - slots[0]]
+        errors, attempt = store.errors(read), one.attempt(read)[slots - slots[0]]
+        point = one.point or ""
         variant = variants(study, store.row(slots))
         options = [
             retry_options[k - 1] if k else variant_options[i]
@@ -243,8 +279,8 @@ def _blocks(
             left = slots[option == number]
             while left.size:
                 some, left = np.split(left, [pace.take(left.size)])
-                params = perturbed(study, store.row(some), errors[some - slots[0]], perturb)
-                yield Block(some, params, distinct[number])
+                params = perturbed(studies[point], store.row(some), errors[some - slots[0]], perturb)
+                yield Block(point, some, params, distinct[number])
 
 
 def _finite(params: NDArray[np.void]) -> NDArray[np.bool_]:
@@ -263,11 +299,11 @@ def _simulate(
 ) -> Timed:
     """Simulate a block and measure the time that it takes."""
     begin = time.perf_counter()
-    simulation = _simulate_finite(simulate, histories, n_harmonics, specs, block)
+    simulation = simulate_finite(simulate, histories, n_harmonics, specs, block)
     return Timed(simulation, time.perf_counter() - begin)
 
 
-def _simulate_finite(
+def simulate_finite(
     simulate: Callable[..., Simulation],
     histories: str,
     n_harmonics: int,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import chain
 from pathlib import Path
@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
-from tolstat.store import Counts, Reader, ResultStore
+from tolstat.store import Counts, Reader, ResultStore, what_if
 from tolstat.store.assembly import DifferingResults, assemble, check_free
+from tolstat.store.provenance import differing_code
 from tolstat.store.recall import differing_keys, recall
 from tolstat.store.result_file import BLOCK
+from tolstat.store.what_if import Altered
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -30,6 +32,8 @@ NOT_EXTENDABLE = {
     "subset": "the levels of a subset simulation determine its number of joints",
 }
 """Sampling methods whose campaigns cannot be extended, and the reason."""
+OTHER_CODE = "was begun by another version of the code"
+"""Fault of a file that gets no further results, because they could differ."""
 
 
 class Merged(NamedTuple):
@@ -41,10 +45,13 @@ class Merged(NamedTuple):
         Numbers of joints of the campaign by status.
     twice : int
         Number of surplus copies of rows that several files hold with the same results.
+    dropped : int
+        Number of changes of the group ``what_if`` that are left out, because the files hold different joints of them.
     """
 
     counts: Counts
     twice: int
+    dropped: int
 
 
 def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
@@ -78,8 +85,17 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
         _check_extendable(store, n)
         study = recall(store, n, study_path)
         more = range(store.n, study.rows)
+        altered = what_if.read(store)
         grow(store, study, draw_blocks(study, more), origin_blocks(study, more))
-        return study
+    _keep(path, altered)
+    return study
+
+
+def _keep(path: Path, altered: Mapping[str, Altered]) -> None:
+    """Write joints with other tolerances to the new file of a campaign: they are samples of that campaign."""
+    if altered:
+        with ResultStore.open_to_write(path) as store:
+            what_if.write(store, altered)
 
 
 def grow(
@@ -108,7 +124,8 @@ def grow(
     changed = {"identity": study.identity(), "sampling": sampling}
     attrs = store.attributes() | {name: json.dumps(value, allow_nan=False) for name, value in changed.items()}
     attrs["campaign_rows"] = study.rows
-    attrs.pop("stop", None)
+    if store.stop:  # the looks of a stop rule stay looks
+        attrs["stop"] = json.dumps({"reached": False, "looks": store.stop["looks"]})
     drawn = None if origin is None else chain(_blocks(store, store.origin), origin)
     whole = chain(_blocks(store, store.errors), errors)
     assemble(store.path, attrs, study.rows, [store], whole, overwrite=True, origin=drawn)
@@ -156,14 +173,19 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
             found = f"hold different results of row {error.row}: {error.column} differs"
             remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {error.row}"
             raise InputError([Fault(" and ".join(holding), found, remedy)]) from None
+        twice = sum(len(store.rows) for store in stores) - stores[0].campaign_rows
+        altered, dropped = what_if.common(what_if.read(store) for store in stores)
+    _keep(out, altered)
     with Reader.open(out) as store:
-        return Merged(store.counts(), sum(len(s.rows) for s in stores) - store.n)
+        return Merged(store.counts(), twice, dropped)
 
 
 def _check_extendable(store: Reader, n: int) -> None:
     place, held = str(store.path), store.sampling["n"]
     faults = []
     reason = NOT_EXTENDABLE.get(store.sampling["method"])
+    if "replicates" in store.sampling:
+        reason = "its replicates are consecutive blocks, so that more joints would change the existing ones"
     if reason:
         remedy = "change the study, and run it as another campaign: tolstat run STUDY --out OTHER.h5"
         faults.append(Fault(place, f"cannot be extended: {reason}", remedy))
@@ -174,8 +196,16 @@ def _check_extendable(store: Reader, n: int) -> None:
         faults.append(Fault(place, found, "merge all slices first: tolstat merge SLICE... --out FILE"))
     elif store.history_specs and not store.complete:
         faults.append(_unfinished(store))
+    if other := differing_code(store.versions):
+        remedy = f"extend it with {code_of(store)}, or run its study into another file: tolstat run STUDY --n {n} --out"
+        faults.append(Fault(place, "\n    ".join([OTHER_CODE, *other]), f"{remedy} OTHER.h5"))
     if faults:
         raise InputError(faults)
+
+
+def code_of(store: Reader) -> str:
+    """Name the code that began a file."""
+    return f"commit {store.git_commit}" if store.git_commit else "the version that began it"
 
 
 def _check_one_campaign(stores: Sequence[Reader]) -> None:

@@ -16,17 +16,21 @@ from tolstat.campaign import verify
 from tolstat.campaign.executors import available_workers
 from tolstat.campaign.progress import Tell, kernels, silent
 from tolstat.campaign.run import choose_fidelity
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import load_of, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation, Status
 from tolstat.display import text
 from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, origin_blocks, streams
 from tolstat.solver import refinement
 from tolstat.solver.simulation import history_specs, simulate_rows, warm_up
+from tolstat.store import worst
 from tolstat.store.axes import attach_scales
 from tolstat.store.histories import create_dataset, create_group
 from tolstat.store.new_file import attributes, fill
 from tolstat.store.recorded import perturbed, settings, variants
+from tolstat.store.result_file import place_of
+from tolstat.study import swept
+from tolstat.study.points import names_of
 from tolstat.study.tolerances import meaning
 
 if TYPE_CHECKING:
@@ -42,10 +46,14 @@ ORDINARY = 680.0
 CONFIDENCE = 0.95
 DRAWN = 1 << 14
 """Largest number of joints whose clearances are computed."""
+LOOPS = 5
+"""Number of times that `_loop` is timed; the shortest time counts."""
+LOOP_S = 0.0124
+"""Time of `_loop` on the core that the three times below were measured on, s."""
 START_S = 4.0
-"""Time from the command to the first joint: imports, loading the kernels, start of the workers; on one core, s."""
-REPORT_S, REPORT_S_PER_JOINT = 2.0, 2.5e-5
-"""Time of a report with 16 limits: imports and figures, and per joint; on the same core, s."""
+"""Time from the command to the first joint: imports, loading the kernels, start of the workers, s."""
+REPORT_S, REPORT_S_PER_JOINT = 3.0, 2.5e-5
+"""Time of a report with 16 limits: imports and figures, and per joint, s."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +125,8 @@ class Plan:
     ----------
     rows : int
         Number of joints, including the nominal joint.
+    points : list of str
+        Operating points that each joint is simulated at; one without a name unless the study has several.
     dimensions : int
         Number of errors that scatter; a vector of a zone counts as two.
     pilot : int
@@ -126,12 +136,13 @@ class Plan:
     fidelity : str
         What ``solver.fidelity = "auto"`` chooses, and why; empty if the study gives the fidelity.
     seconds_per_joint : float
-        Mean processor time of a joint, s: its time in one process that has a core of its own.
+        Mean processor time of a joint at all points, s: its time in one process that has a core of its own.
     workers : int
         Number of processes of the campaign.
     stages : dict of str to float
         Time of each stage of the whole command ``tolstat run`` if every process has a core of its own, s: ``start`` (of
         this process and the workers, kernels compiled), ``joints``, ``check`` of the numerical error, ``report``.
+        Joints and check are timed in the pilot; start and report are scaled by the speed of this machine, and rough.
     process_bytes : int
         Peak memory of this process so far; the campaign needs as much for each worker and for its parent process.
     file_bytes : int
@@ -146,13 +157,20 @@ class Plan:
         Joints that do not go together.
     fit : list of str
         What the fit of the study means, as lines of text; empty without one.
+    sweep : list of str
+        Axes of a sweep whose values are deviations where a value of the joint is easily meant, as lines of text.
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
+    exact : list of str
+        Patterns of the offsets and tilts that nothing sets in a study with tolerances; see `meaning.exact`.
+    correlations : list of dict
+        What correlations mean for the errors themselves: rows of `study.tolerances.meaning.correlations`.
     wilks : dict of float to int
         Minimum number of joints for a one-sided bound, by quantile.
     """
 
     rows: int
+    points: list[str]
     dimensions: int
     pilot: int
     failed: int
@@ -169,7 +187,10 @@ class Plan:
     reversals: Reversals
     assembly: Assembly
     fit: list[str]
+    sweep: list[str]
     tolerances: list[dict[str, Any]]
+    exact: list[str]
+    correlations: list[dict[str, Any]]
 
     @property
     def seconds(self) -> float:
@@ -201,20 +222,25 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     stage("pilot")
     rows = np.unique(np.linspace(0, study.rows - 1, min(pilot, study.rows)).astype(np.intp))
     errors = _errors(study, rows)
-    params = perturbed(study, rows, errors, perturb)
     choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
     own = [settings(solver, choice) for solver in study.solvers]
-    simulation, seconds = simulate_timed(study, params, [own[number] for number in variants(study, rows)])
-    each = seconds / len(rows)
+    options = [own[number] for number in variants(study, rows)]
+    at = {point.name: perturbed(study.at(point.name), rows, errors, perturb) for point in study.points}
+    timed = {name: simulate_timed(study, params, options) for name, params in at.items()}
+    each = sum(seconds for _, seconds in timed.values()) / len(rows)
     stage("check of the numerical error")
-    check = _check(study, params, simulation, [own[number] for number in variants(study, rows)])
-    stages = {"start": START_S, "joints": each * study.rows / workers, "check": check}
-    stages["report"] = REPORT_S + REPORT_S_PER_JOINT * study.rows
+    check = sum(_check(study, at[name], simulation, options) for name, (simulation, _) in timed.items())
+    results = {name: simulation.results for name, (simulation, _) in timed.items()}
+    slower = min(_loop() for _ in range(LOOPS)) / LOOP_S
+    stages = {"start": slower * START_S, "joints": each * study.rows / workers, "check": check}
+    stages["report"] = slower * (REPORT_S + REPORT_S_PER_JOINT * study.rows)
     iid = study.sampling.method == "random"
     valid = slice(study.first_sample, None)
-    status = simulation.results["status"]
+    status = worst.together(list(results.values()))["status"]
+    simulation = next(iter(timed.values()))[0]
     return Plan(
         rows=study.rows,
+        points=list(at),
         dimensions=len(streams(study)),
         pilot=len(rows),
         failed=int(np.isin(status, FAILED).sum()),
@@ -226,13 +252,32 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         process_bytes=_process_bytes(),
         file_bytes=_file_bytes(study, errors, simulation, settings(study.solver, choice), choice),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
-        limits=_limits(study, simulation.results[valid]) if iid else [],
+        limits=_limits(study, {name: own[valid] for name, own in results.items()}) if iid else [],
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
-        reversals=_reversals(params, simulation.results),
+        reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()])),
         assembly=_assembly(study, iid),
-        fit=[] if study.fit is None else study.fit.meaning,
+        fit=fit_in_words(study),
+        sweep=swept.meaning(study.sweep, study.joint),
         tolerances=text.records(meaning.table(study.entries)),
+        exact=meaning.exact(study.entries, study.errors),
+        correlations=text.records(meaning.correlations(study.copula, study.tolerances)),
     )
+
+
+def _loop() -> float:
+    """Processor time of a fixed piece of Python, s: start and report are Python, and take as much more or less."""
+    begin, total = time.process_time(), 0
+    for i in range(300_000):
+        total += i % 7
+    return time.process_time() - begin
+
+
+def fit_in_words(study: Study) -> list[str]:
+    """Lines about the fit of a study, also which values of the joint file it replaces; empty without one."""
+    if study.fit is None:
+        return []
+    values = " and ".join(f"{key} = {value}" for key, value in study.joint.replaced_bearing.items())
+    return [*study.fit.meaning, *([f"fit: replaces {values} of the joint file"] if values else [])]
 
 
 def _assembly(study: Study, iid: bool) -> Assembly:
@@ -292,12 +337,12 @@ def _width(share: float, n: int) -> float:
     return float(upper - lower)
 
 
-def _limits(study: Study, results: NDArray[np.void]) -> list[LimitPlan]:
+def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[LimitPlan]:
     plans = []
     for name, level in study.limits.items():
-        found = exceedance.exceedance(
-            LOADS[name].of(results), results["status"], level, CONFIDENCE, ends=LOADS[name].ends(results)
-        )
+        points = names_of(split(name)[1], list(results), "limits")
+        values, status, ends = worst.load_of([results[point] for point in points], load_of(name))
+        found = exceedance.exceedance(values, status, level, CONFIDENCE, ends=ends)
         valid = found.n - found.n_failed - found.n_unsettled
         nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))
@@ -314,11 +359,12 @@ def _file_bytes(
     origin = origin_blocks(study, range(n))
     with h5py.File("pilot", "w", driver="core", backing_store=False, block_size=512) as file:
         fill(file, attributes(study, specs, dimensions(), options, choice), range(n), [errors], design, origin)
-        group = create_group(file) if specs else file
-        for name, spec in specs.items():
-            dataset = create_dataset(group, name, n, spec)
-            dataset[...] = simulation.histories[name]
-            attach_scales(dataset, file["row"], spec)
+        for point in study.points if specs else ():
+            group = create_group(file[place_of(point.name)])
+            for name, spec in specs.items():
+                dataset = create_dataset(group, name, n, spec)
+                dataset[...] = simulation.histories[name]
+                attach_scales(dataset, file["row"], spec)
         file.flush()
         sizes: list[int] = []
 

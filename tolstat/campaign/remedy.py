@@ -5,12 +5,21 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import FAILED, MAX_ITERATIONS, STATUS_TEXT, UNSETTLED, Motion, Status
+from tolstat.common.tables import (
+    FAILED,
+    MAX_ITERATIONS,
+    STATUS_TEXT,
+    UNSETTLED,
+    Motion,
+    Status,
+    iterations_allowed,
+)
 from tolstat.solver.refinement import MIN_MAX_REVS
 
 if TYPE_CHECKING:
@@ -19,7 +28,7 @@ if TYPE_CHECKING:
 MAX_REVS, MAX_STEPS = 1000, 20_000
 """Largest solver.max_revs and solver.steps_per_rev that a study may have."""
 WITHOUT_RESULTS = {
-    Status.TIMEOUT: 'simulate it again with more time: tolstat run STUDY --retry timeout --joint-timeout "1 h"',
+    Status.TIMEOUT: 'it hangs; with more time: tolstat run STUDY --retry timeout --joint-timeout "1 h"',
     Status.CRASHED: "simulate it again: tolstat run STUDY --retry crashed; if it crashes again, report the error",
     Status.INVALID_INPUT: "a parameter is not finite: check the tolerances in the study",
     Status.OUTSIDE_MODEL: "negative clearance, |alpha| >= 90 deg, no speed or no stiffness: change joint or tolerances",
@@ -31,11 +40,12 @@ WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
 """Sampling methods of a production whose joints are not independent."""
 
 
-def without_interval(method: str) -> str:
+def without_interval(method: str, replicates: int = 1) -> str:
     """Return why shares of a sampling method have no interval, and the remedy; empty if they have one."""
-    if method not in WITHOUT_INTERVAL:
+    if method not in WITHOUT_INTERVAL or replicates > 1:
         return ""
-    return f'shares of {WITHOUT_INTERVAL[method]} have no interval: set sampling.method = "random" for a verdict'
+    remedy = 'set sampling.replicates = 8, or sampling.method = "random"'
+    return f"shares of {WITHOUT_INTERVAL[method]} have no interval: {remedy} for a verdict"
 
 
 class Reason(NamedTuple):
@@ -51,18 +61,22 @@ class Reason(NamedTuple):
         Row of the first in the campaign.
     remedy : str
         Remedy for the first.
+    point : str
+        Operating point, where the campaign has several.
     """
 
     status: Status
     joints: int
     row: int
     remedy: str
+    point: str = ""
 
     @property
     def text(self) -> str:
         """Number, status, meaning and remedy, in lines."""
         noun = "joint" if self.joints == 1 else "joints"
-        head = f"{self.joints} {noun} {self.status.label}: {STATUS_TEXT[self.status]}"
+        where = f" at {self.point}" if self.point else ""
+        head = f"{self.joints} {noun} {self.status.label}{where}: {STATUS_TEXT[self.status]}"
         return f"{head}\n  hint, for row {self.row}: {self.remedy}"
 
     @property
@@ -74,23 +88,23 @@ class Reason(NamedTuple):
         return f"--retry {self.status.label}" if "--retry" in self.remedy else ""
 
 
-def reasons(store: Reader, status: NDArray[np.uint8]) -> list[Reason]:
+def reasons(store: Reader, status: Mapping[str, NDArray[np.uint8]]) -> list[Reason]:
     """Why joints of a file have no valid load, most frequent status first.
 
     Parameters
     ----------
     store : Reader
         The file.
-    status : ndarray, shape (n,)
-        Status of its joints, the nominal joint included.
+    status : mapping of str to ndarray, shape (n,)
+        Status of its joints at each operating point, the nominal joint included.
     """
     found = []
-    for state in (*FAILED, *UNSETTLED):
-        slots = np.flatnonzero(status == state)
+    for point, state in product(status, (*FAILED, *UNSETTLED)):
+        slots = np.flatnonzero(status[point] == state)
         if slots.size:
-            first = int(slots[0])
-            row = store.results(slice(first, first + 1))[0]
-            found.append(Reason(Status(state), len(slots), int(store.row(slots[:1])[0]), remedy(row, store.options)))
+            first, joint = int(slots[0]), int(store.row(slots[:1])[0])
+            row = store.at(point).results(slice(first, first + 1))[0]
+            found.append(Reason(Status(state), len(slots), joint, remedy(row, store.options), point))
     return sorted(found, key=lambda reason: -reason.joints)
 
 
@@ -148,6 +162,9 @@ def _more_revs(options: Mapping[str, Any]) -> int:
 
 def _of_newton_failure(row: np.void, options: Mapping[str, Any]) -> str:
     place, steps = _place(row), _more_steps(options)
+    if row["newton_iterations"] == iterations_allowed(options["steps_per_rev"], options["max_revs"]):
+        spent = f"all {row['newton_iterations']} iterations that a joint may take were spent at {place}"
+        return f"{spent}: try solver.steps_per_rev = {steps}"
     if row["newton_iterations"] > MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
         return f"{MAX_ITERATIONS} iterations a step were spent at {place}: try solver.steps_per_rev = {steps}"
     return f"failed at {place}: try solver.steps_per_rev = {steps}, or solver.max_halvings = 20"

@@ -121,13 +121,15 @@ def begin(store: ResultStore, retry: Retry, specs: Mapping[str, HistorySpec], te
     """
     entry = json.loads(json.dumps(retry.entry()))
     number = len(store.retries)
-    if store.retries[-1:] == [entry] and np.any(store.attempt()[store.pending()] == number):
+    each = store.each()
+    if store.retries[-1:] == [entry] and any(np.any(one.attempt()[one.pending()] == number) for one in each):
         return
     if dict(specs) != store.history_specs:
         found = "these settings give load histories another number of samples than those in the file"
         remedy = "remove solver.steps_per_rev, or run another campaign: tolstat run STUDY --out OTHER.h5"
         raise InputError([Fault("--set", found, remedy)])
-    rows = np.flatnonzero(np.isin(store.status(), retry.status))
-    tell(f"{rows.size} joints are simulated again")
-    if rows.size:
+    rows = {one.point or "": np.flatnonzero(np.isin(one.status(), retry.status)) for one in each}
+    again = sum(slots.size for slots in rows.values())
+    tell(f"{again} joints are simulated again")
+    if again:
         store.begin_retry(rows, entry)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import signals, verify
-from tolstat.campaign.blocks import Execution, Stages, pending, simulate_pending
+from tolstat.campaign.blocks import Execution, Finished, Stages, pending, prepare, settings_in_use, simulate_pending
 from tolstat.campaign.executors import WorkerDied
-from tolstat.campaign.extend import NOT_EXTENDABLE
+from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
 from tolstat.campaign.retry import Retry, begin
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
 from tolstat.solver import fidelity, rainflow
 from tolstat.store import Counts, Reader, ResultStore
-from tolstat.store.provenance import versions
+from tolstat.store.provenance import differing_code
 from tolstat.store.recall import differing_keys
 from tolstat.store.recorded import perturbed, settings
 
@@ -131,35 +131,46 @@ def run(
         try:
             if next(pending(store, last), None) is not None:
                 stage(kernels())
-                stages.warm_up()
+                prepare(stages.warm_up, settings_in_use(study, store))
                 store.begin_session(counts.done)
             stage(JOINTS)
-            if progress:
-                progress(counts)
             finished = simulate_pending(study, store, last, stages, execution, stop)
             with stop.deferred(), closing(finished):
-                for done in finished:
-                    store.write(done.slots, done.simulation)
-                    counts = counts.after(done.simulation.results["status"])
-                    if done.trouble:
-                        status = Status(done.simulation.results["status"][0])
-                        tell(f"row {store.rows[done.slots[0]]}: {status.label}: {done.trouble}")
-                    if progress:
-                        progress(counts)
+                counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
                 stage("check of the numerical error")
-                verify.check_few(store, partial(_rows_of, study, store, stages), stages.simulate)
+                for one in store.each():
+                    verify.check_few(one, partial(_rows_of, study.at(one.point or ""), one, stages), stages.simulate)
             store.finish()
             store.end_session()
         except KeyboardInterrupt:
             store.end_session()
             raise Interrupted(path, store.counts(), stop.number) from None
         except WorkerDied as error:
-            kept = f"{path} holds the results of {counts.done} of {counts.total} joints"
+            held = store.counts()
+            kept = f"{path} holds the results of {held.done} of {held.total} joints"
             raise WorkerDied(f"{error}\n  {kept}; to resume, run the same command again") from error
         if next(pending(store, last), None) is not None:
             raise Interrupted(path, counts, stop.number)
         return counts
+
+
+def _write_blocks(
+    store: ResultStore, finished: Iterable[Finished], counts: Counts, progress: Reporter | None, tell: Tell
+) -> Counts:
+    """Write blocks to the file as they are finished; return the numbers of joints by status after the last one."""
+    if progress:
+        progress(counts)
+    for done in finished:
+        store.at(done.point).write(done.slots, done.simulation)
+        counts = counts.after(done.simulation.results["status"])
+        if done.trouble:
+            status = Status(done.simulation.results["status"][0])
+            place = f"row {store.rows[done.slots[0]]}" + (f" at {done.point}" if done.point else "")
+            tell(f"{place}: {status.label}: {done.trouble}")
+        if progress:
+            progress(counts)
+    return counts
 
 
 def _own_stages() -> Stages:
@@ -223,10 +234,11 @@ def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any
         The record of the choice, see `fidelity.Choice`.
     """
     stages = stages or _own_stages()
-    stages.warm_up()
+    stages.warm_up(study.solver.options())
     rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
     errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
-    params = perturbed(study, rows, errors, stages.perturb)
+    each = [perturbed(study.at(point.name), rows, errors, stages.perturb) for point in study.points]
+    params = np.concatenate(each)  # one choice for all points
     simulate = partial(stages.simulate, histories="none", n_harmonics=0)
     budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
     return fidelity.choose(params, study.solver.options(), budget, study.asked, simulate, min_steps).record
@@ -242,14 +254,8 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     found, remedy = "is the result file of another study", "give another file: --out OTHER.h5"
     if not differing:
-        code = f"commit {store.git_commit}" if store.git_commit else "the version that began it"
-        found = "was begun by another version of the code"
-        remedy = f"run the study into another file (--out OTHER.h5), or resume with {code}"
-    now = versions()
-    for name, noun in (("tolstat", "version"), ("sources", "hash")):
-        held = store.versions.get(name, "unknown")
-        if held != now[name]:
-            differing.append(f"{name}: {noun} {held} in the file, {now[name]} now")
+        found, remedy = OTHER_CODE, f"run the study into another file (--out OTHER.h5), or resume with {code_of(store)}"
+    differing += differing_code(store.versions)
     if held_n := _other_number(store, study, differing):
         raise StoreError(str(_of_number(store, held_n, study.samples)))
     if not differing and store.rows != rows:

@@ -129,17 +129,17 @@ def simulate_case(case: Case) -> CaseResult:
     """
     from tolstat.joint import nominal_errors, perturb
 
-    errors = nominal_errors(2, case.operation)
+    errors = nominal_errors(2)
     for name, value in case.errors.items():
         errors[name][0] = value
-    params = perturb(case.joint, errors)
+    params = perturb(case.joint, case.operation, errors)
     warm_up()
     begin = time.perf_counter()
     options = case.solver.options()
     both = simulate_rows(params, options, "full")
     wall_s = time.perf_counter() - begin
     own = Simulation(both.results[:1], {name: values[:1] for name, values in both.histories.items()})
-    return CaseResult(own, float(errors["operation.alpha"][0]), wall_s, options, both.results[1:])
+    return CaseResult(own, case.operation.alpha, wall_s, options, both.results[1:])
 
 
 def _number(value: float) -> float | None:

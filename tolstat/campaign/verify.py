@@ -16,8 +16,8 @@ from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
-from tolstat.store import Counts, Reader, ResultStore, recorded, verification
-from tolstat.store.provenance import versions
+from tolstat.store import Counts, Reader, ResultStore, recorded, verification, worst
+from tolstat.store.provenance import differing_code
 from tolstat.store.verification import Check, Verification
 
 if TYPE_CHECKING:
@@ -208,6 +208,20 @@ def check_campaign(
     slots = choose(settled, joints, seed)
     if not slots.size:
         return None
+    return check_slots(store, parameters, slots, names, seed, simulate, workers, progress)
+
+
+def check_slots(
+    store: Reader,
+    parameters: Callable[[NDArray[np.intp]], NDArray[np.void]],
+    slots: NDArray[np.intp],
+    names: Iterable[str],
+    seed: int = 0,
+    simulate: Simulate | None = None,
+    workers: int = 1,
+    progress: Progress = no_progress,
+) -> Verification:
+    """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
     options = [recorded.options_of(store, slot) for slot in slots.tolist()]
     checks = run_checks(parameters(slots), options, names, simulate, workers, progress)
     for check in checks.values():
@@ -296,19 +310,27 @@ def check_file(
     """
     number = parse_joints(joints)
     with ResultStore.open_to_write(path) as store:
-        if any(store.versions.get(key) != value for key, value in versions().items() if key in ("tolstat", "sources")):
-            remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
-            raise StoreError(str(Fault(str(path), "was made by another version of the code", remedy)))
+        check_version(store)
         seed = int(store.sampling["seed"]) if seed is None else seed
-        if not (store.status() == Status.OK).any():
+        if not any((one.status() == Status.OK).any() for one in store.each()):
             remedy = f"run the campaign first: tolstat run STUDY --out {path}"
             raise StoreError(str(Fault(str(path), "has no settled joint", remedy)))
         on_start()
-        params = partial(recorded.parameters, store)
-        found = check_campaign(store, params, names, number, seed, None, workers, progress)
-        assert found is not None
-        verification.write(store, found)
-    return found
+        for one in store.each():
+            params = partial(recorded.parameters, one)
+            found = check_campaign(one, params, names, number, seed, None, workers, progress)
+            if found is not None:
+                verification.write(one, found)
+        checked = worst.checks([one for one in map(verification.read, store.each()) if one is not None])
+        assert checked is not None
+    return checked
+
+
+def check_version(store: Reader) -> None:
+    """Raise a StoreError for a file that other code made."""
+    if differing_code(store.versions):
+        remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
+        raise StoreError(str(Fault(str(store.path), "was made by another version of the code", remedy)))
 
 
 def check_study(
@@ -321,8 +343,19 @@ def check_study(
 ) -> Verification:
     """Check joints of a study that has not been run: simulate them with its own settings and for each check.
 
-    Parameters, returns and raises as `check_file`; the joints returned include those that do not settle.
+    Parameters, returns and raises as `check_file`; the joints returned include those that do not settle. Of several
+    operating points the joints follow one another.
     """
+    each = [_check_at(plan.at(point.name), joints, seed, names, workers, progress) for point in plan.points]
+    found = worst.checks(each)
+    assert found is not None
+    return found
+
+
+def _check_at(
+    plan: Study, joints: int | str, seed: int | None, names: Iterable[str], workers: int, progress: Progress
+) -> Verification:
+    """Check joints of a study with one operating point."""
     from tolstat.joint import perturb
     from tolstat.sampling import draw
 

@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from tolstat import __version__
+from tolstat.cli._shortage import shortage
 from tolstat.cli._talk import LogFile, Quiet, Verbose, fail, say, session, warn
 from tolstat.common.errors import Fault, InputError, TolstatError
 
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from tolstat.display.table import Column
     from tolstat.joint import Joint
     from tolstat.report import Report
+    from tolstat.study import Study
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load."
 EPILOG = (
@@ -56,6 +58,22 @@ class _Commands(TyperGroup):
             rows = [(f"{name:{width}}", self.commands[name].get_short_help_str(formatter.width)) for name in names]
             with formatter.section(heading):
                 formatter.write_dl(rows)
+
+
+class OneCommand(TyperCommand):
+    """A command whose help names each argument by its word alone: FILE, without a type of Python behind it."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Parameters of the command, for help and for parsing."""
+        found = super().get_params(ctx)
+        for argument in found:
+            if isinstance(argument, TyperArgument):
+                argument.display_type_rich = _no_type  # type: ignore[method-assign]
+        return found
+
+
+def _no_type(ctx: Any) -> None:
+    return None
 
 
 app = typer.Typer(
@@ -87,12 +105,40 @@ ByMany = Annotated[
     list[str] | None,
     typer.Option("--by", metavar="LOAD", help="Load, such as cross1.F; repeatable; default: loads with limits."),
 ]
+AtPoints = Annotated[
+    str | None,
+    typer.Option(
+        "--point",
+        metavar="POINT",
+        help="Operating point, such as cruise, or the worst of some: cruise+start; default: the worst of all.",
+    ),
+]
+AtPoint = Annotated[
+    str | None,
+    typer.Option("--point", metavar="POINT", help="Operating point, such as cruise; needed if FILE has several."),
+]
+AtOne = Annotated[
+    str | None,
+    typer.Option(
+        "--point", metavar="POINT", help="Operating point of STUDY, such as cruise; needed if it has several."
+    ),
+]
 Accept = Annotated[
     str | None,
     typer.Option(
         "--accept",
         metavar="SHARE",
-        help='Accepted share of joints above a limit, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
+        help='Accepted share of the joints, all limits together, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
+    ),
+]
+Delivery = Annotated[
+    int,
+    typer.Option(
+        "--delivery",
+        metavar="N",
+        min=1,
+        max=10**9,
+        help="Number of joints of the next delivery, for the prediction interval of those above a limit.",
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
@@ -138,6 +184,12 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
                 except TolstatError as error:
                     fail(f"error: {error}")
                     raise typer.Exit(2) from error
+                except (MemoryError, OSError, ImportError) as error:
+                    fault = shortage(error)
+                    if fault is None:
+                        raise
+                    fail(f"error: {fault}")
+                    raise typer.Exit(2) from error
                 except KeyboardInterrupt as error:
                     fail("interrupted")
                     raise typer.Exit(130) from error
@@ -151,8 +203,10 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
         for name, annotation, default in added
     ]
-    run.__signature__ = own.replace(parameters=[*own.parameters.values(), *parameters])  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
+    signature = own.replace(parameters=[*own.parameters.values(), *parameters])
+    decorated: Any = run
+    decorated.__signature__ = signature
+    decorated.__annotations__ = {p.name: p.annotation for p in signature.parameters.values()}
     return run
 
 
@@ -171,11 +225,15 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
-def warn_without_interval(method: str) -> None:
-    """Print a warning if shares of a sampling method have no interval."""
+def print_study_warnings(path: Path, study: Study) -> None:
+    """Print the warnings of a study: of its joints, common axes that are too short, shares without an interval."""
     from tolstat.campaign.remedy import without_interval
+    from tolstat.study.tolerances import zones
 
-    if said := without_interval(method):
+    print_warnings(path, study.joints, study.variants)
+    for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):
+        warn(f"warning: {study.fault(key, found, remedy)}")
+    if said := without_interval(study.sampling.method, study.sampling.replicates):
         warn(f"warning: {said}")
 
 
@@ -255,7 +313,7 @@ def output_file(path: Path) -> Iterator[Path]:
         with files.atomic_write(path) as temporary:
             yield temporary
     except OSError as error:
-        found = f"cannot be written: {error.strerror or error}"
+        found = f"cannot be written: {files.reason(error)}"
         raise InputError(
             [Fault(str(path), found, "check that the folder is writable and the disk has space")]
         ) from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import textwrap
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
@@ -19,6 +20,8 @@ from tolstat.display.text import visible
 if TYPE_CHECKING:
     from tolstat.campaign.progress import Display
 
+WIDTH = 80
+"""Maximum length of a line of prose, characters."""
 LOG = logging.getLogger("tolstat")
 LOG.propagate = False
 
@@ -34,7 +37,8 @@ class _Stderr(logging.Handler):
     """Prints messages on the standard error of the moment: above the bar while one is shown."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        print(for_terminal(record.getMessage()), file=sys.stderr, flush=True)
+        text = for_terminal(record.getMessage())
+        print(wrapped(text) if record.levelno == logging.INFO else text, file=sys.stderr, flush=True)
 
 
 def for_terminal(text: str) -> str:
@@ -53,6 +57,18 @@ class _Terminal:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
+
+
+def wrapped(text: str) -> str:
+    """Break lines of prose above `WIDTH` characters; those with a long path or a command to type stay whole."""
+    return "\n".join(_broken(line) if len(line) > WIDTH else line for line in text.split("\n"))
+
+
+def _broken(line: str) -> str:
+    if ": tolstat " in line or max(map(len, line.split())) > WIDTH // 2:
+        return line
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    return textwrap.fill(line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def say(text: str) -> None:
@@ -89,7 +105,7 @@ def session(quiet: bool, verbose: bool, log: Path | None) -> Iterator[None]:
         if log is not None:
             LOG.addHandler(_log_file(log))
         LOG.debug("tolstat %s: %s", __version__, " ".join(sys.argv[1:]))
-        with redirect_stdout(_Terminal(sys.stdout)) if sys.stdout.isatty() else nullcontext():  # type: ignore[type-var]
+        with redirect_stdout(_Terminal(sys.stdout)) if sys.stdout.isatty() else nullcontext():
             yield
     finally:
         for handler in LOG.handlers[1:]:

@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, StudyOption, Wide, as_text, output_file, print_table
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import (
+    AsJson,
+    AtPoints,
+    Delivery,
+    ResultFile,
+    StudyOption,
+    Wide,
+    as_text,
+    output_file,
+    print_table,
+)
 from tolstat.cli._talk import progress, say
 
 
@@ -26,7 +37,7 @@ def allocate(
         typer.Option(
             "--costs",
             metavar="TABLE",
-            help="Cost of each tolerance, TOML or CSV (see docs/questions/allocate.md); default: cost inversely "
+            help="Cost of each tolerance, TOML or CSV (see tolstat docs allocate); default: cost inversely "
             "proportional to the tolerance.",
         ),
     ] = None,
@@ -42,6 +53,8 @@ def allocate(
         Path | None,
         typer.Option("--out", metavar="STUDY", help="Study file (TOML) to write, with the proposed tolerances."),
     ] = None,
+    delivery: Delivery = DELIVERY,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -61,20 +74,21 @@ def allocate(
     from tolstat.display import text
     from tolstat.questions.allocate import rendering
     from tolstat.questions.allocate.query import allocated
-    from tolstat.store import Reader
+    from tolstat.store import Reader, error_budget
     from tolstat.study.scaling import line
 
     if out is not None:
         check_target(out, file)
     with progress("search for the cheapest tolerances"), Reader.open(file) as store:
-        found = allocated(store.view(study_file), target, costs, keep or ())
+        found = allocated(store.view(study_file).at(point or ""), target, costs, keep or (), delivery=delivery)
+        unknown = "" if found.limits["numerical"].all() else error_budget.command(file)
     if out is not None:
         content = found.text
         with output_file(out) as temporary:
             temporary.write_text(content, encoding="utf-8")
     if as_json:
-        w = found.weights
-        head = {"holds": found.holds, "verdict": found.verdict, "aim": found.aim, "ess": w.ess}
+        own = found.ratios
+        head = {"holds": found.holds, "verdict": found.verdict, "aim": found.aim, "effective": own.effective}
         tables = {key: text.records(getattr(found, key)) for key in ("tolerances", "limits")}
         typer.echo(as_text({**head, "entries": found.entries, **tables}))
         return
@@ -85,5 +99,7 @@ def allocate(
         typer.echo("\n[tolerances]\n" + "\n".join(line(*item) for item in found.entries.items()))
     before, after = found.tolerances["cost_before"].sum(), found.tolerances["cost"].sum()
     say(f"total cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)\n{found.verdict}")
+    if unknown:
+        say(unknown)
     if out is not None:
         say(f"wrote {out}\nnext: tolstat run {out}")

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
-from tolstat.cli._talk import progress, say, warn
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import AsJson, AtPoints, Delivery, ResultFile, Wide, as_text, print_table
+from tolstat.cli._talk import progress, say, warn, wrapped
 from tolstat.common.errors import Fault, InputError, StoreError
 
 
@@ -17,13 +18,16 @@ def capability(
         list[float] | None,
         typer.Option("--one-in", metavar="N", min=1, help="Print the load that one in N joints exceeds; repeatable."),
     ] = None,
+    delivery: Delivery = DELIVERY,
+    point: AtPoints = None,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
     """Print yield and Cpk against each limit of the study.
 
     Prints for each limit, and for all limits together, the share of joints below it (yield) and the process capability
-    index Cpk, each with its 95 % interval.
+    index Cpk, each with its 95 % interval; with --wide or --json also a prediction interval for the number of joints
+    above the limit in the next delivery.
 
     With --one-in N, prints also the load that one in N joints exceeds, and the median of the largest load of N joints,
     from a generalised Pareto distribution fitted to the tail. N may exceed the number of simulated joints: the
@@ -33,15 +37,15 @@ def capability(
     """
     from tolstat.display import text
     from tolstat.questions.capability import query, rendering
-    from tolstat.store import Reader
+    from tolstat.store import Reader, error_budget
 
     with progress("capability"), Reader.open(file) as store:
-        view = store.view()
+        view = store.view().at(point or "")
         if not view.limits or view.method in ("sweep", "cases"):
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
             raise StoreError(str(Fault(str(file), "has no limits, or its joints are no random sample", remedy)))
         view.check_sample(allow_weights=False)
-        table = query.limits(view)
+        table, unknown = query.limits(view, delivery=delivery), error_budget.unknown(view)
         try:
             rare = query.returns(view, list(view.limits), one_in) if one_in else None
         except ValueError as error:
@@ -55,5 +59,7 @@ def capability(
         typer.echo("\nload that one in N joints exceeds; median of the largest load of N joints")
         print_table(rendering.RETURNS, rare, wide)
     say(rendering.note(table))
+    if unknown:
+        say(unknown)
     if rare is not None and (no_tail := rendering.no_tail(rare)):
-        warn(f"warning: {no_tail}; a subset simulation needs no tail: tolstat rare")
+        warn(wrapped(f"warning: {no_tail}; tolstat rare, a subset simulation, needs no tail"))

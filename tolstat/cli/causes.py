@@ -10,7 +10,7 @@ import typer
 
 from tolstat.cli._app import (
     AsJson,
-    ByOne,
+    AtPoints,
     StudyOption,
     Wide,
     Workers,
@@ -21,6 +21,14 @@ from tolstat.cli._app import (
 )
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
+
+
+class Each(StrEnum):
+    """What a line is."""
+
+    ENTRY = "entry"
+    FEATURE = "feature"
+    ERROR = "error"
 
 
 class Groups(StrEnum):
@@ -34,7 +42,14 @@ def causes(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="Result file (HDF5); with --pick-freeze: study file (TOML).")
     ],
-    by: ByOne = None,
+    by: Annotated[
+        str | None,
+        typer.Option(
+            "--by",
+            metavar="LOAD",
+            help='Load, such as cross1.F or psi, or "all limits"; default: all limits, or the only one.',
+        ),
+    ] = None,
     top: Annotated[int, typer.Option("--top", metavar="N", min=1, help="Number of errors in the printed table.")] = 12,
     logarithm: Annotated[
         bool, typer.Option("--logarithm", help="Explain the variance of the load's logarithm instead of the load's.")
@@ -59,6 +74,26 @@ def causes(
             "indices, and a figure beside it.",
         ),
     ] = None,
+    run: Annotated[
+        bool,
+        typer.Option("--run", help="Simulate joints with each line narrower and wider, and keep their loads in FILE."),
+    ] = False,
+    budget: Annotated[
+        str,
+        typer.Option("--budget", metavar="TIME", help="With --run: time limit, with unit s, min or h."),
+    ] = "5 min",
+    each: Annotated[
+        Each,
+        typer.Option(
+            "--each", help="With --run: a line is an entry of [tolerances], a pin with its hole, or an error."
+        ),
+    ] = Each.ENTRY,
+    group: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--group", metavar="NAME=PATTERN,...", help="With --run: also change these errors together; repeatable."
+        ),
+    ] = None,
     workers: Workers = None,
     against_angle: Annotated[
         bool, typer.Option("--against-angle", help="Print the indices over the input angle instead.")
@@ -66,11 +101,17 @@ def causes(
     joints: Annotated[
         int, typer.Option("--joints", metavar="N", min=100, help="With --against-angle: number of joints used.")
     ] = 1000,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print which errors cause the scatter of a load.
+    """Print which tolerances and errors cause the largest loads.
+
+    Prints for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
+    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these
+    joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled or the
+    time is up. To go on, run the same command again.
 
     Prints for each error: the share of the load's variance that it explains alone and in interactions (first-order and
     total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
@@ -88,11 +129,18 @@ def causes(
     if against_angle:
         if points is not None:
             raise InputError([Fault("--against-angle", "cannot be combined with --pick-freeze", "remove one of them")])
-        _against_angle(file, by, top, logarithm, out, joints, study_file, wide)
+        _against_angle(file, by, top, logarithm, out, joints, point, study_file, wide)
         return
+    if run:
+        if points is not None or out is not None:
+            raise InputError([Fault("--run", "cannot be combined with --pick-freeze or --out", "remove one of them")])
+        _run_lines(file, by, each, group or [], budget, workers)
+    elif group or each != Each.ENTRY:
+        raise InputError([Fault("--each, --group", "say what --run simulates", "add --run")])
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
-    from tolstat.questions.exceedance.query import most_exceeded
+    from tolstat.questions.what_if import rendering as whatifs
+    from tolstat.questions.what_if.query import what_if
     from tolstat.store import Reader
 
     if points is not None:
@@ -101,13 +149,37 @@ def causes(
         remedy = "add --pick-freeze 1024, or --against-angle"
         raise InputError([Fault("--out", "is used with --pick-freeze or --against-angle only", remedy)])
     with progress("causes"), Reader.open(file) as store:
-        view = store.view(study_file)
-        found = causes_of(view, by or most_exceeded(view), log=logarithm)
+        view = store.view(study_file).at(point or "")
+        load = by or view.decisive
+        lines = what_if(view, load) if view.altered else None
+        found = causes_of(view, load, log=logarithm)
     if as_json:
-        typer.echo(as_text(rendering.values(found)))
+        typer.echo(as_text(rendering.values(found) | ({"what_if": whatifs.values(lines)} if lines else {})))
         return
+    if lines is not None:
+        typer.echo(whatifs.heading(lines))
+        print_table(whatifs.columns(lines), whatifs.rows(lines), wide)
+        say(whatifs.note(lines))
+        typer.echo(f"\n{rendering.heading(found)}")
+    elif not found.from_design:
+        say(f"which line of the drawing to change: tolstat causes {file} --run")
     print_table(rendering.columns(found), rendering.largest(found, top), wide)
     say(rendering.note(found, logarithm))
+
+
+def _run_lines(path: Path, by: str | None, each: Each, groups: list[str], budget: str, workers: int | None) -> None:
+    """Simulate joints with other widths of each line into the result file."""
+    from tolstat.cli.run import parse_time
+    from tolstat.questions.what_if.run import simulate
+
+    seconds = parse_time(budget, "--budget")
+    announce_compilation()
+    with progress() as shown:
+        done = simulate(path, by, each.value, groups, seconds, workers, say, shown)
+    order = "settled" if done.settled else "not settled: a longer --budget goes on"
+    say(
+        f"simulated {done.simulated} joints in {done.seconds:.0f} s, {done.each} of each change; order of lines {order}"
+    )
 
 
 def _run_design(path: Path, points: int, groups: Groups, out: Path | None, workers: int | None) -> Path:
@@ -131,21 +203,21 @@ def _against_angle(
     logarithm: bool,
     out: Path | None,
     joints: int,
+    point: str | None,
     study_file: Path | None,
     wide: bool,
 ) -> None:
     from tolstat.common.files import check_target
     from tolstat.questions.causes import angles_figure
     from tolstat.questions.causes.angles import against_angle
-    from tolstat.questions.exceedance.query import most_exceeded
     from tolstat.store import Reader, revolutions
 
     if out is not None:
         for path in (out, out.with_suffix(".png")):
             check_target(path, file)
     with progress("causes over the input angle"), Reader.open(file) as store:
-        view = store.view(study_file)
-        load = by or most_exceeded(view)
+        view = store.view(study_file).at(point or "")
+        view, load = view.narrowed(by or view.most_exceeded)
         if not revolutions.held(store):
             announce_compilation()
         found = against_angle(view, [load], joints, (load,) if logarithm else ())[0]

@@ -1,45 +1,114 @@
-"""``tolstat docs``: the documentation site of a clone."""
+"""``tolstat docs``: a page of the documents in the terminal, or the documentation site of a clone."""
 
 from __future__ import annotations
 
+import re
+import sys
 import webbrowser
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from tolstat.cli._talk import say
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import docs_dir
 
 BUILT = Path("build", "docs", "docs", "index.html")
 """First page of the built site, from the root of a clone."""
+PAGE_WIDTH = 100
+"""Maximum width of a page in the terminal, characters."""
 BUILD = (
     'python3 -m venv .venv && .venv/bin/pip install --quiet -e ".[docs,fatigue]"',
     ".venv/bin/sphinx-build -q -c docs . build/docs",
 )
 
 
-def docs() -> None:
-    """Open the documentation in the browser.
+def docs(
+    page: Annotated[
+        str | None,
+        typer.Argument(metavar="PAGE", help="Page to read in the terminal, such as study; without it: the browser."),
+    ] = None,
+) -> None:
+    """Print a page of the documents, or open their site.
 
-    Opens the site that was built in a clone of the repository: the clone that tolstat was installed from with -e, or
-    that around the current folder. Prints its path, or else the two commands that build it.
+    With PAGE, prints this page: study (all keys of study and joint files), tolerances, tutorial, model, report, or the
+    name of a command, such as causes.
 
-    Example: tolstat docs
+    Without PAGE, opens the site that was built in a clone of the repository: the clone that tolstat was installed from
+    with -e, or that around the current folder. Prints its path, or else the two commands that build it. Without a
+    clone, prints the names of the pages.
+
+    Example: tolstat docs study
     """
+    if page is not None:
+        _print_page(page)
+        return
     clone = find_clone([Path(__file__).parents[2], Path.cwd(), *Path.cwd().parents])
     if clone is None:
-        say("the documentation is the folder docs/ of the repository, not part of the installed package")
-        say("next: call tolstat docs inside a clone of it, to open the pages or to see how to build them")
+        say("pages of the installed package; the site with all pages and pictures is built from a clone")
+        typer.echo(_titled())
+        say("next: tolstat docs study")
         return
-    page = clone / BUILT
-    if page.exists():
-        typer.echo(page)
-        if not webbrowser.open(page.as_uri()):
+    built = clone / BUILT
+    if built.exists():
+        typer.echo(built)
+        if not webbrowser.open(built.as_uri()):
             say("no browser was found: open this file in one")
         return
     say(f"the pages are not built yet; they can be read as text from {clone / 'docs' / 'index.md'}")
     say(f"next, in {clone}: these two commands (some minutes), then tolstat docs")
     for command in BUILD:
         typer.echo(command)
+
+
+def pages() -> dict[str, Path]:
+    """Text of each page by its name; pages of questions have the name of their command."""
+    folder = docs_dir()
+    files = [*sorted(folder.glob("*.md")), *sorted((folder / "questions").glob("*.md"))]
+    return {page_name(file.name): file for file in files}
+
+
+def page_name(file: str) -> str:
+    """Name of a page: that of its file without the ending, as commands are spelt."""
+    return file.removesuffix(".md").replace("_", "-")
+
+
+def _print_page(name: str) -> None:
+    from tolstat.common.strict import did_you_mean
+
+    known = pages()
+    file = known.get(page_name(name))
+    if file is None:
+        raise InputError([Fault(name, "is not a page", did_you_mean(name, list(known)))])
+    text = _plain(file.read_text(encoding="utf-8"))
+    if not sys.stdout.isatty():
+        typer.echo(text)
+        return
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    console = Console()
+    console.width = min(console.width, PAGE_WIDTH)
+    with console.pager():
+        console.print(Markdown(text))
+
+
+def _plain(text: str) -> str:
+    """Text of a page without what only builds the site: settings at its top, code that the site does not show."""
+    text = re.sub(r"\A---\n.*?\n---\n+", "", text, flags=re.DOTALL)
+    hidden = r"```\{code-cell\}\n:tags: \[remove-(?:input|cell)\]\n.*?\n```\n+"
+    text = re.sub(hidden, "", text, flags=re.DOTALL)
+    return re.sub(r"```\{code-cell\}\n(?::tags: .*\n)?", "```\n", text)
+
+
+def _titled() -> str:
+    """Names of the pages, and their titles."""
+    found = {}
+    for name, file in pages().items():
+        found[name] = next(line for line in _plain(file.read_text(encoding="utf-8")).splitlines() if line[:2] == "# ")
+    width = max(map(len, found))
+    return "\n".join(f"{name:{width}}  {title[2:]}" for name, title in found.items())
 
 
 def find_clone(folders: list[Path]) -> Path | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import Accept, ResultFile, as_text, output_file, parse_share
+from tolstat.cli._app import Accept, AtPoints, ResultFile, as_text, output_file, parse_share
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from tolstat.store import Reader
     from tolstat.store.view import View
 
 
@@ -58,6 +57,7 @@ def export(
         bool,
         typer.Option("--nominal", help="Include the joint without errors, marked by a column."),
     ] = False,
+    point: AtPoints = None,
 ) -> None:
     """Export joints, load cycles or statistics to files.
 
@@ -70,11 +70,13 @@ def export(
 
     --xlsx writes three sheets: the same columns, the share above each limit, the unit and meaning of each column.
 
+    If the study has several operating points, --statistics is of the worst of them, and the other files need --point.
+
     --statistics writes the verdict, the share above each limit, quantiles, capability, the numerical error and the
     versions.
 
     --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
-    keeps cycles or load histories. docs/questions/fatigue.md shows how to read it as a pandas Series.
+    keeps cycles or load histories. To read it as a pandas Series: tolstat docs fatigue
 
     Example: tolstat export iso2768_f.h5 --csv joints.csv
     """
@@ -83,32 +85,21 @@ def export(
     from tolstat.store import Reader
 
     given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--xlsx": workbook, "--statistics": statistics}
-    targets = [target for target in given.values() if target is not None]
-    if not targets or len(set(targets)) < len(targets):
-        raise typer.BadParameter(
-            "give one or more of --csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
-        )
-    if by and statistics is None:
-        raise typer.BadParameter("--by is used with --statistics only: add --statistics OUT")
-    if accept is not None and statistics is None:
-        raise typer.BadParameter("--accept is used with --statistics only: add --statistics OUT")
+    targets = {option: target for option, target in given.items() if target is not None}
+    _check_options(targets, bool(by), accept is not None, nominal)
     accepted = math.nan if accept is None else parse_share(accept)
-    if nominal and (out, parquet, workbook, cycles) == (None, None, None, None):
-        raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
-    if parquet is not None and find_spec("pyarrow") is None:
-        raise InputError(
-            [Fault("--parquet", "pyarrow is not installed", "install it with: pip install pyarrow, or use --csv OUT")]
-        )
-    for target in targets:
+    for target in targets.values():
         if target != "-":
             check_target(Path(target), file)
-    with progress("reading the file"), Reader.open(file) as store:
+    with progress("reading the file"), Reader.open(file) as opened:
+        view = opened.view().at(point or "")
+        store = view.store
         if workbook is not None:
             excel.check(store, "--xlsx")
         if cycles is not None:
-            _write(cycles, *_collectives(store.view(), nominal))
+            _write(cycles, *_collectives(view, nominal))
         if statistics is not None:
-            _write(statistics, *_statistics(store, by or (), accepted))
+            _write(statistics, *_statistics(view, by or (), accepted))
         if out is None and parquet is None and workbook is None:
             return
         frame = store.to_pandas(nominal)
@@ -121,6 +112,23 @@ def export(
     if parquet is not None:
         _write_parquet(frame, Path(parquet))
         say(f"wrote {parquet}: {len(frame)} joints")
+
+
+def _check_options(targets: dict[str, str], by: bool, accept: bool, nominal: bool) -> None:
+    """Refuse options that do not go together; `targets` are the files to write, by option."""
+    if not targets or len(set(targets.values())) < len(targets):
+        raise typer.BadParameter(
+            "give one or more of --csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
+        )
+    for option, used in (("--by", by), ("--accept", accept)):
+        if used and "--statistics" not in targets:
+            raise typer.BadParameter(f"{option} is used with --statistics only: add --statistics OUT")
+    if nominal and targets.keys() == {"--statistics"}:
+        raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
+    if "--parquet" in targets and find_spec("pyarrow") is None:
+        raise InputError(
+            [Fault("--parquet", "pyarrow is not installed", "install it with: pip install pyarrow, or use --csv OUT")]
+        )
 
 
 def _write(out: str, write: Callable[[TextIO], object], what: str) -> None:
@@ -142,12 +150,11 @@ def _collectives(view: View, nominal: bool) -> tuple[Callable[[TextIO], None], s
     return lambda stream: table.to_csv(stream, index=False, lineterminator="\n"), what
 
 
-def _statistics(store: Reader, by: Sequence[str], accepted: float) -> tuple[Callable[[TextIO], object], str]:
+def _statistics(view: View, by: Sequence[str], accepted: float) -> tuple[Callable[[TextIO], object], str]:
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.query import causes_of
     from tolstat.report import summary
 
-    view = store.view()
     found = summary.statistics(view, accepted=accepted)
     found["causes"] = {load: rendering.values(causes_of(view, load)) for load in by}
     return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"

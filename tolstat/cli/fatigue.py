@@ -8,14 +8,15 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Wide, announce_compilation, as_text, output_file, print_table
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import AsJson, Delivery, Wide, announce_compilation, as_text, output_file, print_table
 from tolstat.cli._talk import progress, say
 
 
 def fatigue(
     files: Annotated[
         list[Path],
-        typer.Argument(metavar="FILE", help="Result file (HDF5); for a duty cycle, one per operating point."),
+        typer.Argument(metavar="FILE", help="Result file (HDF5) of all operating points, or several of one each."),
     ],
     share: Annotated[
         list[float] | None,
@@ -41,6 +42,13 @@ def fatigue(
         int | None,
         typer.Option("--joints", metavar="N", min=1, help="Evaluate the first N joints only; default: all."),
     ] = None,
+    delivery: Delivery = DELIVERY,
+    point: Annotated[
+        str | None,
+        typer.Option(
+            "--point", metavar="POINT", help="Operating point of FILE, such as cruise; default: all, by their shares."
+        ),
+    ] = None,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
@@ -52,7 +60,8 @@ def fatigue(
     line of a load the share of joints whose damage sum exceeds 1. Without --by, prints the most loaded component of
     each bushing force and torque. All settings are those of [fatigue] in the study of the first FILE.
 
-    Several files form a duty cycle: the same joints at several operating points.
+    The operating points of FILE form a duty cycle, by the share of the time that [[operation]] gives each; so do
+    several files, with the same joints at one operating point each.
 
     Example: tolstat fatigue iso2768_f.h5 --by "cross*.F_t"
     """
@@ -69,19 +78,24 @@ def fatigue(
         check_target(out, *files)
     names = channels(by) if by else None
     with ExitStack() as stack:
-        views = [stack.enter_context(Reader.open(file)).view() for file in files]
-        points = of_text(views[0].store.study_text, str(files[0])).points
+        views = [stack.enter_context(Reader.open(file)).view().at(point or "") for file in files]
+        parts_named = of_text(views[0].store.study_text, str(files[0])).points
         stressed = loading = None
-        if points:
-            if not all(held(view.store) for view in views):
+        if parts_named:
+            if not all(held(part.store) for view in views for part in view.parts):
                 announce_compilation()
             with progress("stresses of the parts"):
-                stressed = load_stresses(views, share or [1.0], joints)
-                failures = parts.part_failures(stressed)
-        if all(view.store.history_specs for view in views) or names or out is not None or not points:
+                stressed = load_stresses(views, share or None, joints)
+                failures = parts.part_failures(stressed, delivery=delivery)
+        if (
+            all(part.store.history_specs for view in views for part in view.parts)
+            or names
+            or out is not None
+            or not parts_named
+        ):
             with progress("counting cycles"):
-                loading = query.load_cycles(views, share or [1.0], names, joints)
-                loads, damages = query.equivalent_loads(loading), query.damages(loading)
+                loading = query.load_cycles(views, share or None, names, joints)
+                loads, damages = query.equivalent_loads(loading), query.damages(loading, delivery=delivery)
     if loading is not None and out is not None:
         with output_file(out) as temporary:
             loads.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")

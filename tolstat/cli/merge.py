@@ -20,6 +20,7 @@ def merge(
 
     Slices are made by tolstat run --rows. They must have the same study and version of the code, and together hold all
     rows of the campaign; a row in several slices must have identical results. FILE then equals that of a single run.
+    Joints with other tolerances (what_if) are kept, unless the slices hold different results of them.
 
     Prints the number of joints by outcome on standard error.
 
@@ -33,6 +34,8 @@ def merge(
     pending = counts.total - counts.done
     lines = [f"{out}: {counts.done} joints, {counts.shortfall}"]
     lines += [f"{merged.twice} surplus copies of rows, with identical results"] * bool(merged.twice)
+    dropped = f"left out: joints of {merged.dropped} changes of what_if, of which the slices hold different results"
+    lines += [dropped] * bool(merged.dropped)
     lines += [f"{pending} joints are pending; to simulate them: tolstat run STUDY --out {out}"] * bool(pending)
     lines += [f"next: tolstat report {out} --out {out.with_suffix('.html')}"] * (not pending)
     say("\n".join(lines))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Wide, Workers, announce_compilation, as_text, make_folder, print_table
+from tolstat.cli._app import AsJson, AtOne, Wide, Workers, announce_compilation, as_text, make_folder, print_table
 from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
@@ -46,6 +46,7 @@ def multifidelity(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder of STUDY_high.h5 and STUDY_low.h5, created if missing.")
     ] = Path(),
+    point: AtOne = None,
     workers: Workers = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -72,14 +73,14 @@ def multifidelity(
     with gather(faults):
         seconds = parse_time(budget, "--budget")
     with gather(faults):
-        plan = study.load(study_file)
+        plan = study.load(study_file).at(point or "")
     if faults:
         raise InputError(faults)
     make_folder(out)
     announce_compilation()
     try:
-        with progress("joints at two fidelities"):
-            found = two_fidelities(plan, low, high, out, seconds, pilot, by, workers, say)
+        with progress("joints at two fidelities") as shown:
+            found = two_fidelities(plan, low, high, out, seconds, pilot, by, workers, shown.note, shown.stage, shown)
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop

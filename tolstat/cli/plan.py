@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_warnings, warn_without_interval
-from tolstat.cli._talk import progress, say
+from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_study_warnings
+from tolstat.cli._talk import progress, say, wrapped
 
 if TYPE_CHECKING:
     from tolstat.campaign.plan import Plan
@@ -41,8 +40,7 @@ def plan(
     from tolstat.campaign import plan as plans
 
     loaded = study.load(study_file, n=n)
-    print_warnings(study_file, loaded.joints, loaded.variants)
-    warn_without_interval(loaded.sampling.method)
+    print_study_warnings(study_file, loaded)
     announce_compilation()
     with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)
@@ -52,18 +50,20 @@ def plan(
 
 def _lines(made: Plan) -> str:
     lines = [
-        f"joints: {made.rows}",
+        f"joints: {made.rows}" + (f", each at {', '.join(made.points)}" if all(made.points) else ""),
         f"random numbers a joint: {made.dimensions}",
         f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
         *([made.fidelity] if made.fidelity else []),
         *_rattle_warning(made),
         *_misfit_warning(made),
         f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
-        f"time: {_duration(made.seconds)} on {made.workers} cores, of which",
+        f"time: about {_duration(made.seconds)} on {made.workers} cores, of which",
         *(f"  {stage}: {_duration(seconds)}" for stage, seconds in made.stages.items()),
         f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
         f"file: {_size(made.file_bytes)}",
         *made.fit,
+        *made.sweep,
+        *([f"no tolerance, taken as exact: {', '.join(made.exact)}"] if made.exact else []),
     ]
     lines += [
         f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"
@@ -77,26 +77,16 @@ def _lines(made: Plan) -> str:
     lines += [
         f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}" for q, n in made.wilks.items()
     ]
-    return "\n".join(lines + _meanings(made))
+    return wrapped("\n".join(lines)) + "\n".join(["", *_meanings(made)])
 
 
 def _meanings(made: Plan) -> list[str]:
-    """Table of what each entry of [tolerances] means."""
-    if not made.tolerances:
-        return []
+    """Tables of what each entry of [tolerances] and [[correlation]] means."""
     import pandas as pd
 
-    from tolstat.common import units
-    from tolstat.display import table, text
+    from tolstat.questions.joints import tolerances
 
-    columns = [
-        table.Column("tolerance", lambda row: str(row["entry"])),
-        table.Column("its number", lambda row: str(row["number"])),
-        table.Column("error", lambda row: str(row["errors"])),
-        table.Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
-        table.Column("outside", lambda row: text.percent(math.nan if row["outside"] is None else row["outside"])),
-    ]
-    return ["", table.as_text(columns, pd.DataFrame(made.tolerances))]
+    return tolerances.as_text(pd.DataFrame(made.tolerances), pd.DataFrame(made.correlations))
 
 
 def _rattle_warning(made: Plan) -> list[str]:

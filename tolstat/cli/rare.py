@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import AsJson, StudyOption, Wide, Workers, announce_compilation, as_text, print_table
-from tolstat.cli._talk import fail, progress, say
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.cli._app import (
+    AsJson,
+    AtOne,
+    Delivery,
+    StudyOption,
+    Wide,
+    Workers,
+    announce_compilation,
+    as_text,
+    print_table,
+)
+from tolstat.cli._talk import fail, progress, say, wrapped
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import ANY_LIMIT
 
 if TYPE_CHECKING:
     from tolstat.questions.rare.query import RareEvent
     from tolstat.study import Study
+
+
+REPEATS = 4
+"""Seeds of a simulation, unless another number is given."""
 
 
 class Side(StrEnum):
@@ -31,7 +48,11 @@ def rare(
     ],
     limit: Annotated[
         str | None,
-        typer.Option("--limit", metavar="LIMIT", help='Load and level: "cross1.F > 900 N"; required with STUDY.'),
+        typer.Option(
+            "--limit",
+            metavar="LIMIT",
+            help='"cross1.F > 900 N", "cross*.F > 900 N" or "any limit"; required with STUDY.',
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -54,6 +75,14 @@ def rare(
             help="Whether failed and unsettled joints count as above or below the level; default: below.",
         ),
     ] = None,
+    repeats: Annotated[
+        int | None,
+        typer.Option(
+            "--repeats", metavar="K", min=1, help="Number of seeds, each with a result file of its own; default: 4."
+        ),
+    ] = None,
+    delivery: Delivery = DELIVERY,
+    point: AtOne = None,
     study_file: StudyOption = None,
     workers: Workers = None,
     wide: Wide = False,
@@ -62,10 +91,12 @@ def rare(
     """Estimate a rare exceedance by subset simulation.
 
     Estimates P(load > level) down to 1e-9. Each level of the simulation starts from the joints of the previous level
-    with the largest loads. docs/questions/rare.md states what the interval does not cover.
+    with the largest loads. What the interval does not cover: tolstat docs rare
 
-    Prints threshold and share of each level, and the probability with its 95 % interval. Writes all joints to a result
-    file. To resume after an interruption, run the same command again.
+    Repeats the simulation with 4 seeds. Prints threshold and share of each level (of the first seed), the probability
+    with its 95 % interval from all seeds, whether they agree, and from how many joints of level 0 the joints above the
+    limit descend: few of these, or seeds that disagree, tell of ways to the limit that were missed. Writes the joints
+    of each seed to a result file. To resume after an interruption, run the same command again.
 
     Example: tolstat rare studies/iso2768_f.toml --limit "cross1.F > 5 kN"
     """
@@ -78,30 +109,33 @@ def rare(
     given = {"n": n, "p0": p0, "seed": seed, "unresolved": None if unresolved is None else unresolved.value}
     given = {name: value for name, value in given.items() if value is not None}
     if source.suffix == ".toml":
-        plan, path = _read_study(source, limit, given), out or Path(f"{source.stem}_rare.h5")
+        plan, path = _read_study(source, limit, point, given), out or Path(f"{source.stem}_rare.h5")
     else:
-        plan, path = _recall(source, study_file, [limit, out, *given.values()]), source
+        plan, path, repeats = _recall(source, study_file, [limit, out, point, repeats, *given.values()]), source, 1
     announce_compilation()
     try:
-        with progress("levels of the subset simulation"):
-            found = simulation.run(plan, path, workers, say)
+        with progress("levels of the subset simulation") as shown:
+            found = simulation.repeated(plan, path, repeats or REPEATS, workers, shown.note, shown)
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
     except WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
-    sampling = found.sampling
-    levels = tables.table(found.levels, sampling.load)
+    levels = [tables.table(one.levels, one.sampling.limit) for one in found]
     if as_json:
-        typer.echo(as_text(_summary(found) | {"levels": text.records(levels)}))
+        estimate, agree = tables.together([one.estimate for one in found])
+        numbers = {name: value if math.isfinite(value) else None for name, value in estimate._asdict().items()}
+        seeds = [_summary(one, delivery) | {"levels": text.records(t)} for one, t in zip(found, levels, strict=True)]
+        typer.echo(as_text(numbers | {"agree": agree, "seeds": seeds}))
     else:
-        print_table(tables.LEVELS, levels, wide)
-        typer.echo(tables.sentence(found.estimate, sampling.load, sampling.above))
-    _print_messages(found, path)
+        print_table(tables.LEVELS, levels[0], wide)
+        typer.echo("\n".join(wrapped(line) for line in tables.of_seeds(found, delivery).splitlines()))
+    for k, one in enumerate(found):
+        _print_messages(one, path.with_name(f"{path.stem}_{k + 1}{path.suffix}") if k else path)
 
 
-def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study:
+def _read_study(source: Path, limit: str | None, point: str | None, given: dict[str, Any]) -> Study:
     from tolstat import study
     from tolstat.questions.rare.query import parse_limit, subset_study
 
@@ -109,10 +143,11 @@ def _read_study(source: Path, limit: str | None, given: dict[str, Any]) -> Study
     if limit is None:
         faults.append(Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"'))
     else:
-        with gather(faults):
-            parse_limit(limit)
+        if limit.split() != ANY_LIMIT.split():
+            with gather(faults):
+                parse_limit(limit, {})
     with gather(faults):
-        plan = study.load(source)
+        plan = study.load(source).at(point or "")
     if faults or limit is None:
         raise InputError(faults)
     return subset_study(plan, limit, **given)
@@ -133,16 +168,19 @@ def _recall(source: Path, study_file: Path | None, given: list[Any]) -> Study:
         return store.view(study_file).study
 
 
-def _summary(found: RareEvent) -> dict[str, Any]:
-    import math
-
+def _summary(found: RareEvent, delivery: int) -> dict[str, Any]:
     numbers = found.estimate._asdict() | {"as_sure_as": found.as_sure_as, "upper_if_above": found.upper_if_above}
     plain = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
-    head = {"load": found.sampling.load, "above": found.sampling.above, "reached": found.reached}
-    return head | plain | {"joints": found.joints, "unresolved": found.unresolved}
+    head = {"load": found.sampling.load, "above": found.sampling.limit.level, "reached": found.reached}
+    counts = {"joints": found.joints, "unresolved": found.unresolved, "ancestors": found.ancestors}
+    return head | plain | counts | {"numerical": found.numerical, "delivery": found.delivery(delivery)}
 
 
 def _print_messages(found: RareEvent, path: Path) -> None:
+    from tolstat.store.error_budget import command
+
+    if found.numerical is None:
+        say(command(path, str(found.sampling.limit)))
     say(f"{path}: {found.joints} joints, {found.unresolved} of them failed or not settled")
     if found.reached:
         say(f"the estimate is as precise as that from {found.as_sure_as:.2g} random joints")

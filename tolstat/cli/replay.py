@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, announce_compilation, as_text
+from tolstat.cli._app import AsJson, AtPoint, ResultFile, announce_compilation, as_text
 from tolstat.cli._talk import progress, say
 from tolstat.cli.simulate import case_text, warn_unless_ok, write_trace
 
@@ -22,6 +22,7 @@ def replay(
         Path | None,
         typer.Option("--out", metavar="CSV", help="Write the load histories of the last revolution as CSV."),
     ] = None,
+    point: AtPoint = None,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one joint again and compare with the file.
@@ -40,7 +41,7 @@ def replay(
         check_target(out, file)
     announce_compilation()
     with progress("simulation"), Reader.open(file) as store:
-        again = replays.replay(store, row)
+        again = replays.replay(store.at(point) if point else store, row)
     summary = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     summary |= again.result.summary()
     typer.echo(as_text(summary) if as_json else case_text(summary))

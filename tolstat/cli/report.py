@@ -9,7 +9,17 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import Accept, ResultFile, Wide, announce_compilation, make_folder, parse_share, tell, width_of
+from tolstat.cli._app import (
+    Accept,
+    AtPoints,
+    ResultFile,
+    Wide,
+    announce_compilation,
+    make_folder,
+    parse_share,
+    tell,
+    width_of,
+)
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
@@ -37,6 +47,7 @@ def report(
             "has no load histories; default: 1000, but none is simulated again if FILE has pending joints.",
         ),
     ] = None,
+    point: AtPoints = None,
     wide: Wide = False,
 ) -> None:
     """Report the share of joints above each load.
@@ -50,7 +61,7 @@ def report(
     Example: tolstat report iso2768_f.h5 --out page.html --accept "1 %"
     """
     if out is not None and out.suffix.lower() in PAGES:
-        _page(file, out, accept, again)
+        _page(file, out, accept, again, point or "")
         return
     from tolstat.report import build
     from tolstat.store import Reader
@@ -60,11 +71,11 @@ def report(
         Reader.open(file).close()  # check the file before the folder is created
         make_folder(out)
     with progress("report") as shown:
-        made = build(file, out, width_of(wide), shown.stage, accepted)
+        made = build(file, out, width_of(wide), shown.stage, accepted, point or "")
     tell(made)
 
 
-def _page(file: Path, out: Path, accept: str | None, again: int | None) -> None:
+def _page(file: Path, out: Path, accept: str | None, again: int | None, point: str) -> None:
     from tolstat.campaign.executors.common import THREAD_VARIABLES
 
     for name in THREAD_VARIABLES:  # for many small products, BLAS threads only cost time
@@ -91,5 +102,5 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None) -> None:
         if again and store.sampling["method"] in DRAWN and not held:
             announce_compilation()
     with progress("page") as shown:
-        page.write_page(file, out, accepted, again, shown.stage)
+        page.write_page(file, out, accepted, again, shown.stage, point)
     say(f"wrote {out}")

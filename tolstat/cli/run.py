@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Wide, Workers, announce_compilation, print_warnings, tell, warn_without_interval, width_of
+from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_warnings, tell, width_of
 from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
@@ -57,9 +57,9 @@ def run(
         typer.Option(
             "--joint-timeout",
             metavar="TIME",
-            help="Time limit of a joint, with unit s, min or h; if exceeded twice, its status is timeout.",
+            help="Processor time without progress, with unit s, min or h; a joint that exceeds it twice is a timeout.",
         ),
-    ] = "300 s",
+    ] = "60 s",
     retry: Annotated[
         str | None,
         typer.Option(
@@ -83,7 +83,7 @@ def run(
         typer.Option(
             "--until",
             metavar="RULE",
-            help='Stop when a 95 % interval is narrow enough: "P(cross1.F > 700 N) width < 0.01".',
+            help='Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".',
         ),
     ] = None,
     verify: Annotated[
@@ -105,35 +105,44 @@ def run(
     from tolstat import study
     from tolstat.campaign.blocks import Execution
     from tolstat.campaign.retry import parse
+    from tolstat.common.files import check_target
 
-    faults: list[Fault] = []
     limit, part, again = 0.0, None, None
+    faults = _cannot_be_combined(rows, until, retry, settings)
+    if scheduler is not None and executor is not Executor.DASK:
+        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     with gather(faults):
         limit = parse_time(joint_timeout)
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
-    if rows is not None and until is not None:
-        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
-    if until is not None and retry is not None:
-        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
-    if scheduler is not None and executor is not Executor.DASK:
-        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
-    if settings and retry is None:
-        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
+    path = out if out is not None else Path(f"{study_file.stem}.h5")
+    with gather(faults):
+        check_target(path)  # now, not when the pictures of the report are written
     with gather(faults):
         plan = study.load(study_file, n=n)
         again = None if retry is None else parse(retry, settings or (), plan)
     if faults:
         raise InputError(faults)
-    print_warnings(study_file, plan.joints, plan.variants)
-    warn_without_interval(plan.sampling.method)
-    path = out if out is not None else Path(f"{study_file.stem}.h5")
+    print_study_warnings(study_file, plan)
     execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
     if until is None:
         simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
     else:
         simulate(plan, path, until, execution=execution, check=verify)
     conclude(path, report, wide, str(study_file))
+
+
+def _cannot_be_combined(
+    rows: str | None, until: str | None, retry: str | None, settings: list[str] | None
+) -> list[Fault]:
+    faults = []
+    if rows is not None and until is not None:
+        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
+    if until is not None and retry is not None:
+        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
+    if settings and retry is None:
+        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
+    return faults
 
 
 def parse_time(text: str, option: str = "--joint-timeout") -> float:
@@ -182,7 +191,10 @@ def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) 
     except WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
-    say(f"{path}: {counts.done} joints, {counts.shortfall}")
+    done = f"{counts.done} joints"
+    if len(plan.points) > 1:
+        done = f"{counts.done} simulations of joints at {len(plan.points)} operating points"
+    say(f"{path}: {done}, {counts.shortfall}")
 
 
 def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None:
@@ -200,12 +212,11 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
             made = build(path, None, width_of(wide), shown.stage)
         tell(made)
     with Reader.open(path) as store:
-        found = reasons(store, store.status())
+        found = reasons(store, {one.point or "": one.status() for one in store.each()})
         for reason in found:
             say(reason.text)
-        for reason in found:
-            if reason.retry:
-                say(f"again: tolstat run {study} --out {path} {reason.retry}")
+        for retry in dict.fromkeys(reason.retry for reason in found if reason.retry):
+            say(f"again: tolstat run {study} --out {path} {retry}")
         say(f"next: {_next(store, path)}")
 
 
@@ -230,18 +241,17 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
     from tolstat.campaign import stop_rule
     from tolstat.store import Reader
 
-    rule = stop_rule.parse(text)
+    rule = stop_rule.parse(text, plan.limits)
     with progress() as shown:
         run = partial(campaign.run, plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
         outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
     look = outcome.look
-    n_looks = len(outcome.looks)
     say(
         f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
         f"{look.above} above, {look.n_unresolved} failed or not settled\n"
-        f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f} "
-        "(failed and unsettled joints: below at its lower end, above at its upper end), "
-        f"corrected for {n_looks} planned look{'s' * (n_looks > 1)}; the intervals in the report are not corrected"
+        f"share above {look.estimate:.5f}, corrected for the stop; {100 * stop_rule.CONFIDENCE:.0f} % interval "
+        f"{look.lower:.5f} to {look.upper:.5f} (failed and unsettled joints: below at its lower end, above at its "
+        "upper end), valid after any number of looks; shares and intervals in the report are not corrected"
     )
     with Reader.open(path) as store:
         return store.counts()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
-from tolstat.cli._talk import progress
+from tolstat.cli._talk import progress, wrapped
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,7 +22,8 @@ def status(file: ResultFile, wide: Wide = False, as_json: AsJson = False) -> Non
 
     Prints the number of joints, why joints have no valid load and what to do, and the share of joints above each limit
     so far with its 95 % interval. During a run, prints also its rate and the remaining time; reading the file does not
-    disturb the run. With --json, prints the number of every status.
+    disturb the run. Of several operating points the worst status of a joint counts, and each has a line of its own.
+    With --json, prints the number of every status.
 
     Example: tolstat status iso2768_f.h5
     """
@@ -33,12 +34,15 @@ def status(file: ResultFile, wide: Wide = False, as_json: AsJson = False) -> Non
         summary, states = _summary(store)
         why = reasons(store, states)
     if as_json:
-        causes = {r.status.label: {"row": r.row, "remedy": r.remedy} for r in why}
+        causes = {
+            f"{r.status.label} at {r.point}" if r.point else r.status.label: {"row": r.row, "remedy": r.remedy}
+            for r in why
+        }
         typer.echo(as_text(summary | {"causes": causes}))
         return
     typer.echo(_text(summary))
     for reason in why:
-        typer.echo(reason.text)
+        typer.echo(wrapped(reason.text))
     if summary["exceedance"]:
         _print_shares(summary["exceedance"], wide)
 
@@ -51,6 +55,8 @@ def _text(summary: dict[str, Any]) -> str:
     found = {state.label: summary[state.label] for state in Status if summary[state.label]}
     lines = [f"study: {summary['study']}", f"joints: {summary['joints']}"]
     lines += [f"{name}: {count}" for name, count in found.items()]
+    for point, numbers in summary.get("points", {}).items():
+        lines.append(f"at {point}: {', '.join(f'{count} {name}' for name, count in numbers.items())}")
     lines += [f"{name}: {summary[name]}" for name in ("damaged", "simulated_again") if name in summary]
     pace = ""
     if "joints_per_s" in summary:
@@ -75,42 +81,57 @@ def _print_shares(shares: list[dict[str, Any]], wide: bool) -> None:
     print_table(columns, frame.astype({"estimate": float}), wide)
 
 
-def _summary(store: Reader) -> tuple[dict[str, Any], NDArray[np.uint8]]:
-    """Collect counts and shares, some rows at a time; blocks of pending rows are skipped. Also return the states."""
+def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]]]:
+    """Collect counts and shares, some rows at a time; blocks of pending rows are skipped. Also the states by point."""
     import numpy as np
 
-    from tolstat.common.loads import LOADS
+    from tolstat.common.loads import load_of, split
     from tolstat.common.tables import Status
+    from tolstat.store import worst
     from tolstat.store.result_file import BLOCK
+    from tolstat.study.points import names_of
 
-    states, damaged = np.full(store.n, Status.PENDING, np.uint8), 0
+    each = {one.point or "": one for one in store.each()}
+    states, damaged = {point: np.full(store.n, Status.PENDING, np.uint8) for point in each}, 0
     limits = {} if store.sampling["method"] == "subset" else store.limits  # whose joints are no sample
     loads = {name: np.full((3, store.n), np.nan) for name in limits}
+    worst_states = {name: np.full(store.n, Status.PENDING, np.uint8) for name in limits}
+    at = {name: names_of(split(name)[1], list(each), str(store.path)) for name in limits}
     for first in range(0, store.n, BLOCK):
         slots = slice(first, first + BLOCK)
-        written = store.column("results", "status", slots)
-        if (written != Status.PENDING).any():
-            results = store.results(slots)
-            states[slots] = results["status"]
-            damaged += int(((written != Status.PENDING) & (states[slots] == Status.PENDING)).sum())
-            for name, values in loads.items():
-                values[:, slots] = LOADS[name].of(results), *LOADS[name].ends(results)
-    found = np.bincount(states, minlength=len(Status))
+        results = {}
+        for point, one in each.items():
+            written = one.column("results", "status", slots)
+            if (written != Status.PENDING).any():
+                results[point] = one.results(slots)
+                states[point][slots] = results[point]["status"]
+                damaged += int(((written != Status.PENDING) & (states[point][slots] == Status.PENDING)).sum())
+        for name, values in loads.items():
+            if all(point in results for point in at[name]):
+                own, state, ends = worst.load_of([results[point] for point in at[name]], load_of(name))
+                values[:, slots], worst_states[name][slots] = (own, *ends), state
+    joints = np.choose(worst.deciding(list(states.values())), list(states.values()))
+    found = np.bincount(joints, minlength=len(Status))
     summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     summary |= {state.label: int(found[state]) for state in Status}
-    condition = {"damaged": damaged, "simulated_again": int((store.attempt() > 0).sum())}
-    summary |= {name: count for name, count in condition.items() if count} | _pace(store, summary["pending"])
-    done = summary["pending"] < store.n
-    summary["exceedance"] = [_exceedance(store, states, name, loads[name]) for name in loads if done]
+    if len(each) > 1:
+        counts = {point: np.bincount(own, minlength=len(Status)) for point, own in states.items()}
+        summary["points"] = {p: {s.label: int(own[s]) for s in Status if own[s]} for p, own in counts.items()}
+    again = sum(int((one.attempt() > 0).sum()) for one in each.values())
+    condition = {"damaged": damaged, "simulated_again": again}
+    pending = sum(int((own == Status.PENDING).sum()) for own in states.values())
+    summary |= {name: count for name, count in condition.items() if count} | _pace(store, len(each), pending)
+    known = [name for name in loads if (worst_states[name] != Status.PENDING).any()]
+    summary["exceedance"] = [_exceedance(store, worst_states[name], name, loads[name]) for name in known]
     return summary, states
 
 
-def _pace(store: Reader, pending: int) -> dict[str, Any]:
-    """Return rate and remaining time of the run in progress, once it has finished joints."""
+def _pace(store: Reader, points: int, pending: int) -> dict[str, Any]:
+    """Return rate and remaining time of the run in progress, once it has finished joints at any point."""
     session = store.session()
     if session is None:
         return {"running": False}
-    done = store.n - pending - session.done
+    done = points * store.n - pending - session.done
     if done <= 0:
         return {"running": True}
     rate = done / max(time.time() - session.started, 1e-3)
@@ -119,15 +140,17 @@ def _pace(store: Reader, pending: int) -> dict[str, Any]:
 
 def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]) -> dict[str, Any]:
     """Share of the joints above a limit so far, from loads and their ends, (3, n); None without an estimate."""
-    from tolstat.common.loads import UNIT_OF_LOAD
+    from tolstat.common.loads import load_of
     from tolstat.store.sample_load import SampleLoad
 
     samples, method = slice(store.first_sample, None), store.sampling["method"]
     weights = store.origin()["weight"][samples] if method == "importance" else None
-    limit, unit = store.limits[name], UNIT_OF_LOAD[name]
+    limit, unit = store.limits[name], load_of(name).unit
     own, lower, upper = values[:, samples]
     iid = method in ("random", "importance")
-    load = SampleLoad(name, unit, limit, float("nan"), own, (lower, upper), states[samples], weights, iid)
+    load = SampleLoad(
+        name, unit, limit, float("nan"), own, (lower, upper), states[samples], weights, iid, store.heaviest
+    )
     share = load.above(limit)
     numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
     rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}

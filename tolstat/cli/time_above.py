@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, make_folder, output_folder, print_table
+from tolstat.cli._app import AsJson, AtPoint, ResultFile, Wide, as_text, make_folder, output_folder, print_table
 from tolstat.cli._talk import progress, say
 
 
@@ -29,6 +29,7 @@ def time_above(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Write curves (PNG, SVG, CSV) to this folder, created if missing."),
     ] = None,
+    point: AtPoint = None,
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
@@ -45,7 +46,7 @@ def time_above(
     from tolstat.store import Reader
 
     with progress("time above the levels"), Reader.open(file) as store:
-        found = query.time_above(store.view(), by or (), level or (), curves=out is not None)
+        found = query.time_above(store.view().at(point or ""), by or (), level or (), curves=out is not None)
     if as_json:
         summary = {"joints": found.joints, "left_out": found.left_out, "loads": text.records(found.table)}
         typer.echo(as_text(summary))

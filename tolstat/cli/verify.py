@@ -16,7 +16,20 @@ if TYPE_CHECKING:
 
 def verify(
     what: Annotated[Path, typer.Argument(metavar="STUDY|FILE", help="Study file (TOML) or result file (HDF5).")],
-    joints: Annotated[str, typer.Option("--joints", metavar="N|all", help="Number of joints to check, or all.")] = "24",
+    joints: Annotated[
+        str | None,
+        typer.Option(
+            "--joints", metavar="N|all", help="Number of joints to check, or all; default: 24, near a limit 50."
+        ),
+    ] = None,
+    near: Annotated[
+        str | None,
+        typer.Option(
+            "--near",
+            metavar="LIMIT",
+            help='Check the joints nearest to a limit: "cross1.F > 700 N", "cross*.F > 700 N" or "any limit".',
+        ),
+    ] = None,
     seed: Annotated[
         int | None,
         typer.Option("--seed", metavar="S", min=0, help="Seed of the choice of joints; default: that of the study."),
@@ -34,21 +47,28 @@ def verify(
     integration method, and with a tight reference solution (scipy's Radau). Prints the distribution of the errors of
     the largest loads, relative to the largest load of the kind in the joint.
 
-    Of a result file, checks settled joints and stores the checks in the file for the report.
+    Of a result file, checks settled joints and stores the checks in the file for the report. With --near, checks the
+    joints nearest to a limit, 50 for each load of it, without another method and reference: how far their loads change,
+    and to which side, tells how far the share above the limit moves. Intervals of all commands use it from then on.
 
     Example: tolstat verify iso2768_f.h5 --joints 2 --out errors.csv
     """
+    from tolstat.analysis.accuracy import LEAST_NEAR
     from tolstat.campaign import verify as verification
     from tolstat.campaign.executors import available_workers
+    from tolstat.campaign.near import check_near
+    from tolstat.campaign.verify import QUICK_CHECKS
     from tolstat.common.files import check_target
     from tolstat.questions.accuracy import query, rendering
 
     if out is not None:
         check_target(out, what)
     with progress("checks, then tight references") as shown:
-        found = verification.check(
-            what, joints, seed, announce_compilation, workers or available_workers(), progress=shown
-        )
+        count = workers or available_workers()
+        if near is None:
+            found = verification.check(what, joints or 24, seed, announce_compilation, count, progress=shown)
+        else:
+            found = check_near(what, near, joints or LEAST_NEAR, QUICK_CHECKS, announce_compilation, count, shown)
     if as_json:
         typer.echo(as_text(_summary(found)))
     else:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, ByOne, ResultFile, StudyOption, Wide, as_text, print_table
+from tolstat.cli._app import AsJson, AtPoints, ByOne, ResultFile, StudyOption, Wide, as_text, print_table
 from tolstat.cli._talk import progress, say
 
 
@@ -14,6 +14,7 @@ def worst(
     file: ResultFile,
     by: ByOne = None,
     top: Annotated[int, typer.Option("--top", metavar="N", min=1, help="Number of joints to list.")] = 10,
+    point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -27,15 +28,16 @@ def worst(
     """
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.tail import worst_joints
-    from tolstat.questions.exceedance.query import most_exceeded
     from tolstat.store import Reader
 
     with progress("worst joints"), Reader.open(file) as store:
-        view = store.view(study_file)
-        found = worst_joints(view, by or most_exceeded(view), top)
+        view = store.view(study_file).at(point or "")
+        found = worst_joints(view, by or view.most_exceeded, top)
     if as_json:
         typer.echo(as_text(rendering.worst_values(found)))
         return
     print_table(rendering.worst_columns(found), rendering.worst_rows(found), wide)
     if found.joints:
-        say(f"next: tolstat replay {file} --row {found.joints[0].row} --out trace.csv")
+        first = found.joints[0]
+        where = f" --point {first.point}" if first.point else ""
+        say(f"next: tolstat replay {file} --row {first.row}{where} --out trace.csv")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 import stat
 from collections.abc import Iterator
@@ -24,6 +25,21 @@ def data_dir() -> Path:
     package = Path(__file__).parent.parent
     inside = package / "data"
     return inside if inside.is_dir() else package.parent / "data"
+
+
+def docs_dir() -> Path:
+    """Directory of the pages for users, as text: inside the package in an installed wheel, beside it in a checkout."""
+    package = Path(__file__).parent.parent
+    inside = package / "docs"
+    return inside if inside.is_dir() else package.parent / "docs"
+
+
+def reason(error: OSError) -> str:
+    """Say in a few words why a file cannot be used; of the messages of HDF5 the system's own words are taken."""
+    if error.strerror:
+        return error.strerror
+    own = re.search(r"error message = '([^']*)'", str(error))
+    return own[1] if own else " ".join(str(error).split())
 
 
 @contextmanager
@@ -83,6 +99,8 @@ def check_target(path: Path, *inputs: Path) -> None:
     above = next((folder for folder in path.parents if folder.exists()), path.parent)
     if not above.is_dir():
         raise InputError([Fault(place, f"cannot be written: {above} is no folder", "give another folder")])
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError([Fault(place, f"cannot be written: {above} is read-only", "give another folder")])
     if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
         raise InputError([Fault(place, "cannot be written: it is the input", "give the output another name")])
 

@@ -79,7 +79,7 @@ def _remove_null(own: dict[str, Any]) -> None:
 
 
 def _default(field: FieldInfo) -> dict[str, Any]:
-    made: Any = field.default_factory() if field.default_factory else None  # type: ignore[call-arg]
+    made = field.get_default(call_default_factory=True) if field.default_factory else None
     return {"default": made} if made else {}
 
 

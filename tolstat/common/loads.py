@@ -16,6 +16,9 @@ from tolstat.common.tables import LOAD_KINDS, SPAN
 
 FloatArray = NDArray[np.float64]
 
+AT = " at "
+"""What stands between a load and the operating points that it is taken at: ``"cross1.F at cruise+start"``."""
+
 
 class Load(NamedTuple):
     """One load: its largest value over the revolution. Higher is worse for every load.
@@ -48,6 +51,61 @@ class Load(NamedTuple):
         """Interval of the load in each joint, (n,) each, SI: the load itself unless the joint is stationary."""
         values = self.of(results)
         return values * results[f"{self.kind}_lower"], values * results[f"{self.kind}_upper"]
+
+
+def split(name: str) -> tuple[str, str]:
+    """Load and operating points of a name: of ``"cross1.F at cruise"`` ``("cross1.F", "cruise")``; ``""`` are all."""
+    load, _, points = name.partition(AT)
+    return load, points
+
+
+def load_of(name: str) -> Load:
+    """Load that a name is about, whatever operating points it names."""
+    return LOADS[split(name)[0]]
+
+
+class Limit(NamedTuple):
+    """Levels that loads may not exceed: of one load, of the largest of several, or all limits of a study together.
+
+    Attributes
+    ----------
+    name : str
+        ``cross1.F``, the pattern ``cross*.F``, or `ALL_LIMITS`.
+    loads : tuple of str
+        Names of the loads; a joint is above the limit if any of them is above its level.
+    levels : tuple of float
+        Level of each load, SI.
+    """
+
+    name: str
+    loads: tuple[str, ...]
+    levels: tuple[float, ...]
+
+    @property
+    def has_one_level(self) -> bool:
+        """Whether all loads have the same level, of the same kind."""
+        return self.name != ALL_LIMITS and len(set(self.levels)) == 1
+
+    @property
+    def level(self) -> float:
+        """Level of `of`: that of all loads, SI; 1 if they differ, and `of` is the largest ratio of load to level."""
+        return self.levels[0] if self.has_one_level else 1.0
+
+    @property
+    def unit(self) -> str:
+        """SI unit of `level`."""
+        return load_of(self.loads[0]).unit if self.has_one_level else "1"
+
+    def __str__(self) -> str:
+        """``cross*.F > 700 N``, or `ANY_LIMIT`."""
+        return f"{self.name} > {self.level:g} {unit_text(self.unit)}".rstrip() if self.has_one_level else ANY_LIMIT
+
+    def of(self, results: NDArray[np.void]) -> FloatArray:
+        """Largest of the loads in each joint, (n,), to be compared with `level`; NaN if any of them is."""
+        parts = [load_of(name).of(results) for name in self.loads]
+        if not self.has_one_level:
+            parts = [part / level for part, level in zip(parts, self.levels, strict=True)]
+        return np.asarray(np.maximum.reduce(parts))
 
 
 def of_kind(results: NDArray[np.void], kind: str) -> FloatArray:
@@ -93,7 +151,7 @@ def limits_in_words(limits: Mapping[str, float]) -> str:
     """Limits by name, SI, as one text: loads of the same limit together."""
     loads: dict[str, list[str]] = {}
     for name, limit in limits.items():
-        loads.setdefault(f"{limit:g} {unit_text(UNIT_OF_LOAD[name])}".rstrip(), []).append(name)
+        loads.setdefault(f"{limit:g} {unit_text(load_of(name).unit)}".rstrip(), []).append(name)
     return "; ".join(f"{', '.join(names)}: {limit}" for limit, names in loads.items()) or "none"
 
 
@@ -105,5 +163,7 @@ UNIT_OF_LOAD = {load.name: load.unit for load in LOADS.values()}
 """SI unit of each load."""
 BUSHING_LOADS = tuple(load.name for load in LOADS.values() if load.kind in ("F", "T"))
 """Force and torque of each bushing: what every report shows if the study keeps it."""
+ALL_LIMITS, ANY_LIMIT = "all limits", "any limit"
+"""Name of all limits of a study together, and how a rule names a joint above at least one of them."""
 LOAD_FIELDS = ("status", *(f"{kind}_{of}" for kind in KINDS for of in ("max", "lower", "upper")))
 """Fields of the results that loads and their intervals are read from, and the status."""

@@ -20,8 +20,8 @@ MAX_ROWS = 12
 
 def shown(cls: type[T]) -> type[T]:
     """Class decorator for named tuples and dataclasses: a ``__repr__`` of one line, and a table for notebooks."""
-    cls.__repr__ = _repr  # type: ignore[method-assign]
-    cls._repr_html_ = _repr_html  # type: ignore[attr-defined]
+    decorated: Any = cls
+    decorated.__repr__, decorated._repr_html_ = _repr, _repr_html
     return cls
 
 

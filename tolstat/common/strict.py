@@ -134,6 +134,7 @@ def validate(
     *,
     prefix: tuple[int | str, ...] = (),
     context: Mapping[str, Any] | None = None,
+    examples: Mapping[str, Any] | None = None,
 ) -> ModelT:
     """Validate `data` against `model`.
 
@@ -149,6 +150,8 @@ def validate(
         Key path of `data` in its file, shown in the faults.
     context : mapping, optional
         Passed to the model's validators.
+    examples : mapping, optional
+        Value by dotted key, as a file writes it, for faults about missing keys whose field has no example.
 
     Returns
     -------
@@ -163,14 +166,19 @@ def validate(
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
-        raise InputError(faults(error, model, data, place, prefix)) from error
+        raise InputError(faults(error, model, data, place, prefix, examples)) from error
 
 
 def faults(
-    error: ValidationError, model: type[BaseModel], data: object, place: str, prefix: tuple[int | str, ...] = ()
+    error: ValidationError,
+    model: type[BaseModel],
+    data: object,
+    place: str,
+    prefix: tuple[int | str, ...] = (),
+    examples: Mapping[str, Any] | None = None,
 ) -> list[Fault]:
-    """Translate pydantic's errors of `data` to faults with remedies."""
-    return [_fault(e, model, data, place, prefix) for e in error.errors(include_url=False)]
+    """Translate pydantic's errors of `data` to faults with remedies; see `validate`."""
+    return [_fault(e, model, data, place, prefix, examples or {}) for e in error.errors(include_url=False)]
 
 
 _REMEDIES = {
@@ -190,7 +198,14 @@ _REMEDIES = {
 """Remedy for a kind of pydantic error, filled from the error's context."""
 
 
-def _fault(e: Any, model: type[BaseModel], data: object, place: str, prefix: tuple[int | str, ...]) -> Fault:
+def _fault(
+    e: Any,
+    model: type[BaseModel],
+    data: object,
+    place: str,
+    prefix: tuple[int | str, ...],
+    known: Mapping[str, Any],
+) -> Fault:
     path = dotted((*prefix, *e["loc"]))
     where = f"{place}: {path}" if path else place
     context = e.get("ctx", {})
@@ -203,7 +218,7 @@ def _fault(e: Any, model: type[BaseModel], data: object, place: str, prefix: tup
     if e["type"] == "extra_forbidden":
         return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), _keys_at(model, e["loc"][:-1])))
     if e["type"] == "missing":
-        return Fault(where, "missing key", f"add {path}" + _example(model, e["loc"]))
+        return Fault(where, "missing key", f"add {path}" + _example(model, e["loc"], known))
     if e["type"] in ("literal_error", "enum"):
         return Fault(where, f"{e['input']!r} is not allowed", f"write one of {context['expected']}")
     remedy = _REMEDIES.get(e["type"], "give a value of the expected type").format(**context)
@@ -212,14 +227,14 @@ def _fault(e: Any, model: type[BaseModel], data: object, place: str, prefix: tup
 
 def _written(data: object, location: Sequence[int | str], key: Sequence[str]) -> str:
     """Value of a key as it is written, from the innermost table around a place that has the key."""
-    tables = [data]
+    tables: list[Any] = [data]
     for part in location:
         try:
-            tables.append(tables[-1][part])  # type: ignore[index]
+            tables.append(tables[-1][part])
         except (LookupError, TypeError):
             break
     for table in reversed(tables):
-        value: Any = table
+        value = table
         for part in key:
             value = value.get(part) if isinstance(value, Mapping) else None
         if value is not None:
@@ -256,13 +271,14 @@ def _model_at(model: type[BaseModel], location: Sequence[int | str]) -> Any:
     return current
 
 
-def _example(model: type[BaseModel], location: Sequence[int | str]) -> str:
+def _example(model: type[BaseModel], location: Sequence[int | str], known: Mapping[str, Any]) -> str:
     """How a file writes the key at a path, as its field has it: `` = "22 mm"``; empty where no example is known."""
     fields = getattr(_model_at(model, location[:-1]), "model_fields", {})
     examples = next((field.examples for name, field in fields.items() if location[-1] in (name, field.alias)), None)
-    if not examples or isinstance(examples[0], (Mapping, list)):
+    example = examples[0] if examples else known.get(dotted(location))
+    if example is None or isinstance(example, (Mapping, list)):
         return ""
-    return f", for example {location[-1]} = {json.dumps(examples[0], ensure_ascii=False)}"
+    return f", for example {location[-1]} = {json.dumps(example, ensure_ascii=False)}"
 
 
 def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:

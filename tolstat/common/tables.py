@@ -38,6 +38,17 @@ LIFE_EXPONENT = 10 / 3
 MAX_ITERATIONS = 40
 """Upper bound on a joint's Newton iterations per step of the longest run allowed, so that no joint blocks a campaign.
 Joints that never settle take some 8 to 10."""
+MOST_ITERATIONS = 3_000_000
+"""Newton iterations that the refinement of a joint may take: half a minute of a core."""
+
+
+def iterations_allowed(steps_per_rev: int, max_revs: int) -> int:
+    """Newton iterations of a joint, over all its simulations, at which it is given up.
+
+    They suffice for the longest run with uniform steps twice, in lanes and alone, and for a refinement. An explicit
+    step counts as ``1 / STEPS_PER_ITERATION``.
+    """
+    return min(MOST_ITERATIONS + 2 * MAX_ITERATIONS * steps_per_rev * max_revs, 2**31 - 1)
 
 
 class Status(IntEnum):
@@ -86,10 +97,10 @@ STATUS_TEXT = {
     Status.STATIONARY: "never the same in each revolution, but its largest loads are as large in the first half of the "
     "revolutions watched as in the second: results are the largest of solver.duration revolutions, estimated, with an "
     "interval (lower, upper); of a sub-harmonic joint those of its whole period",
-    Status.TIMEOUT: "took longer than the time allowed to a joint; results are NaN",
+    Status.TIMEOUT: "made no progress in the processor time allowed; results are NaN",
     Status.CRASHED: "its process died with it twice; results are NaN",
     Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
-    Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or the joint took too many; results are NaN",
+    Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or too many iterations were spent; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
     Status.OUTSIDE_MODEL: "negative clearance (interference fit), |alpha| of 90 deg or more, no speed, or stiffness "
     "not positive: the model has no meaning there; results are NaN",
@@ -234,9 +245,9 @@ def _error_fields() -> tuple[Field, ...]:
             fields.append(Field(f"{feature}.tilt_{axis}", "rad", f"angular error of the {kind} axis about {axis}"))
         fields.append(Field(f"{feature}.diameter", "m", f"deviation of the {kind}'s diameter from nominal"))
     fields += [
-        Field("operation.alpha", "rad", "misalignment of the shafts"),
-        Field("operation.speed", "rad/s", "angular velocity of the input shaft"),
-        Field("operation.torque", "N*m", "resisting torque on the output shaft"),
+        Field("operation.alpha", "rad", "deviation of the shafts' misalignment from that of the operating point"),
+        Field("operation.speed", "rad/s", "deviation of the input shaft's angular velocity"),
+        Field("operation.torque", "N*m", "deviation of the resisting torque on the output shaft"),
         Field(
             "material.E_factor",
             "1",
@@ -248,7 +259,7 @@ def _error_fields() -> tuple[Field, ...]:
 
 
 ERROR_FIELDS = _error_fields()
-"""Manufacturing errors (deviations from nominal, zero for the nominal joint) and the operating point."""
+"""Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
 
 OVER = "over the revolutions that count"
 LOAD_KINDS = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -93,7 +94,7 @@ class Panel:
     Attributes
     ----------
     key : str
-        Short name, unique on the page.
+        Short name, unique on the page; what cannot stand in the name of an anchor becomes ``-``.
     title : str
         What it shows.
     description : str
@@ -125,6 +126,9 @@ class Panel:
     reads: tuple[str, ...] = ()
     bare: bool = False
     switches: Sequence[tuple[str, str]] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "key", re.sub(r"[^\w-]+", "-", self.key))
 
 
 @dataclass(frozen=True)
@@ -190,12 +194,13 @@ class Page:
 
     Attributes
     ----------
-    title, subtitle : str
-        Name of the study, and a sentence on the number of joints.
+    title, description, subtitle : str
+        Name of the study, text about its joint, and a sentence on the number of joints.
     sections : sequence of Section
         In reading order; none is empty.
     """
 
     title: str
+    description: str
     subtitle: str
     sections: Sequence[Section]

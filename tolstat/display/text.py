@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolstat.common.files import atomic_write
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, unit_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,8 +81,8 @@ def value(x: float, unit: str) -> str:
 
 
 def limit(row: Mapping[Any, Any]) -> str:
-    """Words for a row with ``load``, ``level`` and ``unit``: ``cross1.F > 1500 N``."""
-    return f"{row['load']} > {value(row['level'], row['unit'])}"
+    """Words for a row with ``load``, ``level`` and ``unit``: ``cross1.F > 1500 N``, ``any limit``."""
+    return ANY_LIMIT if row["load"] == ALL_LIMITS else f"{row['load']} > {value(row['level'], row['unit'])}"
 
 
 def number(x: float) -> str:
@@ -115,6 +115,17 @@ def formed(x: float, form: str = ".3g") -> str:
 def ends(low: float, high: float, form: str) -> str:
     """Format both ends of an interval by a format specification; NaN gives a dash."""
     return "-" if math.isnan(low) else f"{low:{form}} .. {high:{form}}"
+
+
+def ppm(share: float) -> str:
+    """Format a share in parts per million; NaN gives a dash."""
+    return "-" if math.isnan(share) else number(1e6 * share)
+
+
+def delivery(row: Mapping[Any, Any]) -> str:
+    """Prediction interval of a row with ``next_lower`` and ``next_upper``; NaN gives a dash."""
+    low, high = row["next_lower"], row["next_upper"]
+    return "-" if math.isnan(low) else f"{low:.0f} .. {high:.0f}"
 
 
 def percent(share: float) -> str:

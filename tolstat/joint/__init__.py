@@ -2,7 +2,7 @@
 
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.model import AFFECT_NOTHING, Joint, load
-from tolstat.joint.perturbation import HOLE_OF_PIN, Operation, nominal_errors, perturb
+from tolstat.joint.perturbation import HOLE_OF_PIN, Operation, nominal_errors, operating, perturb
 from tolstat.joint.variant import varied
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "Operation",
     "load",
     "nominal_errors",
+    "operating",
     "perturb",
     "varied",
 ]

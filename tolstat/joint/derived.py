@@ -20,6 +20,8 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 
 WIDE = 0.05
 """Clearance, or difference of two diameters, relative to a diameter, that no bearing has by intention."""
+ISOTROPIC = 0.1
+"""Difference between G and E/(2 (1 + nu)), relative to the latter, that no metal has."""
 BEARING = ("contact.D_H", "contact.D_P", "contact.clearance")
 """Keys any two of which define the third."""
 
@@ -125,6 +127,12 @@ _FIT = ("material.E", "material.nu", *BEARING, "contact.z", "contact.fit_load")
 _CYLINDERS = "two crossed cylinders of diameter pin.d, 2 r_b long"
 
 DERIVED: dict[str, Rule] = {
+    "material.G": Rule(
+        ("material.E", "material.nu"),
+        "E/(2 (1 + nu))",
+        lambda j: material.shear_modulus(j.material.E, j.material.nu),
+        "Pa",
+    ),
     "pin.A": Rule(("pin.d",), "pi d^2/4", lambda j: material.circle(j.pin.d)[0], "m^2"),
     "pin.J": Rule(("pin.d",), "pi d^4/64", lambda j: material.circle(j.pin.d)[1], "m^4"),
     "pin.Jp": Rule(("pin.J",), "2 J", lambda j: 2.0 * j.pin.J, "m^4"),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,6 +15,7 @@ from pydantic import BaseModel, Field, ValidationInfo, field_validator
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import data_dir
+from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
@@ -23,6 +26,8 @@ from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pi
 
 AFFECT_NOTHING = ("description", "bearing")
 """Keys of a joint that affect no result of its simulation."""
+DEFAULT_JOINT = "cirelli2021"
+"""Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
 NO_FIT = "the pin does not fit into the hole: D_P, by default pin.d, is not above zero and up to D_H", "give D_P <= D_H"
 
 
@@ -47,8 +52,9 @@ class Joint(Strict):
         Bearing | None, Field(description="Needle bearing of each pin, for its rating life; affects no load")
     ] = None
     _inherited: tuple[Fault, ...] = ()
+    _replaced: Mapping[str, str] = {}
 
-    @field_validator("pin", "arm", "cross", "hub", "bushing", "contact")
+    @field_validator("material", "pin", "arm", "cross", "hub", "bushing", "contact")
     @classmethod
     def _complete(cls, value: BaseModel, info: ValidationInfo) -> BaseModel:
         """Fill in the keys that follow from others; refuse a section that lacks one which does not."""
@@ -112,7 +118,18 @@ class Joint(Strict):
         if 2.0 * self.cross.r_b < self.pin.d:
             found = f"{1e3 * self.cross.r_b:.4g} mm is less than half of pin.d: the pins overlap in the hub"
             overlap = [Fault("cross.r_b", found, "give pin.l, from the hub to the middle of the hole, or cross.r_b")]
-        return [*self._inherited, *overlap, *stations]
+        return [*self._inherited, *self._anisotropic(), *overlap, *stations]
+
+    def _anisotropic(self) -> Iterator[Fault]:
+        steel, expected = self.material, DERIVED["material.G"].value(self)
+        if not math.isclose(steel.G, expected, rel_tol=derived.ISOTROPIC):
+            found = f"{1e-9 * steel.G:.4g} GPa does not agree with E and nu: E/(2 (1 + nu)) = {1e-9 * expected:.4g} GPa"
+            yield Fault("material.G", found, "leave G out, or check E and nu")
+
+    @property
+    def replaced_bearing(self) -> Mapping[str, str]:
+        """Diameters and clearance of the joint file, as written, that overrides replace, by dotted key."""
+        return self._replaced
 
     def given(self, mode: Literal["json", "python"] = "python") -> dict[str, Any]:
         """Sections with the keys that were given, without those that follow from them.
@@ -144,7 +161,7 @@ def _lacking(keys: list[str], section: BaseModel) -> tuple[str, str]:
         return found, "give pin.l, from the hub to the middle of the hole, or hub.mass and hub.inertia"
     if isinstance(section, Contact):
         if section.D_H is None:
-            return "missing key", "give clearance, the radial clearance, or D_H"
+            return "missing key", 'give D_H, or the radial clearance, for example clearance = "0.03 mm"'
         if not 0.0 < section.D_P <= section.D_H:
             return NO_FIT
         if section.D_H == section.D_P:
@@ -194,11 +211,20 @@ def load(
     data = strict.read_toml(path)
     with strict.lines_of(path):
         try:
-            joint = strict.validate(Joint, overridden(data, overrides), place)
+            joint = strict.validate(Joint, overridden(data, overrides), place, examples=examples())
         except InputError as error:
             raise InputError(_attributed(error.faults, data, path, place, section)) from error
     joint._inherited = tuple(_inherited(joint, data, overrides, path))
+    given, held = leaves(overrides), leaves(data)
+    gone = given.keys() | derived.replaced(given, held)
+    joint._replaced = {key: str(held[key]) for key in derived.BEARING if key in held and key in gone}
     return joint
+
+
+@cache
+def examples() -> dict[str, Any]:
+    """Values of the default joint by dotted key, as its file writes them: the examples of a joint's keys."""
+    return leaves(strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml"))
 
 
 def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
@@ -219,7 +245,7 @@ def _attributed(
 ) -> list[Fault]:
     """Report the faults that the joint file has without overrides under its name, the others under `place`."""
     try:
-        strict.validate(Joint, data, str(path))
+        strict.validate(Joint, data, str(path), examples=examples())
         own = {}
     except InputError as error:
         own = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}
@@ -236,11 +262,18 @@ def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], p
     changed = derived.changed(given, held)
     stay = held.keys() - changed - derived.replaced(given, held)
     for key, (expected, reason, instead) in derived.expected(joint, given, changed, stay).items():
+        if key == "pin.d" and _as_before(held.get("contact.D_P"), joint.contact.D_P):
+            continue  # the joint file has pins of two diameters itself
         text, unit = held[key], derived.UNITS[key]
         words = [_written(one, unit, like) for one, like in zip(*map(_listed, (expected, text)), strict=True)]
         new = _quoted(words if isinstance(text, list) else words[0])
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
         yield Fault(key, f"{_quoted(text)} is inherited from {path.stem}; {reason} {new}", remedy)
+
+
+def _as_before(held: object, diameter: float) -> bool:
+    """Whether a diameter is, but for a few per cent, that of the joint file."""
+    return held is not None and math.isclose(units.to_si(held, "m", DIAMETER), diameter, rel_tol=derived.WIDE)
 
 
 def _listed(value: Any) -> list[Any]:

@@ -58,23 +58,31 @@ class Operation(Strict):
     ]
 
 
-def nominal_errors(n: int, operation: Operation) -> Table:
-    """Table of `n` joints without errors at an operating point.
+def nominal_errors(n: int) -> Table:
+    """Table of `n` joints without errors.
 
     Returns
     -------
     ndarray, shape (n,), dtype ERROR
-        Zero deviations, the operating point's values, factor 1 on E.
+        Zero deviations, factor 1 on E.
     """
     errors = np.zeros(n, ERROR)
-    errors["operation.alpha"] = operation.alpha
-    errors["operation.speed"] = operation.speed
-    errors["operation.torque"] = operation.torque
     errors["material.E_factor"] = 1.0
     return errors
 
 
-def perturb(joint: Joint, errors: Table) -> Table:
+def operating(operation: Operation, errors: Table) -> dict[str, Array]:
+    """Values that joints have at an operating point: those of the point, and each joint's deviations from them.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        ``alpha`` (rad), ``speed`` (rad/s) and ``torque`` (N m).
+    """
+    return {name: getattr(operation, name) + errors[f"operation.{name}"] for name in Operation.model_fields}
+
+
+def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     """Turn a table of errors into a table of parameters of the mechanical model.
 
     Position errors, tilts, diameters and clearances affect the contacts only: they change no marker, mass, inertia or
@@ -85,6 +93,8 @@ def perturb(joint: Joint, errors: Table) -> Table:
     ----------
     joint : Joint
         The nominal joint.
+    operation : Operation
+        The operating point; errors of it are deviations that are added.
     errors : ndarray, shape (n,), dtype ERROR
         Row i holds the errors of joint i.
 
@@ -96,9 +106,8 @@ def perturb(joint: Joint, errors: Table) -> Table:
     params = np.zeros(len(errors), PARAM)
     for name, value in _constants(joint).items():
         params[name] = value
-    params["alpha"] = errors["operation.alpha"]
-    params["omega"] = errors["operation.speed"]
-    params["torque"] = errors["operation.torque"]
+    point = operating(operation, errors)
+    params["alpha"], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
     factor = errors["material.E_factor"]
     for name in ("k_cross", "k_fork", "station_k1", "station_k2"):
         params[name] *= factor[:, None]

@@ -86,17 +86,23 @@ class Material(Strict):
     """Material of all parts."""
 
     E: Annotated[Stress, Field(description="Young's modulus")]
-    G: Annotated[Stress, Field(description="shear modulus")]
     nu: Annotated[
         Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
     ]
+    G: Annotated[Stress, follows("material.G", "shear modulus")] = FOLLOWS
     rho: Annotated[Density, Field(description="density")]
 
 
 class Pin(Strict):
     """Each of the four pins: a round beam along its axis e, clamped at the hub, its mass lumped at its end."""
 
-    l: Annotated[Length, Field(description="length of the beam, from the hub to the middle of the contact")]  # noqa: E741
+    l: Annotated[  # noqa: E741
+        Length,
+        Field(
+            description="length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque "
+            "of the bushing is the force times l, or up to l + z/2"
+        ),
+    ]
     d: Annotated[Diameter, Field(description="diameter of the beam")]
     chi: Annotated[Number, Field(description="shear factor of the section")] = PIN_CHI
     A: Annotated[Area, follows("pin.A", "area of the section")] = FOLLOWS

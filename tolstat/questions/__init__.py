@@ -1,7 +1,7 @@
 """Registry of the questions: a folder each, whose query takes a `store.view.View`, a study to simulate, or a joint.
 
-Public names, sections of the page and the JSON summary come from here, in this order. Modules are imported on first
-use.
+Public names, commands, sections of the page and the JSON summary come from here, in this order. Modules are imported
+on first use.
 
 A folder has `query.py` (computes), `rendering.py` (text, tables, figures) and, where
 the page shows the question, `section.py` with ``sections(view, asked)``.
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tolstat.questions.allocate.query import allocated as allocated
     from tolstat.questions.bearing_life.lives import lives_of as lives_of
     from tolstat.questions.causes.angles import against_angle as against_angle
+    from tolstat.questions.causes.pairs import pairs_of as pairs_of
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
     from tolstat.questions.compare.query import compared as compared
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
     from tolstat.questions.time_above.query import time_above as time_above
+    from tolstat.questions.what_if.query import what_if as what_if
     from tolstat.store.view import View
 
 
@@ -45,6 +47,10 @@ class Question(NamedTuple):
         The folder.
     public : tuple of str
         ``module.function`` in the folder that `tolstat` offers under the function's name.
+    heading : str
+        Heading of ``tolstat --help`` that lists its commands.
+    commands : tuple of str
+        Files of `tolstat.cli` with its commands, each with a function of the same name.
     has_section : bool
         Whether the page shows it: ``section.sections(view, asked)``.
     has_summary : bool
@@ -53,33 +59,50 @@ class Question(NamedTuple):
 
     name: str
     public: tuple[str, ...] = ()
+    heading: str = ""
+    commands: tuple[str, ...] = ()
     has_section: bool = False
     has_summary: bool = False
 
 
 QUESTIONS = (
+    Question("what_if", ("query.what_if",), has_section=True),
     Question("exceedance", has_section=True, has_summary=True),
     Question("histograms", has_section=True),
-    Question("capability", has_section=True, has_summary=True),
-    Question("causes", ("query.causes_of", "angles.against_angle", "tail.worst_joints"), has_section=True),
-    Question("show", ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"), has_section=True),
+    Question("capability", (), "Read", ("capability",), has_section=True, has_summary=True),
+    Question(
+        "causes",
+        ("query.causes_of", "angles.against_angle", "pairs.pairs_of", "tail.worst_joints"),
+        "Read",
+        ("worst", "causes"),
+        has_section=True,
+    ),
+    Question(
+        "show",
+        ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"),
+        "Plan",
+        ("show",),
+        has_section=True,
+    ),
     Question(
         "fatigue",
         (
             *("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"),
             *("stress.load_stresses", "parts.part_failures"),
         ),
+        "Read",
+        ("fatigue",),
         has_section=True,
     ),
-    Question("bearing_life", ("lives.lives_of",), has_section=True, has_summary=True),
+    Question("bearing_life", ("lives.lives_of",), "Read", ("bearing_life",), has_section=True, has_summary=True),
     Question("accuracy", has_section=True, has_summary=True),
     Question("joints", has_section=True),
-    Question("time_above", ("query.time_above",)),
-    Question("reweight", ("query.reweighted",)),
-    Question("allocate", ("query.allocated",)),
-    Question("compare", ("query.compared",)),
-    Question("rare", ("query.rare_event",)),
-    Question("multifidelity", ("query.two_fidelities",)),
+    Question("time_above", ("query.time_above",), "Read", ("time_above",)),
+    Question("reweight", ("query.reweighted",), "Decide", ("reweight",)),
+    Question("allocate", ("query.allocated",), "Decide", ("allocate",)),
+    Question("compare", ("query.compared",), "Decide", ("compare",)),
+    Question("rare", ("query.rare_event",), "Decide", ("rare",)),
+    Question("multifidelity", ("query.two_fidelities",), "Decide", ("multifidelity",)),
 )
 
 PUBLIC = {
@@ -88,6 +111,11 @@ PUBLIC = {
     for module, _, function in (name.partition(".") for name in question.public)
 }
 """Public names, and the modules that they come from."""
+
+
+def commands(heading: str) -> tuple[str, ...]:
+    """Files of `tolstat.cli` with the commands of the questions that a heading of the help lists."""
+    return tuple(name for question in QUESTIONS if question.heading == heading for name in question.commands)
 
 
 def sections(view: View, asked: Asked) -> list[Section]:

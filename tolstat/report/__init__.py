@@ -19,7 +19,7 @@ from tolstat.display import table, text
 from tolstat.display.asked import silent
 from tolstat.display.table import WIDTH
 from tolstat.solver import fidelity
-from tolstat.store import Reader
+from tolstat.store import Reader, viewed
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Report(NamedTuple):
     files: list[Path]
 
 
-def write_report(path: str | Path, out_dir: str | Path | None = None) -> list[Path]:
+def write_report(source: str | Path | Reader | View, out_dir: str | Path | None = None) -> list[Path]:
     """Write the report of a result file; see `build`.
 
     Returns
@@ -52,15 +52,16 @@ def write_report(path: str | Path, out_dir: str | Path | None = None) -> list[Pa
     list of Path
         The files written.
     """
-    return build(path, out_dir).files
+    return build(source, out_dir).files
 
 
 def build(
-    path: str | Path,
+    source: str | Path | Reader | View,
     out_dir: str | Path | None = None,
     width: int | None = WIDTH,
     stage: Callable[[str], None] = silent,
     accepted: float = math.nan,
+    point: str = "",
 ) -> Report:
     """Write the report of a result file; the campaign may be unfinished.
 
@@ -72,8 +73,8 @@ def build(
 
     Parameters
     ----------
-    path : str or Path
-        The result file.
+    source : str, Path, Reader or View
+        The result file: its path, what `tolstat.open` returns, or a view.
     out_dir : str or Path, optional
         Folder, made if missing; by default that of the file.
     width : int or None
@@ -82,6 +83,9 @@ def build(
         Called with the name of each stage when it begins.
     accepted : float
         Accepted share: share of the joints that may be above each limit; NaN if none is given.
+    point : str
+        Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; names of files end in it. The worst of
+        all by default.
 
     Returns
     -------
@@ -95,22 +99,24 @@ def build(
     InputError
         When the folder cannot be written to.
     """
-    path = Path(path)
-    stem = (Path(out_dir) if out_dir is not None else path.parent) / path.stem
+    folder = None if out_dir is None else Path(out_dir)
     try:
         stage("report")
-        with Reader.open(path) as store:
+        with viewed(source) as view:
+            store = view.store
+            folder = view.path.parent if folder is None else folder
+            stem = folder / view.path.stem
             stands_on = fidelity.sentence(store.options, store.fidelity)
             if store.case_names:
                 return _noted(_cases(store, stem, width), stands_on)
-            view = store.view()
+            stem = stem.with_name(f"{stem.name}_{point}") if point else stem
             report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width, accepted)
-            for note in (view.missing(), _stopped(store.stop) if store.stop else "", stands_on):
+            for note in (view.missing(), _stopped(store.stop) if store.stop.get("reached") else "", stands_on):
                 report = _noted(report, note)
             return report
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
-        raise InputError([Fault(str(stem.parent), found, "give another folder with --out")]) from error
+        raise InputError([Fault(str(folder), found, "give another folder with --out")]) from error
 
 
 def _noted(report: Report, note: str) -> Report:
@@ -137,6 +143,9 @@ def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> R
         limits = query.limits(view)
         files.append(text.csv(limits, stem, "limits"))
         shown, more = _fitted(rendering.LIMITS, limits, width)
+        points = query.at_points(view)
+        if len(points):
+            shown += f"\n\n{rendering.AT_POINTS}\n{_fitted(rendering.at_points(view), points, width)[0]}"
     if verdict is not None:
         sentence = text.sentence(verdict.sentence)
         shown = f"{sentence if width is None else textwrap.fill(sentence, width)}\n\n{shown}"
@@ -197,6 +206,7 @@ def _stopped(stop: dict[str, Any]) -> str:
     """Sentence about a campaign that its stop rule ended."""
     confidence = f"{100 * stop['confidence']:.0f} %"
     return (
-        f"stopped by {stop['rule']} at {stop['joints']} joints; {confidence} interval corrected for "
-        f"{len(stop['looks'])} looks: {stop['lower']:.5f} to {stop['upper']:.5f}. Intervals above are not corrected."
+        f"stopped by {stop['rule']} at {stop['joints']} joints: {stop['estimate']:.5f}, {confidence} interval "
+        f"{stop['lower']:.5f} to {stop['upper']:.5f}, valid after {len(stop['looks'])} looks. Shares above are not "
+        "corrected for the stop."
     )

@@ -14,7 +14,7 @@ from tolstat.campaign.remedy import remedy
 from tolstat.common import selected_results
 from tolstat.common.tables import BUSHINGS, Motion, Status
 from tolstat.solver import refinement
-from tolstat.store import verification
+from tolstat.store import recorded, verification
 from tolstat.study.design import IDEAL
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def table(store: Reader) -> pd.DataFrame:
         torque of each bushing, SI, and their Gamma, eq. (14), per cent; loads that the study does not keep are left
         out. If the file holds a comparison with the reference (``tolstat verify``), also the columns of `reference`.
     """
-    design, results, alpha = store.design(), store.results(), store.errors()["operation.alpha"]
+    design, results, alpha = store.design(), store.results(), recorded.operating_points(store)["alpha"]
     work = refinement.work(results)
     variants = [store.variants[i] for i in design["variant"]]
     columns: dict[str, object] = {

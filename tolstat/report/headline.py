@@ -9,15 +9,24 @@ import numpy as np
 
 from tolstat.analysis import exceedance as shares
 from tolstat.campaign.remedy import without_interval
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED
 from tolstat.display import text
 from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.joints import query as joints
+from tolstat.questions.what_if import rendering as what_if
 from tolstat.store.view import View
+from tolstat.store.worst import point_of
 
-WORDS = {"yes": "kept", "no": "not kept", "open": "open", "none": "no verdict"}
+WORDS = {
+    "yes": "kept",
+    "searched": "consistent with what was searched",
+    "no": "not kept",
+    "open": "open",
+    "none": "no verdict",
+}
 """Answers of `verdict` in words."""
 Row = Mapping[Any, Any]
 
@@ -28,7 +37,8 @@ class Headline(NamedTuple):
     Attributes
     ----------
     answer : str
-        ``yes``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share can be.
+        ``yes``, ``searched``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share
+        can be.
     value, words : str
         The answer or, without one, a share or its interval; the rest of the sentence.
     notes : tuple of str
@@ -61,7 +71,7 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
     view : View
         The campaign; it may be unfinished.
     accepted : float
-        Accepted share: share of the joints that may be above each limit; NaN if none is given.
+        Accepted share: share of the joints that may exceed at least one limit; NaN if none is given.
 
     Returns
     -------
@@ -75,26 +85,26 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limits(view).to_dict("records")
     found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
-    worst = _worst(view, records)
-    unresolved = _causes(view) if _matter(records if found.answer == "none" else [worst]) else ()
+    unresolved = _causes(view) if _matter([_decisive(view, records)]) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
 
 
 def verdict(row: Row, accepted: float) -> str:
-    """Verdict on a limit: whether the interval `ends` of its share lies below or above the accepted share.
+    """Verdict on a limit, or on all together: whether the interval `ends` lies below or above the accepted share.
 
     Parameters
     ----------
     row : mapping
-        A row of `exceedance.limits`.
+        A row of `exceedance.limits`, or `exceedance.all_limits`.
     accepted : float
         Accepted share: share of the joints that may be above the limit; NaN if none is given.
 
     Returns
     -------
     str
-        ``yes`` (below), ``no`` (above), ``open`` (neither), ``none``: no interval, or joints without a valid load
-        decide, so that more joints do not help; empty without an accepted share.
+        ``yes`` (below), ``no`` (above), ``searched`` (below if the proposals of importance sampling reach every way to
+        the limit; whatever they miss, it may be above), ``open`` (neither), ``none``: no interval, or joints without a
+        valid load decide, so that more joints do not help; empty without an accepted share.
     """
     if np.isnan(accepted):
         return ""
@@ -102,7 +112,8 @@ def verdict(row: Row, accepted: float) -> str:
     if np.isnan(low):
         return "none"
     if high <= accepted or low > accepted:
-        return "yes" if high <= accepted else "no"
+        missed = row["unsearched_upper"] > accepted  # False for joints of equal weight
+        return "no" if low > accepted else "searched" if missed else "yes"
     undecided = row["bound_lower"] <= accepted < row["bound_upper"]
     return "none" if not row["n"] or (undecided and _matter([row])) else "open"
 
@@ -121,12 +132,11 @@ def share_of(row: Row) -> str:
     return text.span(low, high) if not np.isnan(low) else text.span(row["bound_lower"], row["bound_upper"])
 
 
-def deciding(records: list[dict[Any, Any]], accepted: float) -> str:
-    """Sentence on the number of simulated joints that would decide each open limit; empty if none is open."""
-    said = [f"{row['load']} {_needed(row, accepted)}" for row in records if verdict(row, accepted) == "open"]
-    if not said:
+def deciding(row: Row, accepted: float) -> str:
+    """Sentence on the number of simulated joints that would decide an open verdict; empty if it is not open."""
+    if verdict(row, accepted) != "open":
         return ""
-    return f"Joints that would decide the open limits if their shares stayed the same: {', '.join(said)}"
+    return f"Joints that would decide it if the share stayed the same: {_needed(row, accepted)}"
 
 
 def _needed(row: Row, accepted: float) -> str:
@@ -143,30 +153,65 @@ def _needed(row: Row, accepted: float) -> str:
 
 
 def _judged(view: View, records: list[dict[Any, Any]], accepted: float) -> Headline:
-    answers = [verdict(row, accepted) for row in records]
-    answer = next(own for own in ("no", "none", "open", "yes") if own in answers)
-    count, most = len(records), text.percent(accepted)
+    row, worst = _decisive(view, records), _worst(view, records)
+    several, most = len(records) > 1, text.percent(accepted)
+    answers = [verdict(own, accepted) for own in records]
+    answer = verdict(row, accepted)
+    alone = several and answer == "none" and "no" in answers  # the joints above one limit are too many already
+    if alone:
+        answer, row = "no", _worst(view, [own for own, said in zip(records, answers, strict=True) if said == "no"])
+        worst = row
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
-    notes: tuple[str, ...] = (f"of {count} limits: {numbers}",) if count > 1 else ()
-    decide = deciding(records, accepted) if view.iid and not view.weighted else ""
+    notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
+    decide = deciding(row, accepted) if view.iid and not view.weighted else ""
     notes += (decide,) if decide else ()
-    concerned = [row for row, own in zip(records, answers, strict=True) if own == answer]
     if answer == "none":
-        return Headline(answer, WORDS[answer], _reason(view, concerned), notes)
-    worst = _worst(view, concerned)
-    limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
-    interval = f"total interval {text.span(*ends(worst))}"
+        return Headline(answer, WORDS[answer], _reason(view, [row]), notes)
+    limit = _words(view, row)
+    interval = f"total interval {text.span(*ends(row))}"
     if answer == "no":
-        share = share_of(worst)
-        interval = "total interval" if _matter([worst]) else interval
+        share = share_of(row)
+        interval = "total interval" if _matter([row]) else interval
         said = f"{share} of the joints exceed {limit} ({interval}); {most} is accepted"
+    elif answer == "searched":
+        missed = text.percent(row["unsearched_upper"])
+        said = (
+            f"at most {most} of the joints exceed {limit} if the proposals reach every way to it ({interval}); "
+            f"whatever they miss, at most {missed}"
+        )
     elif answer == "yes":
-        which = limit if count == 1 else f"each of the {count} limits"
-        said = f"at most {most} of the joints exceed {which} (largest share {share_of(worst)}, {interval})"
+        said = f"at most {most} of the joints exceed {limit} (share {share_of(row)}, {interval})"
     else:
-        which = limit if len(concerned) == 1 else f"{len(concerned)} limits, most of all {limit}"
-        said = f"the joints that exceed {which} may be more or fewer than {most} ({interval})"
+        said = f"the joints that exceed {limit} may be more or fewer than {most} ({interval})"
+    if alone:
+        notes += (_untold(view, records),)
+    elif several and worst["count"] and not np.isnan(worst["estimate"]):
+        said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
+    better = what_if.advice(view, row["load"], accepted) if answer == "no" else ""
+    said += f". {better}" if better else ""
     return Headline(answer, WORDS[answer], said, notes, worst["load"])
+
+
+def _decisive(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
+    """Row on which the verdict is: that of the joints above at least one limit, or of the only limit."""
+    return exceedance.all_limits(view) if len(records) > 1 else records[0]
+
+
+def _untold(view: View, records: list[dict[Any, Any]]) -> str:
+    """Why the verdict is on one of several limits."""
+    return f"No share of the joints that exceed at least one limit: {_reason(view, [_decisive(view, records)])}"
+
+
+def _words(view: View, row: Row) -> str:
+    """What joints exceed, in words: one limit, or ``at least one limit``."""
+    return "at least one limit" if row["load"] == ALL_LIMITS else _limit(view, row)
+
+
+def _limit(view: View, row: Row) -> str:
+    """Limit in words: ``1500 N on cross1.F (most often at start)`` where it holds at several operating points."""
+    said = f"{text.value(row['level'], row['unit'])} on {row['load']}"
+    several = row["count"] and len(view.narrowed(row["load"])[0].points) > 1
+    return f"{said} (most often at {point_of(view, row['load'])})" if several else said
 
 
 def _worst(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
@@ -175,20 +220,28 @@ def _worst(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
 
 
 def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
-    """Without an accepted share: share of the joints that keep all limits; of weighted joints, of the worst limit."""
-    notes = () if view.iid else (without_interval(view.method),)
+    """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
+    notes = () if view.has_intervals else (without_interval(view.method),)
     if view.weighted:
-        known = [row for row in records if not np.isnan(row["estimate"])]
-        if not known or _undecided(known):
-            return Headline("none", WORDS["none"], _reason(view, records), notes)
-        worst = _worst(view, known)
-        limit = f"{text.value(worst['level'], worst['unit'])} on {worst['load']}"
-        interval = "total interval" if _matter([worst]) else f"total interval {text.span(*ends(worst))}"
-        said = f"of the joints exceed {limit}, the limit exceeded most ({interval})"
-        return Headline("", share_of(worst), said, notes, worst["load"])
+        row, worst = _decisive(view, records), _worst(view, records)
+        if np.isnan(row["estimate"]):
+            known = [own for own in records if not np.isnan(own["estimate"])]
+            if len(records) == 1 or not known or _undecided(known):
+                return Headline("none", WORDS["none"], _reason(view, [row]), notes)
+            notes += (_untold(view, records),)
+            row = worst = _worst(view, known)
+        if _undecided([row]):
+            return Headline("none", WORDS["none"], _reason(view, [row]), notes)
+        interval = "total interval" if _matter([row]) else f"total interval {text.span(*ends(row))}"
+        missed = f"whatever the proposals miss, at most {text.percent(row['unsearched_upper'])}"
+        most = ", the limit exceeded most" if row is worst else ""
+        said = f"of the joints exceed {_words(view, row)}{most} ({interval}; {missed})"
+        if row["load"] == ALL_LIMITS and worst["count"] and not np.isnan(worst["estimate"]):
+            said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
+        return Headline("", share_of(row), said, notes, worst["load"])
     found = capabilities.together(capability.limits(view))
     if not found.decides:
-        return Headline("none", WORDS["none"], _reason(view, records), notes)
+        return Headline("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     return Headline("", found.value, found.words, notes, _worst(view, records)["load"])
 
 
@@ -203,12 +256,11 @@ def _reason(view: View, records: list[dict[Any, Any]]) -> str:
     poor = [row for row in records if row["n"] > lost and np.isnan(row["estimate"])]
     if poor:
         trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
-        limit = text.limit(poor[0]) + (f" (and {len(poor) - 1} more)" if len(poor) > 1 else "")
-        return f"too few effective joints are above {limit}: {trust.effective:.0f}"
+        return f"few joints have most of the weight above {text.limit(poor[0])} (Pareto k {trust.k:.2f}, 0.7 allowed)"
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
-    if not view.iid:
+    if not view.has_intervals:
         return without_interval(view.method)
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 

@@ -22,6 +22,9 @@ POLICY = (
 )
 """Content-Security-Policy: nothing is loaded or sent; pictures and page have styles of their own."""
 
+_TORQUE = re.compile(r"\bN m\b")
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:k?N|mm|[µu]m|m?rad|deg|rpm|rad/s|[MG]Pa|ms|min|[smh])\b|[%°])")
+
 
 def write(page: Page, path: Path) -> None:
     """Write a page; the same page gives the same bytes.
@@ -35,7 +38,7 @@ def write(page: Page, path: Path) -> None:
     """
     environment = templates.environment()
     environment.globals["figure"] = _figure
-    environment.filters |= {"data": _data, "grouped": grouped}
+    environment.filters |= {"data": _data, "grouped": grouped, "bound": bound}
     script = (templates.FOLDER / "page.js").read_text(encoding="utf-8")
     text = environment.get_template("page.html.j2").render(
         page=page,
@@ -56,6 +59,12 @@ def allowed(script: str) -> str:
 def grouped(words: str) -> str:
     """Group the digits of whole numbers from 10 000 on by narrow spaces."""
     return re.sub(r"(?<![\w.])\d{5,}(?!\w)", lambda found: f"{int(found[0]):,}".replace(",", "\u202f"), words)
+
+
+def bound(words: str) -> str:
+    """Keep numbers with their units, and intervals, on one line: no-break spaces in them."""
+    words = _BEFORE_UNIT.sub("\u00a0", _TORQUE.sub("N\u00a0m", words))
+    return words.replace(" .. ", "\u00a0..\u00a0")
 
 
 def _figure(panel: Panel) -> dict[str, Any]:

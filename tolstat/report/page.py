@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,11 +14,13 @@ from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
 from tolstat.display.asked import Asked, silent
 from tolstat.display.blocks import Facts, Listing, Page, Section
-from tolstat.report import html, verdict
+from tolstat.report import html, joint_values, verdict
 from tolstat.solver import fidelity
-from tolstat.store import Reader
+from tolstat.store import viewed
 from tolstat.store.integrity import DIGEST
+from tolstat.store.recorded import joint_of
 from tolstat.store.result_file import BLOCK
+from tolstat.store.worst import point_of
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -28,18 +31,19 @@ REPLAYED = 1000
 
 
 def write_page(
-    path: str | Path,
+    source: str | Path | Reader | View,
     out: str | Path,
     accepted: float = np.nan,
     replay: int = REPLAYED,
     stage: Callable[[str], None] = silent,
+    point: str = "",
 ) -> Path:
     """Write the report of a result file as one page; the campaign may be unfinished.
 
     Parameters
     ----------
-    path : str or Path
-        The result file of a study that draws its joints or sweeps.
+    source : str, Path, Reader or View
+        The result file of a study that draws its joints or sweeps: its path, what `tolstat.open` returns, or a view.
     out : str or Path
         HTML file to write.
     accepted : float
@@ -49,6 +53,8 @@ def write_page(
         the page shows no histories.
     stage : callable
         Called with the name of each part of the page when its computation begins.
+    point : str
+        Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; the worst of all by default.
 
     Returns
     -------
@@ -65,11 +71,11 @@ def write_page(
     >>> tolstat.write_page("iso2768_f.h5", "iso2768_f.html", accepted=0.01)  # doctest: +SKIP
     PosixPath('iso2768_f.html')
     """
-    with Reader.open(path) as store:
-        if store.case_names:
+    with viewed(source) as view:
+        if view.store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
-            raise StoreError(str(Fault(str(path), "lists its joints one by one", remedy)))
-        made = compose(store.view(), Asked(store.path, accepted, replay, stage=stage))
+            raise StoreError(str(Fault(str(view.path), "lists its joints one by one", remedy)))
+        made = compose(view.at(point), Asked(view.path, accepted, replay, stage=stage))
         stage("page: pictures")  # drawn from the view
         html.write(made, Path(out))
     return Path(out)
@@ -83,17 +89,24 @@ def compose(view: View, asked: Asked) -> Page:
     asked.notes.extend(
         note for note in (fidelity.sentence(view.store.options, view.store.fidelity), _stopped(view)) if note
     )
+    if len(view.points) > 1:
+        point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
+        remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
+        asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
+        asked = replace(asked, replay=0)
     sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
     facts = Facts(tuple(_facts(view.store)))
-    provenance = Section("provenance", "Provenance", [facts, Listing("The study as it was run", view.store.study_text)])
+    text = Listing("The study as it was run", view.store.study_text)
+    provenance = Section("provenance", "Provenance", [facts, joint_values.listing(view.store), text])
     lead = [section for section in sections if section.lead]
     rest = [section for section in sections if not section.lead]
-    return Page(view.name, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
+    described = joint_of(view.store, 0).description
+    return Page(view.name, described, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
 
 
 def _stopped(view: View) -> str:
     stop = view.store.stop
-    if not stop:
+    if not stop.get("reached"):
         return ""
     return f"stopped by {stop['rule']} at {stop['joints']} joints: intervals here are not corrected for it"
 
@@ -105,6 +118,8 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
     rows = f"{store.n}" if store.whole else f"{store.rows[0]} to {store.rows[-1]} of {store.campaign_rows}"
     yield "Rows of the campaign", rows
     yield "Sampling", f"{store.sampling['method']}, seed {store.sampling['seed']}"
+    for point in store.points.values():
+        yield f"Operating point {point.name}".strip(), point.in_words
     yield "Begun", store.created
     yield "Versions", ", ".join(f"{name} {value}" for name, value in store.versions.items() if name != "sources")
     yield "Code", f"{store.git_commit or 'no commit known'}; sources {store.versions.get('sources', 'unknown')}"
@@ -118,8 +133,9 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
 
 
 def results_digest(store: Reader) -> str:
-    """SHA-256 over the checksums of all rows: equal for files with the same joints and results."""
+    """SHA-256 over the checksums of all rows, point by point: equal for files with the same joints and results."""
     digest = hashlib.sha256()
-    for first in range(0, store.n, BLOCK):
-        digest.update(store.column("ledger", "results_check", slice(first, first + BLOCK)).tobytes())
+    for one in store.each():
+        for first in range(0, store.n, BLOCK):
+            digest.update(one.column("ledger", "results_check", slice(first, first + BLOCK)).tobytes())
     return digest.hexdigest()

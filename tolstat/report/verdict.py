@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -12,13 +13,13 @@ from matplotlib.axes import Axes
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Card, Decision, Panel, Panels, Section, Text
+from tolstat.display.blocks import Card, Decision, Panel, Panels, Section, Table, Text
 from tolstat.display.table import Column, as_block
 from tolstat.questions.accuracy import rendering as accuracy
 from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
-from tolstat.questions.exceedance.rendering import LIMIT_DASH, LIMITS, above
+from tolstat.questions.exceedance.rendering import AT_POINTS, LIMIT_DASH, LIMITS, above, at_points
 from tolstat.questions.show import section as show
 from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, verdict
 from tolstat.store.view import METHODS, View
@@ -32,7 +33,7 @@ def section(view: View, asked: Asked) -> Section:
         question_of(view.store.study_text), _answer(view, found), _cards(view, found), show.worst(view, load, asked)
     )
     notes = (Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes)
-    return Section("verdict", "Verdict", [head, *notes], lead=True)
+    return Section("verdict", "Verdict", [head, *_points(view), *notes], lead=True)
 
 
 def limits(view: View, asked: Asked) -> list[Section]:
@@ -42,7 +43,7 @@ def limits(view: View, asked: Asked) -> list[Section]:
     table = exceedance.limits(view)
     verdicts = [verdict(row, asked.accepted) for row in table.to_dict("records")]
     words = dict(zip(table["load"], (WORDS.get(v, "") for v in verdicts), strict=True))
-    kept = Column("kept", lambda row: words[row["load"]], shown=lambda _: asked.judges)
+    kept = Column("kept by itself", lambda row: words[row["load"]], shown=lambda _: asked.judges)
     block = as_block(
         "Joints above each limit, in numbers", (LIMITS[0], kept, *LIMITS[1:]), table, verdicts if asked.judges else ()
     )
@@ -57,10 +58,38 @@ def limits(view: View, asked: Asked) -> list[Section]:
         "; ".join(said),
         partial(_forest, table=table, accepted=asked.accepted),
         (4.9, drawing.rows_height(len(table))),
-        1.4,
+        max(1.4, drawing.rows_left(_above(table))),
     )
     how = [Text(line, small=True) for line in _how(view, asked)]
-    return [Section("limits", "Each limit", [Panels([panel], beside=how), block])]
+    points = exceedance.at_points(view)
+    each = [as_block(AT_POINTS.capitalize(), at_points(view), points)] if len(points) else []
+    return [Section("limits", "Each limit", [Panels([panel], beside=how), block, *each])]
+
+
+def _points(view: View) -> list[Table]:
+    """Operating points, and of the joints that keep all limits there; none of a file with one point."""
+    rows = []
+    for part in view.parts:
+        point = part.store.points[part.points[0]]
+        row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
+        if part.sampled and not part.weighted and part.limits and part.count(*VALID):
+            found = capabilities.together(capability.limits(part))
+            row |= {"kept": found.value if found.decides else WORDS["none"]}
+        rows.append(row)
+    return [as_block("Operating points", POINTS, pd.DataFrame(rows))] if len(rows) > 1 else []
+
+
+def _has(name: str) -> Callable[[pd.DataFrame], bool]:
+    return lambda table: name in table and bool(table[name].notna().any())
+
+
+POINTS = (
+    Column("point", lambda row: str(row["point"])),
+    Column("misalignment, speed, torque", lambda row: str(row["operation"])),
+    Column("of the time", lambda row: text.percent(row["share"]), shown=_has("share")),
+    Column("keep all limits there", lambda row: str(row["kept"]), shown=_has("kept")),
+)
+"""Columns of the table of operating points."""
 
 
 def question_of(text: str) -> str:
@@ -79,7 +108,7 @@ def _answer(view: View, found: Headline | None) -> Card:
         why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
         return Card("", f"{why}, so there is no verdict.", "")
     note = " ".join(text.sentence(note) for note in found.notes)
-    return Card(found.value, found.words, note, "open" if found.answer == "none" else found.answer)
+    return Card(found.value, found.words, note, "open" if found.answer in ("none", "searched") else found.answer)
 
 
 def _cards(view: View, found: Headline | None) -> list[Card]:
@@ -108,32 +137,39 @@ def _basis(view: View) -> list[Card]:
     if usual and view.verification:
         kind = max(usual, key=lambda name: usual[name])
         label = f"numerical error of the largest loads ({kind})"
-        cards.append(Card(text.percent(usual[kind]), label, accuracy.basis(view.verification)))
+        cards.append(Card(accuracy.in_percent(usual[kind]), label, accuracy.basis(view.verification)))
     return cards
 
 
 def _how(view: View, asked: Asked) -> list[str]:
     """Paragraphs on what the picture shows, and what decides."""
-    if not view.iid:
+    if not view.has_intervals:
         return [
             "Points: share of the joints with a valid load. Grey: with failed and unsettled joints counted below and "
             "above every limit.",
-            "No intervals: Clopper–Pearson holds for independent samples only; replicates with other seeds show the "
-            "scatter.",
+            "No intervals: Clopper–Pearson holds for independent samples only; sampling.replicates gives intervals.",
         ]
     said = "Joints are counted by their weights. " if view.weighted else ""
     paragraphs = [
-        f"{said}Points: share of the joints with a valid load. Blue: its interval by Clopper and Pearson, 95 % for "
-        "each limit by itself.",
+        f"{said}Points: share of the joints with a valid load. Blue: its interval ({view.interval_of}), 95 % "
+        "for each limit by itself.",
         "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above "
         "it at its upper end; it covers the numerical error, too, where it is known.",
     ]
+    if len(view.points) > 1:
+        paragraphs.append("A limit that names no operating point is about the largest load over all of them.")
     if asked.judges:
         paragraphs.append(
-            f"A limit is kept if its total interval lies below {text.percent(asked.accepted)}, not kept if it lies "
-            "above. It has no verdict where joints without a valid load decide, and is open otherwise."
+            f"Each limit by itself: kept if its total interval lies below {text.percent(asked.accepted)}, not kept if "
+            "it lies above. It has no verdict where joints without a valid load decide, and is open otherwise. The "
+            "verdict at the top is on the joints that exceed at least one limit."
         )
     return paragraphs
+
+
+def _above(table: pd.DataFrame) -> list[str]:
+    """Each limit as a label: ``cross1.F > 1500 N``."""
+    return [f"{row['load']} > {text.value(row['level'], row['unit'])}" for row in table.to_dict("records")]
 
 
 def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
@@ -144,7 +180,7 @@ def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
     shown = np.array([*table["estimate"], *np.ravel(spans)], float)
     shown = np.array([*shown[shown >= 0.5 / n], *([accepted] if accepted > 0 else ())])
     high = min(1.4 * shown.max(initial=0.5 / n), 1.0)
-    drawing.rows(ax, [text.limit(row) for row in rows])
+    drawing.rows(ax, _above(table))
     style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
     low = ax.get_xlim()[0]
     for i, (row, span) in enumerate(zip(rows, spans, strict=True)):

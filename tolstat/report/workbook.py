@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import load_of
 from tolstat.display.text import cell
 from tolstat.questions.exceedance.query import limits
 from tolstat.store import Reader
@@ -70,7 +70,7 @@ def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:
 
 def _limits(view: View) -> Iterable[Sequence[object]]:
     if not view.sampled:  # joints of a sweep or a list are no sample, whose shares would mean something
-        return [(name, limit, UNIT_OF_LOAD[name]) for name, limit in view.limits.items()]
+        return [(name, limit, load_of(name).unit) for name, limit in view.limits.items()]
     names = ("load", "level", "unit", "count", "valid", "estimate", "lower", "upper", "confidence", "nominal")
     found = limits(view)
     if found.empty:

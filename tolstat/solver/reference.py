@@ -22,6 +22,7 @@ from tolstat.common.tables import (
     Start,
     Status,
     for_kernels,
+    iterations_allowed,
     without_results,
 )
 
@@ -105,7 +106,8 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     alone = make_scratch(options)
     work, state = alone.work, alone.state
     settled = np.zeros(1, RESULT)
-    simulate_joint(par, options, alone, for_kernels(settled)[0])
+    allowed = iterations_allowed(options.steps_per_rev, options.max_revs)
+    simulate_joint(par, options, allowed, alone, for_kernels(settled)[0])
     period = 2 * np.pi / abs(float(par.omega))
     t0, y0 = period * (float(settled["revolutions"][0]) % 1.0), np.concatenate([state.q0, state.v0])
     if from_start:

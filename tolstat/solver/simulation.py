@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common import progress_memory
 from tolstat.common.tables import (
     CONTACTS,
     KERNEL_RESULT,
@@ -23,6 +24,7 @@ from tolstat.common.tables import (
     Simulation,
     Status,
     for_kernels,
+    iterations_allowed,
 )
 from tolstat.joint import ideal
 from tolstat.solver import rainflow, refinement, stationary
@@ -122,7 +124,22 @@ def scratch(options: Options) -> Scratch:
     """Work arrays of this process for `options`; importing the kernel here keeps it out of light commands."""
     from tolstat.kernel.revolution.simulate import make_scratch
 
-    return make_scratch(options)
+    return make_scratch(options, _state())
+
+
+@cache
+def _state() -> NDArray[np.void]:
+    """Memory of the state of the joint that this process simulates alone: its counters show that it makes progress."""
+    from tolstat.kernel.integrators.state import record_dtype
+    from tolstat.kernel.mechanics.topology import N_DOF
+
+    return progress_memory.zeros(1, record_dtype(N_DOF))
+
+
+@cache
+def _tally() -> NDArray[np.int64]:
+    """Counters of the lanes of this process, which show that it makes progress; see `kernel.lanes.lockstep`."""
+    return progress_memory.zeros(3, np.dtype(np.int64))
 
 
 @cache
@@ -170,6 +187,8 @@ def simulate_rows(
     """
     specs = history_specs(options, histories, n_harmonics)
     kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
+    allowed = iterations_allowed(options.steps_per_rev, options.max_revs)
+    left = np.full(len(params), allowed)
 
     def simulate(rows: NDArray[np.intp], settings: Options) -> tuple[NDArray[np.void], NDArray[np.void]]:
         found = np.zeros(len(rows), RESULT).view(np.recarray)
@@ -178,10 +197,12 @@ def simulate_rows(
         run: Callable[..., Iterator[tuple[int, NDArray[np.void]]]] = _together if in_lanes(settings) else _alone
         if follows_error(settings):
             run = partial(_resolved, steps[rows])
-        for i, samples in run(params[rows], settings, bool(specs), found, blocks):
+        own = left[rows]
+        for i, samples in run(params[rows], settings, own, bool(specs), found, blocks):
             if found[i].status in SIMULATED:
                 for name, values in _sample(samples, histories, specs).items():
                     kept[name][rows[i]] = values
+        left[rows] = own
         return found.view(np.ndarray), blocks.view(np.ndarray)
 
     steps = explicit_steps(params, options)
@@ -193,6 +214,7 @@ def simulate_rows(
     if len(others):
         results[others], _ = simulate(others, options)
     refinement.refine(results, options, simulate)
+    results["newton_iterations"][(results["status"] == Status.NEWTON_FAILED) & (left <= 0)] = allowed
     stationary.fill_intervals(results)
     results["clearance"] = params["clearance"]
     return Simulation(results, kept)
@@ -201,17 +223,23 @@ def simulate_rows(
 def _alone(
     params: NDArray[np.void],
     options: Options,
+    left: NDArray[np.int64],
     keep: bool,
     results: NDArray[np.void],
     blocks: NDArray[np.void] = NO_BLOCKS,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints one after the other; yield index and samples of each if `keep`."""
+    """Simulate joints one after the other; yield index and samples of each if `keep`.
+
+    `left`: Newton iterations still allowed to each joint, (n,), reduced by those taken.
+    """
+    from tolstat.kernel.integrators.state import ITERATIONS
     from tolstat.kernel.revolution.simulate import simulate_joint
 
     alone = scratch(options)
     rows, out, own = params.view(np.recarray), for_kernels(results), for_kernels(blocks)
     for i in range(len(params)):
-        simulate_joint(rows[i], options, alone, out[i])
+        simulate_joint(rows[i], options, left[i], alone, out[i])
+        left[i] -= alone.state.counters[ITERATIONS]
         if len(own):
             own[i] = alone.past.trail.revolution
         if keep:
@@ -221,6 +249,7 @@ def _alone(
 def _together(
     params: NDArray[np.void],
     options: Options,
+    left: NDArray[np.int64],
     keep: bool,
     results: NDArray[np.void],
     blocks: NDArray[np.void] = NO_BLOCKS,
@@ -228,13 +257,14 @@ def _together(
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints in lanes by number of contact stations; yield index and samples of each if `keep`.
 
-    `steps`: number of explicit steps of the first revolution, (n,); without it joints are simulated in lock-step.
+    `left` is as of `_alone`. `steps`: number of explicit steps of the first revolution, (n,); without it joints are
+    simulated in lock-step.
     """
     from tolstat.kernel.lanes.explicit import explicit
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
-    batch, tally = lanes(options), np.zeros(3, np.int64)
+    batch, tally = lanes(options), _tally()
     max_size = max(1, MAX_KEPT_SAMPLES // options.steps_per_rev) if keep else len(params)
     for here in _groups(params, max_size):
         part = np.ascontiguousarray(params[here])
@@ -243,11 +273,12 @@ def _together(
         samples = make_samples(len(part) if keep else 0, options.steps_per_rev)
         own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
         out = np.zeros(len(part), KERNEL_RESULT).view(np.recarray)
-        rows = part.view(np.recarray)
+        rows, allowed = part.view(np.recarray), left[here]
         if steps is None:
-            lockstep(rows, words, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+            lockstep(rows, words, allowed, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
         else:
-            explicit(rows, words, steps[here], options, scratch(options), batch, samples, own, out)
+            explicit(rows, words, steps[here], allowed, options, scratch(options), batch, samples, own, out, tally)
+        left[here] = allowed
         for_kernels(results)[here] = out
         if len(blocks):
             for_kernels(blocks)[here] = own
@@ -277,6 +308,7 @@ def _resolved(
     steps: NDArray[np.int64],
     params: NDArray[np.void],
     options: Options,
+    left: NDArray[np.int64],
     keep: bool,
     results: NDArray[np.void],
     blocks: NDArray[np.void],
@@ -295,10 +327,11 @@ def _resolved(
         run: Callable[..., Iterator[tuple[int, NDArray[np.void]]]] = _together if in_lanes(options) else _alone
         if explicit:
             run = partial(_together, steps=steps[rows])
-        for i, samples in run(params[rows], options, keep, out, own):
+        allowed = left[rows]
+        for i, samples in run(params[rows], options, allowed, keep, out, own):
             results[rows[i]] = out[i]
             yield int(rows[i]), samples
-        results[rows], blocks[rows] = out, own
+        results[rows], blocks[rows], left[rows] = out, own, allowed
         steps[rows[out["status"] == Status.NEWTON_FAILED]] = 0
 
 
@@ -325,15 +358,13 @@ def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, Hi
 
 def is_compiled(options: Options | None = None) -> bool:
     """Whether the kernels that `options` need lie in the cache, so that `warm_up` only has to load them."""
-    from pathlib import Path
-
-    from tolstat.kernel.simd.jit import CACHE_DIRECTORY
+    from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
 
     options = options or Options()
     names = ["lockstep.lockstep" if in_lanes(options) else "simulate.simulate_joint"]
     if refinement.may_refine(options):
         names += ["explicit.explicit", "explicit.count_steps"]
-    return all(any(Path(CACHE_DIRECTORY).rglob(f"{name}*.nbc")) for name in names)
+    return all(any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}")) for name in names)
 
 
 def warm_up(options: Options | None = None) -> None:
@@ -346,5 +377,6 @@ def warm_up(options: Options | None = None) -> None:
         params["omega"], params["alpha"], params["Js"] = 1.0, 0.1, 1.0  # its torque reverses
         explicit_steps(params, options)
         found, one = np.zeros(1, RESULT).view(np.recarray), np.full(1, options.steps_per_rev)
-        list(_together(params, refinement.settings(options), False, found, found[:, None], one))
+        left = np.full(1, 2**31)
+        list(_together(params, refinement.settings(options), left, False, found, found[:, None], one))
     rainflow.count(np.zeros((2, 8, 6)))

@@ -3,5 +3,6 @@
 from tolstat.store.counts import Counts
 from tolstat.store.reader import Reader
 from tolstat.store.result_store import ResultStore
+from tolstat.store.sources import viewed
 
-__all__ = ["Counts", "Reader", "ResultStore"]
+__all__ = ["Counts", "Reader", "ResultStore", "viewed"]

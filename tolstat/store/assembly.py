@@ -10,12 +10,19 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.files import atomic_write
+from tolstat.common.files import atomic_write, reason
 from tolstat.common.tables import Status
 from tolstat.store.axes import attach_scales
-from tolstat.store.histories import HISTORY_BYTES, HistoryParts, create_dataset, create_group, rows_per_chunk
+from tolstat.store.histories import (
+    HISTORY_BYTES,
+    HistoryParts,
+    create_dataset,
+    create_group,
+    parts_folder,
+    rows_per_chunk,
+)
 from tolstat.store.new_file import fill
-from tolstat.store.reader import Reader, parts_folder
+from tolstat.store.reader import Reader
 from tolstat.store.result_file import BLOCK, LINKED, campaign_digest, store_error
 
 
@@ -77,7 +84,7 @@ def assemble(
     try:
         with atomic_write(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
             fill(file, attrs, range(n), errors, design, origin)
-            for source in sources:
+            for source in (one for whole in sources for one in whole.each()):
                 _copy_results(file, source)
             if overwrite:
                 _histories_beside(path, file, n, sources)
@@ -86,9 +93,9 @@ def assemble(
     except FileExistsError as error:
         raise store_error(path, "exists already", "give another file: --out OTHER.h5") from error
     except OSError as error:
-        reason = error.strerror or str(error)
+        why = reason(error)
         raise store_error(
-            path, f"cannot be written: {reason}", "check that the folder is writable and the disk has space"
+            path, f"cannot be written: {why}", "check that the folder is writable and the disk has space"
         ) from error
 
 
@@ -98,10 +105,11 @@ def _copy_results(file: h5py.File, source: Reader) -> None:
         own = slice(first, min(first + BLOCK, source.n))
         there = slice(source.row(own.start), source.row(own.stop))
         done = source.status(own) != Status.PENDING
-        held = file["results/status"][there] != Status.PENDING
+        target = file[source._held().name]
+        held = target["results/status"][there] != Status.PENDING
         both, new = done & held, done & ~held
         for name in (c.name for c in source.columns):
-            dataset = file["results"][name]
+            dataset = target["results"][name]
             values, before = source.column("results", name, own), dataset[there]
             same = _bytes(values[both]) == _bytes(before[both])
             if not same.all():
@@ -109,7 +117,7 @@ def _copy_results(file: h5py.File, source: Reader) -> None:
                 raise DifferingResults(int(there.start + row), name)
             before[new] = values[new]
             dataset[there] = before
-        for name, dataset in file["ledger"].items():
+        for name, dataset in target["ledger"].items():
             if name not in ("errors_check", *LINKED):
                 dataset[there] = np.where(new, source.column("ledger", name, own), dataset[there])
 
@@ -132,26 +140,28 @@ def _histories_inside(file: h5py.File, n: int, sources: Sequence[Reader]) -> Non
     specs = sources[0].history_specs
     if not specs:
         return
-    group = create_group(file)
-    for name, spec in specs.items():
-        attach_scales(create_dataset(group, name, n, spec), file["row"], spec)
-    for source in sources:
-        for name, slots in _history_blocks(source):
-            begin = source.row(int(slots[0]))
-            group[name][begin : begin + len(slots)] = source.histories(name, slots)
+    for of_point in zip(*(source.each() for source in sources), strict=True):
+        group = create_group(file[of_point[0]._held().name])
+        for name, spec in specs.items():
+            attach_scales(create_dataset(group, name, n, spec), file["row"], spec)
+        for source in of_point:
+            for name, slots in _history_blocks(source):
+                begin = source.row(int(slots[0]))
+                group[name][begin : begin + len(slots)] = source.histories(name, slots)
 
 
 def _histories_beside(path: Path, file: h5py.File, n: int, sources: Sequence[Reader]) -> None:
     specs = sources[0].history_specs
     if not specs:
         return
-    parts = HistoryParts(parts_folder(path), n, specs, campaign_digest(file))
-    parts.remove()  # left by an attempt that was killed: the file at `path` has its histories inside
-    for source in sources:
-        size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in specs.values()))
-        for first in range(0, source.n, size):
-            slots = np.arange(first, min(first + size, source.n))
-            parts.add(source.row(slots), {name: source.histories(name, slots) for name in specs})
+    size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in specs.values()))
+    for of_point in zip(*(source.each() for source in sources), strict=True):
+        parts = HistoryParts(parts_folder(path) / (of_point[0].point or ""), n, specs, campaign_digest(file))
+        parts.remove()  # left by an attempt that was killed: the file at `path` has its histories inside
+        for source in of_point:
+            for first in range(0, source.n, size):
+                slots = np.arange(first, min(first + size, source.n))
+                parts.add(source.row(slots), {name: source.histories(name, slots) for name in specs})
 
 
 def check_free(path: Path) -> None:

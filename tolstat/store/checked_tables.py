@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,8 @@ from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.tables import Status, Variant
 from tolstat.store import checks, integrity
 from tolstat.store.numbering import Numbering
-from tolstat.store.result_file import BLOCK, RUN_AGAIN, descriptions, store_error
+from tolstat.store.result_file import BLOCK, POINT_GROUPS, RUN_AGAIN, descriptions, place_of, store_error
+from tolstat.study.points import Point
 
 
 class CheckedTables(Numbering):
@@ -28,7 +29,26 @@ class CheckedTables(Numbering):
     variants: tuple[Variant, ...]
     _left_out: NDArray[np.bool_]
     """File slots whose results were found damaged while they were read, (n,)."""
-    _file: h5py.File
+    points: Mapping[str, Point]
+    point: str | None
+
+    @property
+    def _file(self) -> h5py.File:
+        raise NotImplementedError
+
+    def _held(self) -> h5py.Group:
+        """Group of the file with the tables of the operating point.
+
+        Raises
+        ------
+        StoreError
+            When the file has several and none is chosen.
+        """
+        if self.point is None:
+            names = ", ".join(self.points)
+            remedy = f"give one of them: --point {next(iter(self.points))}, or store.at({next(iter(self.points))!r})"
+            raise store_error(self.path, f"has results at several operating points: {names}", remedy)
+        return self._file[place_of(self.point)]
 
     def status(self, slots: slice = slice(None)) -> NDArray[np.uint8]:
         """Status of the joints, (n,), or of a slice of file slots; joints whose row is damaged are PENDING.
@@ -164,7 +184,8 @@ class CheckedTables(Numbering):
             When it cannot be read.
         """
         try:
-            return np.asarray(self._file[group][name][slots])
+            holder = self._held() if group in POINT_GROUPS else self._file
+            return np.asarray(holder[group][name][slots])
         except checks.DAMAGE_ERRORS as error:
             if not self._file:
                 raise
@@ -202,9 +223,10 @@ class CheckedTables(Numbering):
         return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
 
     def _check_errors(self, slots: slice, errors: NDArray[np.void]) -> None:
+        checks = self._file[place_of(next(iter(self.points)))]["ledger/errors_check"]  # the same at all points
         first = self.row(slots.indices(self.n)[0])
         described = [(c, self._read(name, c, dtype, slots)) for name, (c, dtype) in descriptions(self._file).items()]
-        right = integrity.errors_hash(first, errors, described) == self.column("ledger", "errors_check", slots)
+        right = integrity.errors_hash(first, errors, described) == checks[slots]
         if not right.all():
             found = f"is damaged: the errors of row {first + int(np.argmin(right))} do not match their checksum"
             raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")

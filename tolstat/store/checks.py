@@ -6,6 +6,7 @@ Its layout comes first (`layout`), then the checksum of its attributes, their co
 from __future__ import annotations
 
 import math
+from itertools import product
 from pathlib import Path
 
 import h5py
@@ -14,8 +15,10 @@ import numpy as np
 from tolstat.common import selected_results
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec
+from tolstat.joint import Operation
 from tolstat.store import integrity, layout, metadata
-from tolstat.store.result_file import FILETYPE, check_column, descriptions, store_error, text
+from tolstat.store.result_file import FILETYPE, check_column, descriptions, place_of, store_error, text
+from tolstat.study.points import Point, check_name
 
 DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
 """Exceptions that reading a damaged file raises, in h5py or in code that relies on the file's attributes."""
@@ -89,6 +92,27 @@ def history_specs(file: h5py.File) -> dict[str, HistorySpec]:
     return specs
 
 
+def points(file: h5py.File) -> dict[str, Point]:
+    """Read the attribute ``points``: the operating points by name.
+
+    Raises
+    ------
+    KeyError, ValueError, TypeError
+        When it does not describe operating points.
+    """
+    found = {}
+    for name, values in metadata.read(file, "points").items():
+        if name:
+            check_name(name)  # also a folder of histories has this name
+        share = values.pop("share")
+        if values.keys() != Operation.model_fields.keys() or not all(isinstance(v, float) for v in values.values()):
+            raise ValueError(f"operating point {name!r} has the values {values}")
+        found[name] = Point(name, Operation.model_construct(**values), math.nan if share is None else float(share))
+    if not found or (len(found) > 1 and "" in found):
+        raise ValueError("attribute points has no operating point, or one without a name among others")
+    return found
+
+
 def check_tables(file: h5py.File) -> int:
     """Check that every kept column is present with the type and length that its table defines.
 
@@ -102,20 +126,21 @@ def check_tables(file: h5py.File) -> int:
     KeyError, ValueError
         With the dataset that is missing or wrong.
     """
-    status = _dataset(file, "results", "status")
+    at_points = [place_of(point) for point in points(file)]
+    status = _dataset(file, f"{at_points[0]}/results/status")
     n = int(status.shape[0]) if status.ndim == 1 else 0
     if n < 1:
-        raise ValueError(f"/results/status has the shape {status.shape}")
+        raise ValueError(f"{status.name} has the shape {status.shape}")
     histories = tuple(check_column(name) for name in metadata.read(file, "histories"))
     groups = {
         "errors": ERROR_COLUMNS,
-        "results": selected_results.columns(metadata.read(file, "identity")),
-        "ledger": (*LEDGER_COLUMNS, *histories),
+        **{f"{place}/results": selected_results.columns(metadata.read(file, "identity")) for place in at_points},
+        **{f"{place}/ledger": (*LEDGER_COLUMNS, *histories) for place in at_points},
         **{name: columns for name, (columns, _) in descriptions(file).items()},
     }
     for group, columns in groups.items():
         for c in columns:
-            _check_column(_dataset(file, group, c.name), n, c.dtype)
+            _check_column(_dataset(file, f"{group}/{c.name}"), n, c.dtype)
     return n
 
 
@@ -127,20 +152,18 @@ def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> N
     KeyError, ValueError
         With the dataset that is missing or wrong.
     """
-    if "histories" not in file:
-        return
-    for name, spec in specs.items():
-        dataset = _dataset(file, "histories", name)
+    for place, (name, spec) in product(map(place_of, points(file)), specs.items()):
+        if "histories" not in file[place]:
+            continue
+        dataset = _dataset(file, f"{place}/histories/{name}")
         if dataset.shape != (n, *spec.shape) or dataset.dtype != np.dtype(spec.dtype):
             raise ValueError(f"{dataset.name} has the shape {dataset.shape} and type {dataset.dtype}")
 
 
-def _dataset(file: h5py.File, group: str, name: str) -> h5py.Dataset:
-    if group not in file or name not in file[group]:
-        raise ValueError(f"/{group}/{name} is missing")
-    dataset = file[group][name]
+def _dataset(file: h5py.File, path: str) -> h5py.Dataset:
+    dataset = file.get(path)
     if not isinstance(dataset, h5py.Dataset):
-        raise ValueError(f"/{group}/{name} is not a dataset")
+        raise ValueError(f"{path.replace('//', '/')} is missing")
     return dataset
 
 

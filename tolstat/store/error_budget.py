@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tolstat.analysis.accuracy import size
-from tolstat.common.loads import LOADS
+from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
+from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS
+from tolstat.store.several_loads import largest_of, together
 
 if TYPE_CHECKING:
     from tolstat.store.sample_load import SampleLoad
@@ -15,17 +19,93 @@ if TYPE_CHECKING:
 
 
 def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
-    """Return a load reduced, and increased, by its numerical error in every joint; None if the error is unknown."""
+    """Return the load of all joints at both ends of its numerical error, as far as that is known; None if it is not.
+
+    With enough verified joints near the limit of the load, see `near`; otherwise the load is reduced and increased by
+    the error that most joints checked at random stay below.
+    """
+    if load.parts:
+        return _together(load, [shifted(view, part) for part in load.parts])
+    found = near(view, load)
+    if found is not None:
+        return found
     error = relative(view, load.name)
     if np.isnan(error):
         return None
-    by = error * size(view.results, load.name)
+    narrowed, name = view.narrowed(load.name)
+    by = error * size(narrowed.results, name) / load.scale
     return load.shifted(-by), load.shifted(by)
 
 
+def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
+    """Return the load of all joints corrected by what verified joints near its limit lack; see `accuracy.corrected`.
+
+    Returns
+    -------
+    tuple of SampleLoad or None
+        The load at both ends of the mean correction. None if fewer than `accuracy.LEAST_NEAR` of the joints nearest to
+        the limit are verified, twice as many at most; `unknown` has the command that verifies them.
+    """
+    if load.parts:
+        return _together(load, [near(view, part) for part in load.parts])
+    if load.limit is None:
+        return None
+    view, name = view.narrowed(load.name)
+    if len(view.parts) > 1:
+        return _together(load, [near(part, _at(part, name, load)) for part in view.parts])
+    if view.near is None:
+        return None
+    checks = {name: check.results for name, check in view.near.checks.items()}
+    distance = np.abs(load.valid_or_nan - load.limit)
+    nearest = view.rows(np.argsort(distance, kind="stable")[: 2 * LEAST_NEAR])
+    found = corrections(view.near.base, checks)[np.isin(view.near.rows, nearest), OBSERVABLES.index(name)]
+    found = found[np.isfinite(found)]
+    if found.size < LEAST_NEAR:
+        return None
+    sizes = np.nan_to_num(size(view.results, name) / load.scale)
+    low, high = corrected(np.zeros(load.values.size), sizes, found)
+    return load.shifted(low), load.shifted(high)
+
+
+def _at(part: View, name: str, load: SampleLoad) -> SampleLoad:
+    """A load at one operating point, with the limit, and as the ratio, of the load over several."""
+    assert load.limit is not None
+    own = replace(part.load(name), limit=load.limit * load.scale)
+    return own if load.scale == 1.0 else own.of_limit()
+
+
+def _together(
+    load: SampleLoad, parts: Sequence[tuple[SampleLoad, SampleLoad] | None]
+) -> tuple[SampleLoad, SampleLoad] | None:
+    """The largest of the loads at each end; None if one of them is not known."""
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    low, high = (largest_of(load.name, ends) for ends in zip(*known, strict=True))
+    return low, high
+
+
+def unknown(view: View) -> str:
+    """Words on the numerical error near the limits of the study if it is not known; empty if it is."""
+    if not view.limits or near(view, together(view)) is not None:
+        return ""
+    return command(view.path)
+
+
+def command(path: Path, limit: str = ANY_LIMIT) -> str:
+    """Words on a numerical error that is not known near a limit, with the command that tells it."""
+    return f'numerical error at the limit: not known; tolstat verify {path} --near "{limit}"'
+
+
 def relative(view: View, name: str) -> float:
-    """Numerical error of a load, relative to the largest load of its kind in the joint; NaN if unknown."""
-    return view.numerical_error.get(LOADS[name].kind, np.nan)
+    """Numerical error of a load, relative to the largest load of its kind in the joint; NaN if unknown.
+
+    Of all limits that of the load whose error is the largest.
+    """
+    if name == ALL_LIMITS:
+        return float(np.max([relative(view, own) for own in view.limits]))
+    narrowed, plain = view.narrowed(name)
+    return narrowed.numerical_error.get(LOADS[plain].kind, np.nan)
 
 
 def total_interval(
@@ -47,5 +127,24 @@ def total_interval(
     lower, upper : float
         Shares of the joints; NaN for dependent samples.
     """
-    low, high = ends or (load, load)
-    return low.above(level, confidence).outer_lower, high.above(level, confidence).outer_upper
+    found = [part.above(level, confidence) for part in (load, *(ends or ()))]
+    lower, upper = [part.outer_lower for part in found], [part.outer_upper for part in found]
+    return min(lower), max(upper)
+
+
+def delivery(
+    load: SampleLoad,
+    ends: tuple[SampleLoad, SampleLoad] | None,
+    level: float,
+    number: int,
+    confidence: float,
+) -> dict[str, float]:
+    """Prediction interval for the number above a level among `number` further joints; parameters as `total_interval`.
+
+    Returns
+    -------
+    dict
+        ``next_lower``, ``next_upper``: whole numbers, ends included; NaN for dependent samples.
+    """
+    found = [part.delivery(level, number, confidence) for part in (load, *(ends or ()))]
+    return {"next_lower": min(low for low, _ in found), "next_upper": max(high for _, high in found)}

@@ -20,10 +20,18 @@ if TYPE_CHECKING:
     from tolstat.store.checked_tables import CheckedTables
     from tolstat.store.reader import Reader
 
+OPERATING = {
+    "operation.alpha": "misalignment of the shafts",
+    "operation.speed": "angular velocity of the input shaft",
+    "operation.torque": "resisting torque on the output shaft",
+}
+"""Meaning of the columns that an export holds as the joint's own values instead of deviations."""
+
 
 def described(store: Reader) -> dict[str, Column]:
     """Columns with unit and description that an export has, by name; see `to_pandas` for the others."""
-    return {c.name: c for c in (*draw_records.columns(store.sampling), *ERROR_COLUMNS, *store.columns)}
+    own = [c._replace(description=OPERATING.get(c.name, c.description)) for c in ERROR_COLUMNS]
+    return {c.name: c for c in (*draw_records.columns(store.sampling), *own, *store.columns)}
 
 
 def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
@@ -45,6 +53,7 @@ def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
         origin = store.origin(rows)
         data |= {c.name: c.of(origin) for c in drawn}
     data |= {c.name: c.of(errors) for c in ERROR_COLUMNS}
+    data |= {f"operation.{name}": values for name, values in recorded.operating_points(store, rows).items()}
     data |= {c.name: c.of(results) for c in store.columns}
     if store.retries:
         data["attempt"] = store.attempt(rows)

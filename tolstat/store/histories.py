@@ -28,6 +28,8 @@ from tolstat.store.result_file import link_rows, put_attributes, store_error
 
 CHUNK_BYTES = 1 << 16
 """Approximate size of one chunk of a history before compression, bytes."""
+PARTS = ".parts"
+"""Ending of the folder of the histories of a campaign that is not complete yet."""
 HISTORY_BYTES = 1 << 25
 """Approximate amount of history data copied at a time, bytes."""
 
@@ -37,8 +39,8 @@ def rows_per_chunk(spec: HistorySpec, n: int) -> int:
     return max(1, min(n, CHUNK_BYTES // spec.blank(1).nbytes))
 
 
-def create_group(file: h5py.File) -> h5py.Group:
-    """Create the group of the histories in a result file."""
+def create_group(file: h5py.Group) -> h5py.Group:
+    """Create the group of the histories of an operating point in a result file."""
     group = file.create_group("histories")
     put_attributes(group, {"description": "loads of each joint over its last revolution, or what follows from them"})
     link_rows(file, group)
@@ -86,7 +88,7 @@ class HistoryParts:
     Parameters
     ----------
     folder : Path
-        ``FILE.h5.parts``; created when the first part is added.
+        ``FILE.h5.parts``, or the folder in it of an operating point; created when the first part is added.
     n : int
         Number of joints in the result file.
     specs : mapping of str to HistorySpec
@@ -118,7 +120,7 @@ class HistoryParts:
             expected = (len(rows), *spec.shape)
             if arrays[name].shape != expected:
                 raise ValueError(f"history {name}: shape {arrays[name].shape}, {expected} expected")
-        self.folder.mkdir(exist_ok=True)
+        self.folder.mkdir(parents=True, exist_ok=True)
         if self._next is None:
             paths = self.paths()
             self._next = int(paths[-1].stem) + 1 if paths else 0
@@ -186,8 +188,8 @@ class HistoryParts:
         self._check_held(index.part[rows[done]])
         return self._gather(name, rows, index)
 
-    def gather_into(self, file: h5py.File) -> None:
-        """Copy the histories of all joints to datasets in the group ``histories``, a few chunks at a time.
+    def gather_into(self, file: h5py.Group) -> None:
+        """Copy the histories of all joints to datasets in a new group ``histories``, a few chunks at a time.
 
         Raises
         ------
@@ -199,7 +201,7 @@ class HistoryParts:
         group = create_group(file)
         for name, spec in self.specs.items():
             dataset = create_dataset(group, name, self.n, spec)
-            attach_scales(dataset, file["row"], spec)
+            attach_scales(dataset, file.file["row"], spec)
             step = 16 * rows_per_chunk(spec, self.n)
             for first in range(0, self.n, step):
                 rows = np.arange(first, min(first + step, self.n))
@@ -239,6 +241,14 @@ class HistoryParts:
             raise store_error(path, "is damaged", remedy) from error
 
     def remove(self) -> None:
-        """Delete the folder with all parts."""
+        """Delete the folder with all parts, and the one that it is in if nothing else is."""
         if self.folder.exists():
             shutil.rmtree(self.folder)
+            above = self.folder.parent
+            if above.suffix == PARTS and not any(above.iterdir()):
+                above.rmdir()
+
+
+def parts_folder(path: Path) -> Path:
+    """Folder of the histories of a campaign that is not complete yet."""
+    return path.with_name(path.name + PARTS)

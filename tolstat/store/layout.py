@@ -28,6 +28,8 @@ OF_SCALES = (b"DIMENSION_LIST", b"REFERENCE_LIST")
 """Attributes in which HDF5 itself keeps references, for dimension scales; nothing follows them."""
 HISTORIES = "histories"
 """Name of the groups whose datasets are compressed."""
+NAMED = "/what_if/"
+"""Group outside the histories whose datasets may be names, of loads."""
 
 
 def check(file: h5py.File, compressed: str = HISTORIES) -> None:
@@ -123,7 +125,7 @@ def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool) 
     if layout != h5d.CONTIGUOUS or filters:
         raise ValueError(f"{path} is not stored contiguously")
     kind = held.get_type().get_class()
-    if kind not in (h5t.INTEGER, h5t.FLOAT) and not (compressed and kind == h5t.STRING):  # names along an axis
+    if kind not in (h5t.INTEGER, h5t.FLOAT) and not (kind == h5t.STRING and (compressed or path.startswith(NAMED))):
         raise ValueError(f"{path} does not hold numbers")
     offset, stored = held.get_offset(), held.get_storage_size()
     if offset is None or stored < nbytes or offset + stored > size:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 import h5py
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError, create_model
 
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import LOADS, split
 from tolstat.common.solver_options import CODES
 from tolstat.common.strict import MAX_DEPTH, Strict, depth, dotted
 from tolstat.common.tables import FINEST_STEPS, Options
@@ -27,7 +27,7 @@ MAX_SHOWN = 5
 
 
 def _load(name: str) -> str:
-    if name not in LOADS:
+    if split(name)[0] not in LOADS:
         raise ValueError("is not a load")
     return name
 
@@ -89,9 +89,11 @@ class StopRecord(_File):
     """Why a campaign ended early, see `campaign.stop_rule.Outcome.record`."""
 
     rule: str
+    reached: bool
     joints: Count
     n_unresolved: Count
     above: Count
+    estimate: float
     lower: float
     upper: float
     confidence: Annotated[float, Field(gt=0, lt=1)]
@@ -105,6 +107,15 @@ class RetryRecord(_File):
     status: list[str]
     settings: dict[str, str | float | bool]
     options: SolverOptions
+
+
+class PointRecord(_File):
+    """An operating point, SI, and its share of the time."""
+
+    alpha: float
+    speed: float
+    torque: float
+    share: float | None
 
 
 class VariantRecord(_File):
@@ -125,6 +136,7 @@ class DesignRecord(_File):
 Dimensions = dict[str, Annotated[int, Field(strict=True, ge=0)]]
 MODELS: dict[str, TypeAdapter[Any]] = {
     "limits": TypeAdapter(dict[LoadName, Positive]),
+    "points": TypeAdapter(dict[str, PointRecord]),
     "joint": TypeAdapter(dict[str, Any]),
     "identity": TypeAdapter(dict[str, Any]),
     "options": TypeAdapter(SolverOptions),

@@ -44,10 +44,8 @@ class NamedLoads:
 
         Raises
         ------
-        InputError
-            When there is no such load, or the study does not keep it.
-        StoreError
-            When the file holds levels of a subset simulation, which are not a sample.
+        InputError, StoreError
+            When the file has no such load for a sample of joints; see `View.load`.
         """
         import pandas as pd
 

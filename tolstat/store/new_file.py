@@ -19,7 +19,16 @@ from tolstat.store import meanings
 from tolstat.store.integrity import attempt_hash, errors_hash, seal
 from tolstat.store.meanings import Meanings
 from tolstat.store.provenance import git_commit, versions
-from tolstat.store.result_file import BLOCK, FILETYPE, check_column, descriptions, link_rows, put_attributes
+from tolstat.store.result_file import (
+    BLOCK,
+    FILETYPE,
+    check_column,
+    descriptions,
+    link_rows,
+    place_of,
+    put_attributes,
+    text,
+)
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -31,12 +40,14 @@ ABOUT = "Monte Carlo campaign of Cardan joints: row i is joint i in every datase
 GROUPS = {
     "design": "which of the listed joints each row is",
     "origin": "how each joint was drawn, where not from the tolerances alone",
-    "errors": "manufacturing errors and operating point of each joint, drawn before anything was simulated",
+    "errors": "errors of each joint, those of the operating point among them, drawn before anything was simulated",
+    "points": "results of the same joints at each operating point",
     "results": "status, diagnostics and loads of each joint; NaN where there are none",
     "ledger": "what gave the results of each joint, and checksums of its rows",
     "session": "the run under way",
+    "what_if": "largest loads of joints with other tolerances, drawn with the seed of the campaign",
 }
-"""Description of each group that a new file has."""
+"""Description of each group; `what_if` comes later, the others are in a new file if it needs them."""
 SESSION = {
     "started": ("f8", "seconds since 1970-01-01 00:00:00", "start of the run under way; NaN where none is"),
     "done": ("i8", "1", "joints that were done when it started"),
@@ -46,9 +57,10 @@ SESSION = {
 
 def study_attributes(study: Study) -> dict[str, str]:
     """Return the attributes of a study that do not affect results and may change between runs of a campaign."""
-    structured = {"limits": study.limits, "joint": study.joint.given("json")}
-    plain = {"study": study.text, "study_name": study.name}
-    return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
+    points = {point.name: point.values() for point in study.points}
+    structured = {"limits": study.limits, "points": points, "joint": study.joint.given("json")}
+    texts = {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
+    return {"study": study.text, "study_name": study.name} | texts
 
 
 def attributes(
@@ -94,9 +106,9 @@ def attributes(
     return plain | {name: json.dumps(value, allow_nan=False) for name, value in structured.items()}
 
 
-def size_of_new(n: int, results: tuple[Column, ...]) -> int:
+def size_of_new(n: int, results: tuple[Column, ...], points: int) -> int:
     """Approximate upper bound on the size of a new file of `n` rows, bytes, without long attributes."""
-    groups = (DESIGN_COLUMNS, ERROR_COLUMNS, results, LEDGER_COLUMNS)
+    groups = (DESIGN_COLUMNS, ERROR_COLUMNS, *(results, LEDGER_COLUMNS) * points)
     columns = [np.dtype(c.dtype).itemsize for group in groups for c in group]
     return n * sum(columns) + COLUMN_OVERHEAD * len(columns)
 
@@ -143,12 +155,16 @@ def fill(
         raise ValueError("how the joints were drawn must be given for the methods that have columns for it, only")
     if drawn:
         create_table(file, "origin", drawn, n, origin, codes)
-    create_table(file, "results", selected_results.columns(json.loads(str(attrs["identity"]))), n, codes=codes)
-    create_table(file, "ledger", (*LEDGER_COLUMNS, *history_check_columns(attrs)), n)
+    columns = selected_results.columns(json.loads(str(attrs["identity"])))
+    at_points = [file.require_group(place_of(point)) for point in json.loads(str(attrs["points"]))]
+    for group in at_points:
+        create_table(group, "results", columns, n, codes=codes)
+        create_table(group, "ledger", (*LEDGER_COLUMNS, *history_check_columns(attrs)), n)
     _create_session(file)
     create_table(file, "errors", ERROR_COLUMNS, n, _checked(file, rows, errors))
-    for name in GROUPS.keys() & file.keys():
-        put_attributes(file[name], {"description": GROUPS[name]})
+    for group in dict.fromkeys((file, *at_points)):
+        for name in GROUPS.keys() & group.keys():
+            put_attributes(group[name], {"description": GROUPS[name]})
     seal(file)
 
 
@@ -185,14 +201,16 @@ def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -
                 c.of(table)[:] = file[group][c.name][here]
             described.append((columns, table))
         checks = errors_hash(rows.start + first, block, described)
-        file["ledger/errors_check"][here] = checks
-        file["ledger/attempt_check"][here] = attempt_hash(checks, np.zeros(len(block), np.int32))
+        attempts = attempt_hash(checks, np.zeros(len(block), np.int32))
+        for point in json.loads(text(file.attrs, "points")):
+            ledger = file[place_of(point)]["ledger"]
+            ledger["errors_check"][here], ledger["attempt_check"][here] = checks, attempts
         yield block
         first = here.stop
 
 
 def create_table(
-    file: h5py.File,
+    file: h5py.Group,
     name: str,
     columns: tuple[Column, ...],
     n: int,
@@ -204,8 +222,8 @@ def create_table(
 
     Parameters
     ----------
-    file : h5py.File
-        File with ``row`` and ``nominal``.
+    file : h5py.Group
+        Group that the table is made in, of a file with ``row`` and ``nominal``.
     name : str
         Group of the datasets.
     columns : tuple of Column
@@ -219,7 +237,7 @@ def create_table(
     scale : h5py.Dataset, optional
         Dimension scale of the rows; ``row`` of the file without it, which the group then has with ``nominal``.
     """
-    group, row = file.create_group(name), scale or file["row"]
+    group, row = file.create_group(name), scale or file.file["row"]
     if scale is None:
         link_rows(file, group)
     else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 import subprocess
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
@@ -23,6 +24,27 @@ def versions() -> dict[str, str]:
     """Versions of tolstat, of Python and of the libraries that affect results, and `source_hash`."""
     found = {"tolstat": tolstat.__version__, "sources": source_hash(), "python": platform.python_version()}
     return found | {name: metadata.version(name) for name in LIBRARIES}
+
+
+def differing_code(held: Mapping[str, str]) -> list[str]:
+    """Compare the code that began a file with that of now: only equal code adds joints to a file.
+
+    Parameters
+    ----------
+    held : mapping of str to str
+        Versions in the file, see `versions`.
+
+    Returns
+    -------
+    list of str
+        ``"tolstat: version 0.1.0 in the file, 0.2.0 now"`` for each difference.
+    """
+    now = {"tolstat": ("version", tolstat.__version__), "sources": ("hash", source_hash())}
+    return [
+        f"{name}: {noun} {held.get(name, 'unknown')} in the file, {own} now"
+        for name, (noun, own) in now.items()
+        if held.get(name) != own
+    ]
 
 
 def source_hash() -> str:

@@ -2,48 +2,49 @@
 
 from __future__ import annotations
 
-import logging
-import time
+import math
+from copy import copy
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
-from tolstat.common.errors import Fault, StoreError
+from tolstat.common.errors import StoreError
 from tolstat.common.loads import limits_in_words
 from tolstat.common.shown import table
 from tolstat.common.tables import Status, Variant
-from tolstat.store import checks, integrity, metadata
+from tolstat.store import checks, integrity, left_out, metadata, session
 from tolstat.store.checked_tables import CheckedTables
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
-from tolstat.store.histories import HistoryParts
+from tolstat.store.histories import HistoryParts, parts_folder
 from tolstat.store.named_loads import NamedLoads
-from tolstat.store.result_file import BLOCK, RUN_AGAIN, campaign_digest, is_locked, open_hdf5, store_error, text
+from tolstat.store.result_file import (
+    BLOCK,
+    RUN_AGAIN,
+    Handle,
+    campaign_digest,
+    is_locked,
+    open_hdf5,
+    store_error,
+    text,
+)
 from tolstat.store.view import View
+from tolstat.study.points import only_one
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
+    from tolstat.joint import Operation
+
 ONE_EACH = ("random", "sobol", "lhs", "importance", "subset")
 """Sampling methods whose number of joints is ``sampling.n``."""
-
-MAX_TOLD = 5
-"""Most damaged rows that a warning lists."""
-LOG = logging.getLogger("tolstat.store")
-
-
-class Session(NamedTuple):
-    """A run under way: when it started (Unix time, s), and how many joints were done by then."""
-
-    started: float
-    done: int
 
 
 class Reader(CheckedTables):
@@ -68,8 +69,13 @@ class Reader(CheckedTables):
         Columns of the results that the campaign keeps, in the order of the table.
     joint, options, sampling, versions : dict
         Nominal joint with all values resolved, solver options, sampling (with ``dimensions``), software versions.
+    points : dict of str to Point
+        Operating points by name; one without a name unless the study has several.
+    point : str or None
+        Operating point whose results are read; None where there are several and none is chosen, see `at`.
     limits : dict of str to float
-        Limits of the study in SI units, ``{"cross1.F": 700.0}``.
+        Limits of the study in SI units, ``{"cross1.F": 700.0}``; those of some operating points only are named
+        ``cross1.F at cruise``.
     case_names : tuple of str
         Cases of a study that lists its joints, ``"ideal"`` first; empty for other methods.
     variants : tuple of Variant
@@ -124,7 +130,7 @@ class Reader(CheckedTables):
 
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
-        self._file = file
+        self._handle = Handle(file)
         attrs = file.attrs
         checks.check_schema(path, file)
         self._read_study_attributes()
@@ -155,12 +161,56 @@ class Reader(CheckedTables):
         ):
             raise ValueError(f"sampling.n is {self.sampling['n']} in a campaign of {self.campaign_rows} rows")
         checks.check_histories(file, self.history_specs, self.n)
-        self._parts = HistoryParts(parts_folder(path), self.n, self.history_specs, campaign_digest(file))
+        self.point = next(iter(self.points)) if len(self.points) == 1 else None
+        self._campaign = campaign_digest(file)
+
+    @property
+    def _file(self) -> h5py.File:
+        return self._handle.file
+
+    @cached_property
+    def _parts(self) -> HistoryParts:
+        self._held()
+        folder = parts_folder(self.path) / (self.point or "")
+        return HistoryParts(folder, self.n, self.history_specs, self._campaign)
+
+    def at(self, point: str) -> Self:
+        """Return the file at one of its operating points; both are closed together.
+
+        Raises
+        ------
+        InputError
+            When there is no such point.
+        """
+        only_one(point, list(self.points), str(self.path))
+        found = copy(self)
+        for kept in ("_parts", "loads"):
+            found.__dict__.pop(kept, None)
+        found.point = point
+        return found
+
+    def each(self) -> list[Self]:
+        """Return the file at each of its operating points, or at the one that it is at."""
+        return [self.at(name) for name in (self.points if self.point is None else [self.point])]
+
+    @property
+    def operation(self) -> Operation:
+        """Operating point whose results are read, without the deviations of the joints.
+
+        Raises
+        ------
+        StoreError
+            When the file has several and none is chosen.
+        """
+        self._held()
+        return self.points[self.point or ""].operation
 
     def __repr__(self) -> str:
         if not self._file:
             return f"<result file {self.path.name!r}, closed>"
-        return f"<result file {self.path.name!r}: {self.n - self.first_sample} joints ({self._progress()})>"
+        joints = f"{self.n - self.first_sample} joints"
+        progress = [f"{one.point}: {one._progress()}" if one.point else one._progress() for one in self.each()]
+        return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
 
     def _repr_html_(self) -> str:
         entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
@@ -187,17 +237,8 @@ class Reader(CheckedTables):
     def close(self) -> None:
         """Close the file; joints that were left out because their results are damaged are told as a warning."""
         if self._file and self._file.mode == "r":
-            self._tell_damage("are left out", f"simulate these joints again: tolstat run STUDY --out {self.path}")
+            left_out.tell(self, "are left out", f"simulate these joints again: tolstat run STUDY --out {self.path}")
         self._file.close()
-
-    def _tell_damage(self, done: str, remedy: str) -> None:
-        slots = np.flatnonzero(self._left_out)
-        if slots.size:
-            joints = "1 joint" if slots.size == 1 else f"{slots.size} joints"
-            rows = ", ".join(map(str, self.row(slots[:MAX_TOLD]).tolist())) + ", ..." * (slots.size > MAX_TOLD)
-            found = f"the results of {joints} are damaged and {done}: row {rows}"
-            LOG.warning("warning: %s", Fault(str(self.path), found, remedy))
-            self._left_out[:] = False
 
     def view(self, study_path: Path | None = None) -> View:
         """View of the file that questions read, while the file is open.
@@ -218,14 +259,19 @@ class Reader(CheckedTables):
         return NamedLoads(self.view())
 
     @property
+    def heaviest(self) -> float:
+        """Largest weight that a joint of importance sampling can have: one over the share of the tolerances, else 1."""
+        return 1.0 / (1.0 - math.fsum(share for share, _ in self.identity.get("proposal", ())))
+
+    @property
     def nominal(self) -> pd.Series[float]:
         """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
         return self.loads.nominal()
 
     @property
     def complete(self) -> bool:
-        """Whether no row is pending."""
-        return next(self.pending_blocks(), None) is None
+        """Whether no row is pending, at any operating point."""
+        return all(next(one.pending_blocks(), None) is None for one in self.each())
 
     @property
     def whole(self) -> bool:
@@ -233,19 +279,19 @@ class Reader(CheckedTables):
         return self.rows == range(self.campaign_rows)
 
     def counts(self) -> Counts:
-        """Count the joints of the file by status."""
-        counts = Counts(self.n, 0, 0, 0)
-        for first in range(0, self.n, BLOCK):
-            counts = counts.after(self.status(slice(first, first + BLOCK)))
+        """Count the joints of the file by status; each at every operating point."""
+        each = self.each()
+        counts = Counts(self.n * len(each), 0, 0, 0)
+        for one in each:
+            for first in range(0, self.n, BLOCK):
+                counts = counts.after(one.status(slice(first, first + BLOCK)))
         return counts
 
-    def session(self) -> Session | None:
+    def session(self) -> session.Session | None:
         """Return the run under way; None if no process is writing the file."""
         if "session" not in self._file or not is_locked(self.path):
             return None
-        started, done = (float(self._file["session"][name][()]) for name in ("started", "done"))
-        # beyond these bounds the record is damaged: a rate would mean nothing
-        return Session(started, int(done)) if 0 < started <= time.time() and 0 <= done <= self.n else None
+        return session.read(self._file["session"], len(self.points) * self.n)
 
     def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Read the histories of one kind.
@@ -272,7 +318,7 @@ class Reader(CheckedTables):
             remedy = f'write histories = "full" or "harmonics" in [output] of the study, and {RUN_AGAIN}'
             raise store_error(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
         slots = np.arange(self.n) if slots is None else np.asarray(slots, dtype=np.intp)
-        if "histories" not in self._file:
+        if "histories" not in self._held():
             done = self.status()[slots] != Status.PENDING  # read first: histories are written before the status
             try:
                 values = self._parts.read(name, slots, done)
@@ -331,6 +377,7 @@ class Reader(CheckedTables):
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
         self.limits: dict[str, float] = metadata.read(self._file, "limits")
+        self.points = checks.points(self._file)
         self.joint: dict[str, Any] = metadata.read(self._file, "joint")
 
     def _reopen(self) -> bool:
@@ -338,11 +385,11 @@ class Reader(CheckedTables):
         if self._file.mode != "r":
             return False
         file = open_hdf5(self.path, "r")
-        if "histories" not in file or campaign_digest(file) != self._parts.campaign:
+        if "histories" not in file[self._held().name] or campaign_digest(file) != self._campaign:
             file.close()
             return False
         self._file.close()
-        self._file = file
+        self._handle.file = file
         return True
 
     def _check_history(self, name: str, slots: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
@@ -352,8 +399,3 @@ class Reader(CheckedTables):
             row = self.rows[slots[done][np.argmax(wrong)]]
             found = f"is damaged: the history {name} of row {row} does not match its checksum"
             raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
-
-
-def parts_folder(path: Path) -> Path:
-    """Folder of the histories of a campaign that is not complete yet."""
-    return path.with_name(path.name + ".parts")

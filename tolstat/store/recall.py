@@ -62,6 +62,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
     if path is None:
         study = replace(study, solver=_solver(store, study))
+    study = _at_point(store, study)
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     if differing:
         lines = ["does not match the study that was read for it", *differing]
@@ -70,7 +71,15 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     if n is None:
         return study
     with nullcontext() if path is not None else only_below(store.path.parent):
-        return replace(load(source, n=n, text=text, joint=joint), solver=study.solver)
+        return replace(_at_point(store, load(source, n=n, text=text, joint=joint)), solver=study.solver)
+
+
+def _at_point(store: Reader, study: Study) -> Study:
+    """Study at the point of a file with one operating point that was made from a study with several."""
+    if len(study.points) > 1 and len(store.points) == 1:
+        own = next((point for point in study.points if point.operation == store.operation), None)
+        return study if own is None else study.at(own.name)
+    return study
 
 
 def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:

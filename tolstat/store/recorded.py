@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tolstat.common.solver_options import from_names
 from tolstat.common.strict import validate
 from tolstat.common.tables import PARAM, Options
-from tolstat.joint import Joint, perturb, varied
+from tolstat.joint import Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.solver import fidelity
 from tolstat.study.design import nested
@@ -21,6 +21,8 @@ from tolstat.study.swept import KEYS
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
     from tolstat.study import Study
+
+_OPERATION = tuple(f"operation.{name}" for name in Operation.model_fields)
 
 
 def joint_of(store: Reader, row: int) -> Joint:
@@ -33,6 +35,23 @@ def joint_of(store: Reader, row: int) -> Joint:
     """
     nominal = validate(Joint, store.joint, f"{store.path}: joint")
     return varied(nominal, _values(store, row))
+
+
+def operation_of(store: Reader, row: int) -> Operation:
+    """Operating point of file slot `row`: that of the store, or of the slot's variant; see `joint.operating`."""
+    own = {key.removeprefix("operation."): value for key, value in _values(store, row).items() if key in _OPERATION}
+    return store.operation.model_copy(update=own)
+
+
+def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDArray[np.float64]]:
+    """Values that the joints of a slice of file slots have at the operating point, (m,) each; see `joint.operating`."""
+    errors = store.errors(slots)
+    if not store.variants:
+        return operating(store.operation, errors)
+    first, last, _ = slots.indices(store.n)
+    rows = (operating(operation_of(store, row), errors[row - first : row - first + 1]) for row in range(first, last))
+    each = list(rows)
+    return {name: np.concatenate([one[name] for one in each]) for name in Operation.model_fields}
 
 
 def options_of(store: Reader, row: int) -> Options:
@@ -74,19 +93,20 @@ def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
     """Parameters of the joints in file slots `rows`, (m,) table PARAM."""
     params = np.empty(len(rows), PARAM)
     for i, row in enumerate(rows.tolist()):
-        params[i : i + 1] = perturb(joint_of(store, row), store.errors(slice(row, row + 1)))
+        errors = store.errors(slice(row, row + 1))
+        params[i : i + 1] = perturb(joint_of(store, row), operation_of(store, row), errors)
     return params
 
 
 def perturbed(
     study: Study, rows: NDArray[np.intp], errors: NDArray[np.void], perturb: Callable[..., NDArray[np.void]]
 ) -> NDArray[np.void]:
-    """Parameters of `rows` of the campaign, (m,) table PARAM, each computed from the nominal joint of its variant."""
+    """Parameters of `rows` of the campaign, (m,) table PARAM, each computed from the joint and point of its variant."""
     params = np.empty(len(rows), PARAM)
     variant = variants(study, rows)
     for number in np.unique(variant):
         here = variant == number
-        params[here] = perturb(study.joints[number], errors[here])
+        params[here] = perturb(study.joints[number], study.operations[number], errors[here])
     return params
 
 

@@ -33,11 +33,27 @@ RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
 """Remedy for a file that cannot be repaired."""
 
 
+POINT_GROUPS = ("results", "ledger", "histories", "verify", "near")
+"""Groups that a file has once for each operating point."""
+
+
+class Handle:
+    """An open result file; readers of its operating points share it, so that all follow when it is replaced."""
+
+    def __init__(self, file: h5py.File) -> None:
+        self.file = file
+
+
+def place_of(point: str) -> str:
+    """Path of the group that holds `POINT_GROUPS` of an operating point: the root for the one without a name."""
+    return f"/points/{point}" if point else "/"
+
+
 def campaign_digest(file: h5py.File) -> str:
     """Hash that identifies a campaign: the study's identity, the software versions, and the rows in the file."""
     texts = [text(file.attrs, name) for name in ("identity", "versions")]
     if "first_row" in file.attrs:
-        texts.append(f"{int(file.attrs['first_row'])} {file['results/status'].shape[0]}")
+        texts.append(f"{int(file.attrs['first_row'])} {file['row'].shape[0]}")
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
 
 
@@ -52,10 +68,10 @@ def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str |
         holder.attrs.create(name, data, dtype=dtype)
 
 
-def link_rows(file: h5py.File, group: h5py.Group) -> None:
-    """Link ``row`` and ``nominal`` of the file into a group, so that it can be read on its own."""
+def link_rows(file: h5py.Group, group: h5py.Group) -> None:
+    """Link ``row`` and ``nominal`` of a file into one of its groups, so that it can be read on its own."""
     for name in LINKED:
-        group[name] = file[name]
+        group[name] = file.file[name]
 
 
 def text(attrs: h5py.AttributeManager, name: str) -> str:

@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
-from tolstat.common.files import atomic_write, check_disk_space, make_parent
+from tolstat.common.files import atomic_write, check_disk_space, make_parent, reason
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
-from tolstat.store.histories import HISTORY_BYTES
+from tolstat.store import left_out
+from tolstat.store.histories import HISTORY_BYTES, parts_folder
 from tolstat.store.integrity import attempt_hash, history_checks, results_hash
 from tolstat.store.new_file import attributes, fill, size_of_new, study_attributes
-from tolstat.store.reader import Reader, parts_folder
+from tolstat.store.reader import Reader
 from tolstat.store.result_file import copy_open, get, is_at, put, put_attributes, replace, store_error, text
 
 if TYPE_CHECKING:
@@ -85,7 +86,8 @@ class ResultStore(Reader):
         held = range(study.rows) if rows is None else rows
         try:
             make_parent(path)
-            check_disk_space(path, size_of_new(len(held), selected_results.columns(study.identity())))
+            kept = selected_results.columns(study.identity())
+            check_disk_space(path, size_of_new(len(held), kept, len(study.points)))
             with atomic_write(path, overwrite=False) as temporary, h5py.File(temporary, "w") as file:
                 blocks = [errors] if isinstance(errors, np.ndarray) else errors
                 design = study.design[held.start : held.stop] if study.variants else None
@@ -96,9 +98,9 @@ class ResultStore(Reader):
                 path, "exists already", "resume it with its own study, or give another file: --out OTHER.h5"
             ) from error
         except OSError as error:
-            reason = error.strerror or str(error)
+            why = reason(error)
             remedy = "check that the folder is writable and the disk has space"
-            raise store_error(path, f"cannot be written: {reason}", remedy) from error
+            raise store_error(path, f"cannot be written: {why}", remedy) from error
         return cls.open_to_write(path)
 
     @classmethod
@@ -119,15 +121,16 @@ class ResultStore(Reader):
             process.
         """
         store = cls._opened(Path(path), "r+")
-        damaged = store.damaged()
-        store._left_out[damaged] = True
-        store._tell_damage("pending again", "run its study to simulate these joints: tolstat run STUDY")
-        store._make_pending(damaged)
-        store._reset_rows_without_histories()
+        for one in store.each():
+            damaged = one.damaged()
+            store._left_out[damaged] = True
+            one._make_pending(damaged)
+            one._reset_rows_without_histories()
+        left_out.tell(store, "pending again", "run its study to simulate these joints: tolstat run STUDY")
         return store
 
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
-        """Write the results of `rows`; on return they are on disk and the joints are no longer pending.
+        """Write the results of `rows` at the operating point; on return they are on disk and no longer pending.
 
         Parameters
         ----------
@@ -158,9 +161,9 @@ class ResultStore(Reader):
             self._sync()
             self._check_path()
         except OSError as error:
-            reason = error.strerror or str(error)
+            why = reason(error)
             remedy = "free disk space, and run the same command again; finished joints are kept"
-            raise store_error(self.path, f"cannot be written: {reason}", remedy) from error
+            raise store_error(self.path, f"cannot be written: {why}", remedy) from error
 
     def begin_session(self, done: int) -> None:
         """Record for readers of the file that a run begins with `done` joints finished."""
@@ -188,9 +191,16 @@ class ResultStore(Reader):
         """
         if not self.history_specs or not self.complete:
             return
-        if "histories" not in self._file:
-            self._replace(self._parts.gather_into, self._parts.size())
-        self._parts.remove()
+        left = [one for one in self.each() if "histories" not in one._held()]
+
+        def gather(file: h5py.File) -> None:
+            for one in left:
+                one._parts.gather_into(file[one._held().name])
+
+        if left:
+            self._replace(gather, sum(one._parts.size() for one in left))
+        for one in self.each():
+            one._parts.remove()
 
     def update_study(self, study: Study) -> None:
         """Replace the attributes that do not affect results (limits, text, name) by those of a study of equal identity.
@@ -219,13 +229,13 @@ class ResultStore(Reader):
             self._replace(lambda file: put_attributes(file, {"stop": json.dumps(stop, allow_nan=False)}))
             self.stop = dict(stop)
 
-    def begin_retry(self, rows: NDArray[np.intp], entry: Mapping[str, Any]) -> None:
+    def begin_retry(self, rows: Mapping[str, NDArray[np.intp]], entry: Mapping[str, Any]) -> None:
         """Mark joints as pending that are to be simulated again, with the settings of `entry`.
 
         Parameters
         ----------
-        rows : (m,) array of int
-            File slots.
+        rows : mapping of str to (m,) array of int
+            File slots, by operating point.
         entry : mapping
             Entry added to `retries`; ``options`` are the solver options.
 
@@ -235,35 +245,44 @@ class ResultStore(Reader):
             When there is no room for a second copy of the file.
         """
         retries = [*self.retries, dict(entry)]
+        each = [(self.at(point), slots) for point, slots in rows.items() if slots.size]
 
         def change(file: h5py.File) -> None:
             put_attributes(file, {"retries": json.dumps(retries, allow_nan=False)})
-            attempt = np.full(rows.size, len(retries), np.int32)
-            put(file["ledger/attempt"], rows, attempt)
-            put(file["ledger/attempt_check"], rows, attempt_hash(get(file["ledger/errors_check"], rows), attempt))
-            put(file["results/status"], rows, np.full(rows.size, Status.PENDING, np.uint8))
-            if "histories" in file:
-                del file["histories"]
+            for one, slots in each:
+                held = file[one._held().name]
+                ledger, attempt = held["ledger"], np.full(slots.size, len(retries), np.int32)
+                put(ledger["attempt"], slots, attempt)
+                put(ledger["attempt_check"], slots, attempt_hash(get(ledger["errors_check"], slots), attempt))
+                put(held["results/status"], slots, np.full(slots.size, Status.PENDING, np.uint8))
+                if "histories" in held:
+                    del held["histories"]
 
-        if "histories" in self._file:
-            self._parts.remove()  # left by an earlier call that was interrupted
-            size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in self.history_specs.values()))
-            for first in range(0, self.n, size):
-                some = np.arange(first, min(first + size, self.n))
-                self._parts.add(some, {name: self.histories(name, some) for name in self.history_specs})
+        for one, _ in each:
+            one._move_histories_beside()
         self._replace(change)
         self.retries = retries
 
+    def _move_histories_beside(self) -> None:
+        """Copy the histories inside the file, if they are there, to the folder of parts."""
+        if "histories" not in self._held():
+            return
+        self._parts.remove()  # left by an earlier call that was interrupted
+        size = max(1, HISTORY_BYTES // sum(spec.blank(1).nbytes for spec in self.history_specs.values()))
+        for first in range(0, self.n, size):
+            some = np.arange(first, min(first + size, self.n))
+            self._parts.add(some, {name: self.histories(name, some) for name in self.history_specs})
+
     def _replace(self, change: Callable[[h5py.File], None], growth: int = 0) -> None:
         try:
-            self._file = replace(self.path, self._file, change, growth)
+            self._handle.file = replace(self.path, self._file, change, growth)
         except OSError as error:
-            reason = error.strerror or str(error)
+            why = reason(error)
             remedy = "free disk space for a second copy, and run the same command again; finished joints are kept"
-            raise store_error(self.path, f"cannot be replaced: {reason}", remedy) from error
+            raise store_error(self.path, f"cannot be replaced: {why}", remedy) from error
 
     def _put(self, name: str, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
-        put(self._file["results"][name], rows, values)
+        put(self._held()["results"][name], rows, values)
 
     def _check_path(self) -> None:
         """Restore the file if it was deleted or replaced; its contents exist as long as it is open.
@@ -285,7 +304,7 @@ class ResultStore(Reader):
         raise store_error(self.path, f"{found} during the campaign", remedy)
 
     def _put_checksums(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
-        ledger = self._file["ledger"]
+        ledger = self._held()["ledger"]
         for name in self.history_specs:
             checks = history_checks(simulation.histories[name], self.row(rows))
             put(ledger[f"{name}_check"], rows, checks)
@@ -298,7 +317,7 @@ class ResultStore(Reader):
 
     def _reset_rows_without_histories(self) -> None:
         """Mark rows as pending whose histories are missing, e.g. because the file was moved without its parts."""
-        if not self.history_specs or "histories" in self._file:
+        if not self.history_specs or "histories" in self._held():
             return
         part = self._parts.index().part
         self._make_pending(np.flatnonzero((part < 0) & (self.status() != Status.PENDING)))

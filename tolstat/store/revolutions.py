@@ -173,7 +173,7 @@ def channel(loads: NDArray[Any], name: str) -> FloatArray:
 
 def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
     """Simulate joints again: their loads, (m, samples, 8, 6), and `Revolutions.apart`."""
-    params = perturb(joint_of(store, int(slots[0])), _pick(store.errors, slots))
+    params = perturb(joint_of(store, int(slots[0])), store.operation, _pick(store.errors, slots))
     attempts = _pick(store.attempt, slots)
     stored = _pick(store.results, slots)
     loads = np.empty((len(slots), int(store.options["steps_per_rev"]), 8, 6), np.float32)

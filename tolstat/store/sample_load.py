@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import exceedance, quantile, weighted
+from tolstat.analysis import exceedance, prediction, quantile, replicates, weighted
 from tolstat.analysis.exceedance import Exceedance, FloatArray, Mask
 from tolstat.analysis.quantile import Quantile
 from tolstat.common.shown import table
@@ -50,6 +50,16 @@ class SampleLoad:
         Weight of each joint; without it all joints count equally.
     iid : bool
         Whether the joints are independent samples.
+    heaviest : float
+        Largest weight that a joint can have; inf without a bound.
+    drawn : ndarray of bool, shape (n,), optional
+        Which joints of importance sampling were drawn from the tolerances themselves.
+    replicates : int
+        Number of independent replicates, consecutive blocks of the joints; 1 without them.
+    scale : float
+        Value of one in `unit` as a load, SI: 1 but for ratios of load to limit.
+    parts : tuple of SampleLoad
+        Loads of which this is the largest; empty for a single one. See `largest_of`.
     """
 
     name: str
@@ -61,6 +71,11 @@ class SampleLoad:
     status: NDArray[np.uint8]
     weights: FloatArray | None
     iid: bool
+    heaviest: float = np.inf
+    replicates: int = 1
+    drawn: Mask | None = None
+    scale: float = 1.0
+    parts: tuple[SampleLoad, ...] = ()
 
     def __repr__(self) -> str:
         valid = self.valid
@@ -84,7 +99,14 @@ class SampleLoad:
     @cached_property
     def _weighted(self) -> weighted.Sample:
         assert self.weights is not None
-        return weighted.sort_out(self.values, self.status, self.weights, self.ends)
+        return weighted.sort_out(self.values, self.status, self.weights, self.ends, self.heaviest)
+
+    @cached_property
+    def _parts(self) -> list[exceedance.Sample]:
+        """Loads of each replicate."""
+        blocks = np.split(np.arange(self.values.size), self.replicates)
+        ends = self.ends
+        return [exceedance.sort_out(self.values[b], self.status[b], (ends[0][b], ends[1][b])) for b in blocks]
 
     @property
     def valid(self) -> FloatArray:
@@ -109,6 +131,8 @@ class SampleLoad:
 
     def curve(self, levels: ArrayLike | None = None, confidence: float = CONFIDENCE) -> NDArray[np.void]:
         """Share of the joints above each level, (m,) table `exceedance.CURVE`; see `exceedance.curve`."""
+        if self.replicates > 1:
+            return replicates.curve_of(self.sample, self._parts, levels, confidence)
         if self.weights is None:
             return exceedance.curve_of(self.sample, levels, confidence, self.iid)
         return weighted.curve_of(self._weighted, levels, confidence)
@@ -119,6 +143,8 @@ class SampleLoad:
 
     def quantile(self, share: float, confidence: float = CONFIDENCE) -> Quantile:
         """Load that a share of the joints stays at or below; see `quantile.quantile`."""
+        if self.replicates > 1:
+            return replicates.quantile_of(self.sample, self._parts, share, confidence)
         if self.weights is None:
             return quantile.of_sample(self.sample, share, confidence, self.iid)
         return weighted.quantile_of(self._weighted, share, confidence)
@@ -131,6 +157,31 @@ class SampleLoad:
         """Whether the weights of the joints support a share above a level; equal weights always do."""
         return self.weights is None or self.trust(level).usable
 
+    def unsearched(self, level: float, confidence: float = CONFIDENCE) -> float:
+        """Upper end of the share above a level whatever the proposals of importance sampling miss.
+
+        That of the joints drawn from the tolerances themselves; Clopper and Pearson's, with all joints without a valid
+        load above the level. NaN for joints of equal weight.
+        """
+        if self.drawn is None:
+            return np.nan
+        return replace(self.only(self.drawn), weights=None, drawn=None).above(level, confidence).outer_upper
+
+    def delivery(self, level: float, number: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+        """Prediction interval for the number above a level among further joints; see `analysis.prediction`.
+
+        Joints without a valid load count below the level for its lower end, above it for its upper end. NaN without an
+        interval.
+        """
+        if self.weights is None and self.replicates == 1:
+            found = self.above(level, confidence)
+            if np.isnan(found.lower):
+                return np.nan, np.nan
+            least, most = round(found.n * found.bound_lower), round(found.n * found.bound_upper)
+            return prediction.of_counts(least, most, found.n, number, confidence)
+        found = self.above(level, prediction.half(confidence))
+        return prediction.of_share(found.outer_lower, found.outer_upper, number, confidence)
+
     def shifted(self, by: FloatArray) -> SampleLoad:
         """Return the load of the same joints with `by`, (n,), added to values and ends."""
         return replace(self, values=self.values + by, ends=(self.ends[0] + by, self.ends[1] + by))
@@ -140,7 +191,8 @@ class SampleLoad:
         assert self.limit is not None
         ends = (self.ends[0] / self.limit, self.ends[1] / self.limit)
         values, nominal = self.values / self.limit, self.nominal / self.limit
-        return replace(self, unit="1", limit=1.0, nominal=nominal, values=values, ends=ends)
+        scale = self.scale * self.limit
+        return replace(self, unit="1", limit=1.0, nominal=nominal, values=values, ends=ends, scale=scale)
 
     def only(self, samples: NDArray[np.intp] | Mask) -> SampleLoad:
         """Return the load of some of the joints."""
@@ -149,5 +201,8 @@ class SampleLoad:
             values=self.values[samples],
             ends=(self.ends[0][samples], self.ends[1][samples]),
             status=self.status[samples],
+            replicates=1,
             weights=None if self.weights is None else self.weights[samples],
+            drawn=None if self.drawn is None else self.drawn[samples],
+            parts=tuple(part.only(samples) for part in self.parts),
         )

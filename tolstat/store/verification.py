@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from tolstat.store.reader import Reader
     from tolstat.store.result_store import ResultStore
 
-GROUP = "verify"
+VERIFY, NEAR = "verify", "near"
+"""Groups of joints: chosen at random, and those nearest to limits."""
 
 
 @shown
@@ -66,14 +67,14 @@ class Verification(NamedTuple):
     checks: dict[str, Check]
 
 
-def read(store: Reader) -> Verification | None:
-    """Read the verification from a result file; None if it holds none."""
-    file = store._file
-    if GROUP not in file:
+def read(store: Reader, name: str = VERIFY) -> Verification | None:
+    """Read the verification of a group from a result file; None if it holds none."""
+    held = store._held()
+    if name not in held:
         return None
     try:
-        rows, checks = _read(file[GROUP], store)
-        seed = int(file[GROUP].attrs["seed"])
+        rows, checks = _read(held[name], store)
+        seed = int(held[name].attrs["seed"])
     except DAMAGE_ERRORS as error:
         found = f"is damaged: its verification cannot be used: {error}"
         raise store_error(store.path, found, f"make it anew: tolstat verify {store.path}") from error
@@ -90,36 +91,37 @@ def _read(group: h5py.Group, store: Reader) -> tuple[NDArray[np.intp], dict[str,
     if np.any(np.diff(rows) <= 0) or not np.isin(rows[[0, -1]] if len(rows) else rows, store.rows).all():
         raise ValueError("its rows are no ascending rows of the campaign")
     checks = {}
-    for name in text(group.attrs, "checks").split():
+    for check in text(group.attrs, "checks").split():
         table = np.empty(len(rows), tables.RESULT)
         selected_results.blank_others(table, store.columns)
         for c in store.columns:
-            held = group[name][c.name]
+            held = group[check][c.name]
             if held.shape != rows.shape or held.dtype != np.dtype(c.dtype):
                 raise ValueError(f"{held.name} is {held.shape} of {held.dtype}")
             c.of(table)[:] = held[:]
         if table["status"].size and table["status"].max() > max(tables.Status):
-            raise ValueError(f"{name} has an unknown status")
-        options = metadata.read(group[name], "options", {})
-        checks[name] = Check(text(group[name].attrs, "description"), options, table)
+            raise ValueError(f"{check} has an unknown status")
+        options = metadata.read(group[check], "options", {})
+        checks[check] = Check(text(group[check].attrs, "description"), options, table)
     return rows, checks
 
 
-def write(store: ResultStore, verification: Verification) -> None:
-    """Write a verification to a result file, replacing an earlier one.
+def write(store: ResultStore, verification: Verification, name: str = VERIFY) -> None:
+    """Write a verification to a group of a result file, replacing an earlier one.
 
     Raises
     ------
     StoreError
         When there is no room for a second copy of the file.
     """
-    store._replace(lambda file: _write(file, verification, store.columns))
+    where = store._held().name
+    store._replace(lambda file: _write(file[where], name, verification, store.columns))
 
 
-def _write(file: h5py.File, verification: Verification, columns: tuple[Column, ...]) -> None:
-    if GROUP in file:
-        del file[GROUP]
-    group = file.create_group(GROUP)
+def _write(holder: h5py.Group, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:
+    if place in holder:
+        del holder[place]
+    group = holder.create_group(place)
     about = "joints of the campaign simulated again in other ways, to know its numerical error"
     names = " ".join(verification.checks)
     put_attributes(group, {"description": about, "seed": verification.seed, "checks": names})

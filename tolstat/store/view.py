@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,16 +16,20 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import BUSHING_LOADS, LOAD_FIELDS, LOADS, limits_in_words
+from tolstat.common.loads import ALL_LIMITS, BUSHING_LOADS, LOADS, limits_in_words, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import ERROR, FAILED, RESULT, UNSETTLED, VALID, Status
-from tolstat.store import verification
+from tolstat.common.tables import ERROR, Status
+from tolstat.store import first_pass, verification, what_if, worst
 from tolstat.store.counts import Counts
+from tolstat.store.first_pass import FirstPass
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
 from tolstat.store.sample_load import SampleLoad, frozen
+from tolstat.store.several_loads import leading, together
 from tolstat.store.verification import Verification
+from tolstat.store.what_if import Altered
+from tolstat.study.points import limits_at, names_of
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -40,33 +45,13 @@ METHODS = {
 }
 DRAWN = ("random", "sobol", "lhs")
 """Sampling methods that draw every joint from the tolerances, all with the same weight."""
-MAX_LISTED = 12
-"""Number of joints without a valid load whose complete results are kept."""
-
-
-class _FirstPass(NamedTuple):
-    """What is kept of the results after one pass over them.
-
-    Attributes
-    ----------
-    results : ndarray, shape (n,)
-        Fields `LOAD_FIELDS` of the samples.
-    nominal : ndarray of RESULT, shape (1,) or (0,)
-        The nominal joint, if the file has one and its results are valid.
-    without_load : ndarray of RESULT, shape (m,)
-        The first `MAX_LISTED` joints that failed or did not settle.
-    mode_share : ndarray, shape (4, 4)
-        Weighted mean over the valid joints; NaN if none is valid or the study does not keep it.
-    """
-
-    results: NDArray[np.void]
-    nominal: NDArray[np.void]
-    without_load: NDArray[np.void]
-    mode_share: FloatArray
 
 
 class View:
     """A result file as questions read it. Element i of every array is sample i; the nominal joint is not among them.
+
+    Of several operating points a load is the largest over them, and a joint is valid only if it is at all of them.
+    What cannot be told of several points raises the error of a `store` that is at no point.
 
     Each part is read and checked when it is first used, and kept; arrays that are kept cannot be written to. Tables of
     errors are kept for the first `BLOCK` samples; those of larger campaigns are read in blocks.
@@ -78,31 +63,60 @@ class View:
     name, method : str
         Name of the study, and its sampling method.
     limits : dict of str to float
-        Allowed load in SI units by name (``"cross1.F"``).
+        Allowed load in SI units by name (``"cross1.F"``, ``"cross1.F at cruise"``).
+    parts : list of View
+        Views of each operating point; the view itself if there is one.
+    points : tuple of str
+        Names of the operating points.
     columns : tuple of Column
         Columns of the results that the study keeps; the others are NaN.
     n : int
         Number of samples.
     """
 
-    def __init__(self, store: Reader, study_path: Path | None = None) -> None:
+    def __init__(self, store: Reader, study_path: Path | None = None, parts: Sequence[View] = ()) -> None:
         self.store = store
+        if not parts and store.point is None:
+            parts = [View(store.at(name), study_path) for name in store.points]
+        self.parts = list(parts) or [self]
+        self.points = tuple(part.store.point or "" for part in self.parts)
         self.path = store.path
         self.name = store.study_name
         self.method = str(store.sampling["method"])
-        self.limits = store.limits
+        self.limits = limits_at(store.limits, self.points, list(store.points))
         self.columns = store.columns
         self.n = store.n - store.first_sample
         self._study_path = study_path
         self._loads: dict[str, SampleLoad] = {}
+        self._at: dict[tuple[str, ...], View] = {self.points: self}
 
     def __repr__(self) -> str:
         loads = f"{len(self.kept_loads)} loads, {len(self.limits)} with a limit"
+        loads += f", at {' and '.join(self.points)}" if all(self.points) else ""
         return f"<view of {self.path.name!r}: {self.n} joints ({METHODS.get(self.method, self.method)}), {loads}>"
 
     def _repr_html_(self) -> str:
         loads = [("loads", ", ".join(self.kept_loads)), ("limits", limits_in_words(self.limits))]
         return table(repr(self)[1:-1], [("study", self.name), *loads])
+
+    def at(self, selection: str) -> View:
+        """View of some of the operating points: ``"cruise"``, or the worst of ``"cruise+start"``; of all with ``""``.
+
+        Raises
+        ------
+        InputError
+            When there is no such point.
+        """
+        chosen = names_of(selection, self.points, str(self.path))
+        if chosen not in self._at:
+            parts = [self.parts[self.points.index(name)] for name in chosen]
+            self._at[chosen] = parts[0] if len(parts) == 1 else View(self.store, self._study_path, parts)
+        return self._at[chosen]
+
+    def narrowed(self, name: str) -> tuple[View, str]:
+        """View of the points that a load or column names, and its plain name: ``"cross1.F at cruise"``."""
+        plain, where = split(name)
+        return (self.at(where), plain) if where else (self, plain)
 
     @cached_property
     def study(self) -> Study:
@@ -112,7 +126,21 @@ class View:
     @cached_property
     def verification(self) -> Verification | None:
         """The verification that the file holds, if any."""
+        if len(self.parts) > 1:
+            return worst.checks([part.verification for part in self.parts])
         return verification.read(self.store)
+
+    @cached_property
+    def near(self) -> Verification | None:
+        """The verification of joints near limits that the file holds, if any."""
+        if len(self.parts) > 1:
+            return worst.checks([part.near for part in self.parts])
+        return verification.read(self.store, verification.NEAR)
+
+    @cached_property
+    def altered(self) -> dict[str, Altered]:
+        """Loads of joints with other tolerances that the file holds, by the digest of the change."""
+        return what_if.read(self.store)
 
     @cached_property
     def numerical_error(self) -> dict[str, float]:
@@ -155,7 +183,7 @@ class View:
 
     @property
     def first_without_load(self) -> NDArray[np.void]:
-        """Complete results of the first `MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
+        """Complete results of the first `first_pass.MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
         return self._tables.without_load
 
     @property
@@ -164,29 +192,17 @@ class View:
         return self._tables.mode_share
 
     @cached_property
-    def _tables(self) -> _FirstPass:
-        skip, store = self.store.first_sample, self.store
-        nominal = np.empty(0, RESULT)
-        results = np.empty(self.n, [(name, RESULT[name]) for name in LOAD_FIELDS])
-        kept, total, shares = [np.empty(0, RESULT)], 0.0, np.zeros((4, 4))
-        for first in range(0, store.n, BLOCK):
-            block = store.results(slice(first, first + BLOCK))
-            if first == 0 and skip:
-                nominal, block = block[:1][np.isin(block["status"][:1], VALID)].copy(), block[1:]
-            begin = max(0, first - skip)
-            for name in LOAD_FIELDS:
-                results[name][begin : begin + len(block)] = block[name]
-            if sum(map(len, kept)) < MAX_LISTED:
-                kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:MAX_LISTED])
-            valid = np.isin(block["status"], VALID)
-            weight = np.ones(len(block)) if self.weights is None else self.weights[begin : begin + len(block)]
-            shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
-            total += float(weight[valid].sum())
-        mean = shares / total if total else np.full((4, 4), np.nan)
-        return _FirstPass(frozen(results), frozen(nominal), frozen(np.concatenate(kept)[:MAX_LISTED]), frozen(mean))
+    def _tables(self) -> FirstPass:
+        if len(self.parts) > 1:
+            return first_pass.of_points([part._tables for part in self.parts], [part.store for part in self.parts])
+        return first_pass.read(self.store, self.weights)
 
     def load(self, name: str) -> SampleLoad:
-        """Largest load over the revolution of every joint, by its name.
+        """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
+
+        ``"all limits"`` is the largest ratio of load to limit of each joint, see `several_loads.together`.
+
+        Its limit is the one of that name or, without it, the one that holds at these points.
 
         Raises
         ------
@@ -197,17 +213,26 @@ class View:
         """
         if name not in self._loads:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
+            if name == ALL_LIMITS and self.limits:
+                self._loads[name] = together(self)
+                return self._loads[name]
+            view, plain = self.narrowed(name)
+            if view is not self:
+                own = view.load(plain)
+                self._loads[name] = replace(own, name=name, limit=self.limits.get(name, own.limit))
+                return self._loads[name]
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
             if not selected_results.holds(self.columns, name):
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
-            load, results = LOADS[name], self.results
+            load, skip = LOADS[name], self.store.first_sample
+            drawn = None if self.weights is None else frozen(self.store.origin()["component"][skip:] == 0)
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
-            values, ends = frozen(load.of(results)), load.ends(results)
+            values, _, (lower, upper) = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = SampleLoad(
-                name, load.unit, self.limits.get(name), nominal, values, (frozen(ends[0]), frozen(ends[1])),
-                self.status, self.weights, self.iid,
+                name, load.unit, self.limits.get(name), nominal, frozen(values), (frozen(lower), frozen(upper)),
+                self.status, self.weights, self.iid, self.store.heaviest, self.replicates, drawn,
             )  # fmt: skip
         return self._loads[name]
 
@@ -234,24 +259,42 @@ class View:
     def leading(self) -> tuple[str, ...]:
         """Leading load of each kind (force, torque, ...).
 
-        Candidates are the loads with limits or, without limits, all bushing loads kept. The leading load is the one
-        whose limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the limit
-        (without limits by the 99 % quantile).
+        See `several_loads.leading`.
         """
-        found: dict[str, tuple[tuple[float, float], str]] = {}
-        for load in self.loads(list(self.limits) or self.bushing_loads):
-            if load.valid.size:
-                limit = 1.0 if load.limit is None else load.limit
-                share = 0.0 if load.limit is None else load.above(limit).estimate
-                rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
-                kind = load.name.rpartition(".")[2]
-                found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
-        return tuple(name for _, name in found.values())
+        return leading(self)
+
+    @property
+    def decisive(self) -> str:
+        """What a verdict is about: of several limits all together, ``"all limits"``; else `most_exceeded`."""
+        return ALL_LIMITS if len(self.limits) > 1 else self.most_exceeded
+
+    @property
+    def most_exceeded(self) -> str:
+        """The leading load whose limit the largest share of the joints exceeds; see `leading`."""
+        shares = {load.name: load.above(load.limit).estimate for load in self.loads(self.leading) if load.limit}
+        known = {name: share for name, share in shares.items() if share == share}
+        return max(known, key=lambda name: known[name]) if known else next(iter((*self.leading, "cross1.F")))
 
     @property
     def iid(self) -> bool:
         """Whether the joints are independent samples."""
         return self.method in ("random", "importance")
+
+    @cached_property
+    def replicates(self) -> int:
+        """Number of independent replicates with all joints simulated; 1 without them, and in a slice."""
+        number, whole = int(self.store.sampling.get("replicates", 1)), self.n == self.store.sampling.get("n")
+        return number if whole and not (self.status == Status.PENDING).any() else 1
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether shares and quantiles have intervals: of independent joints, or over replicates."""
+        return self.iid or self.replicates > 1
+
+    @property
+    def interval_of(self) -> str:
+        """Name of the intervals of shares, in words."""
+        return f"Student's t over {self.replicates} replicates" if self.replicates > 1 else "Clopper–Pearson's"
 
     @property
     def sampled(self) -> bool:
@@ -351,7 +394,11 @@ class View:
     def head(self) -> str:
         """Sentence with the number of joints and of those without a valid result."""
         pending = self.counts.total - self.counts.done
-        text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)}), {self.counts.shortfall}"
+        text = f"{self.counts.done} joints ({METHODS.get(self.method, self.method)})"
+        if all(self.points):
+            *others, last = self.points
+            text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"
+        text += f", {self.counts.shortfall}"
         return text + (f", {pending} still pending" if pending else "")
 
     def missing(self) -> str:

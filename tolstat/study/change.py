@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import did_you_mean
-from tolstat.study import selection
+from tolstat.study import rewriting, scaling, selection
 from tolstat.study.study import Study
-from tolstat.study.tolerances import kinds, zones
+from tolstat.study.tolerances import fits, kinds, zones
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import Site, ToleranceEntry
+from tolstat.study.tolerances.entry import Site, Toleranced, ToleranceEntry
 
 REPLACED_KEYS = {
     **dict.fromkeys(("plus_minus",), ("lower", "upper", "iso2768", "nominal")),
@@ -56,25 +56,13 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
         With every fault of the settings.
     """
     faults: list[Fault] = []
-    sites = {site.name: (site, dict(entry.keys)) for entry in study.entries for site, _ in entry.models}
-    entries = {name: keys for name, (_, keys) in sites.items()}
-    touched: dict[str, str] = {}
-    for text in settings:
-        with gather(faults):
-            setting = _parse(text)
-            names = selection.select(setting.pattern, entries)
-            if not names:
-                remedy = did_you_mean(setting.pattern, list(entries))
-                raise InputError([Fault(f"--set {text!r}", "selects no error that has a tolerance", remedy)])
-            for name in names:
-                kept = {k: v for k, v in entries[name].items() if k not in REPLACED_KEYS.get(setting.key, ())}
-                entries[name] = kept | {setting.key: setting.value}
-                touched[name] = text
+    entries, touched = _keys(study, settings, faults)
+    sites = {site.name: site for entry in study.entries for site, _ in entry.models}
     found = dict(study.tolerances)
     reported: set[tuple[str, ...]] = set()
     read: dict[str, tuple[Site, ToleranceEntry]] = {}
     for name, text in touched.items():
-        site, place = sites[name][0], f"--set {text!r}"
+        site, place = sites[name], f"--set {text!r}"
         try:
             _check_bonus(study, name, place)
             read[name] = site, kinds.entry(entries[name], site, place, ("tolerances", name))
@@ -91,6 +79,62 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
     if faults:
         raise InputError(faults)
     return found
+
+
+def rewritten(study: Study, settings: Sequence[str]) -> str:
+    """Text of a study with some keys of its tolerances changed, see `changed`; comments and seed are kept.
+
+    An entry whose settings are for some of its errors only becomes one entry for each of its errors.
+
+    Returns
+    -------
+    str
+        TOML.
+
+    Raises
+    ------
+    InputError
+        With the faults of the settings; see `rewriting.with_keys`.
+    """
+    faults: list[Fault] = []
+    keys, touched = _keys(study, settings, faults)
+    if faults:
+        raise InputError(faults)
+    alike: dict[str, dict[str, Any]] = {}
+    parted: list[Toleranced] = []
+    for entry in study.entries:
+        own = [keys[site.name] for site, _ in entry.models]
+        if touched.keys() & {site.name for site, _ in entry.models}:
+            alike[entry.pattern] = own[0] if all(one == own[0] for one in own) else dict(entry.keys)
+            parted += [entry] * any(one != own[0] for one in own)
+    text = scaling.rewritten(study, alike, study.sampling.seed)
+    paths = {entry.pattern: entry.path for entry in fits.entries(tomllib.loads(text)["tolerances"], None)}
+    changes: dict[tuple[int | str, ...], dict[str, Any]] = {("tolerances",): {}}
+    for entry in parted:
+        *table, key = paths[entry.pattern]
+        changes.setdefault(tuple(table), {})[str(key)] = None
+        changes["tolerances",] |= {site.name: keys[site.name] for site, _ in entry.models}
+    return rewriting.with_keys(text, changes, f"{study.name}.toml")
+
+
+def _keys(
+    study: Study, settings: Sequence[str], faults: list[Fault]
+) -> tuple[dict[str, dict[str, Any]], dict[str, str]]:
+    """Keys of the entry of each error with the settings; and the setting that changes them, of those changed."""
+    keys = {site.name: dict(entry.keys) for entry in study.entries for site, _ in entry.models}
+    touched: dict[str, str] = {}
+    for text in settings:
+        with gather(faults):
+            setting = _parse(text)
+            names = selection.select(setting.pattern, keys)
+            if not names:
+                remedy = did_you_mean(setting.pattern, list(keys))
+                raise InputError([Fault(f"--set {text!r}", "selects no error that has a tolerance", remedy)])
+            for name in names:
+                kept = {k: v for k, v in keys[name].items() if k not in REPLACED_KEYS.get(setting.key, ())}
+                keys[name] = kept | {setting.key: setting.value}
+                touched[name] = text
+    return keys, touched
 
 
 def _check_bonus(study: Study, name: str, place: str) -> None:

@@ -95,7 +95,7 @@ def table(cases: Sequence[Sequence[int]], points: int) -> NDArray[np.void]:
     return np.array(rows, DESIGN)
 
 
-def sobol(n: int, dimensions: int, seed: int, first: int = 0) -> NDArray[np.float64]:
+def sobol(n: int, dimensions: int, seed: int | Sequence[int], first: int = 0) -> NDArray[np.float64]:
     """Scrambled Sobol' points `first` and following in the unit cube, (n, dimensions), at the middle of their cells."""
     from scipy.stats import qmc
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,15 +11,16 @@ from tolstat import joint
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import read_input
-from tolstat.common.loads import LOADS, UNIT_OF_LOAD
+from tolstat.common.loads import UNIT_OF_LOAD, load_of, split
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
 from tolstat.joint.overrides import merged
-from tolstat.study import fatigue, listing, proposal, selection, swept
+from tolstat.study import fatigue, listing, points, proposal, selection, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
+from tolstat.study.points import Point
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
 from tolstat.study.swept import KEYS, Swept
@@ -114,6 +115,15 @@ class StudyFile:
             return fits.read(self.data.get("tolerances"), self.place)
         return None
 
+    def points(self) -> tuple[Point, ...]:
+        """``[operation]``, or ``[[operation]]``: the operating points; empty if one could not be read."""
+        if "operation" not in self.data:
+            self._fault(("operation",), "missing table", "add [operation]")
+            return ()
+        with gather(self._faults):
+            return points.read(self.data["operation"], self.place)
+        return ()
+
     def joint(self, fit: Fit | None = None) -> Joint | None:
         """``[joint]``: a joint file by name or path, and keys that replace some of its own; diameters by the fit."""
         table = self._table("joint")
@@ -147,7 +157,7 @@ class StudyFile:
             return selection.fixed_errors(self._table("errors"), ("errors",), self.place, self._claims)
         return {}
 
-    def tolerances(self, joint: Joint | None, operation: Operation | None, fit: Fit | None) -> Tolerances:
+    def tolerances(self, joint: Joint | None, fit: Fit | None) -> Tolerances:
         """``[tolerances]``: how errors scatter."""
         written = []
         for entry in fits.entries(self._table("tolerances"), fit):
@@ -157,7 +167,7 @@ class StudyFile:
                     self._claims.claim(entry, selected)
                 self._toleranced |= {name: TOLERANCED[name] for name in selected}
                 written.append((entry, selected))
-        found = reading.read(written, Nominal(joint, operation, self.path.parent), self.place, self._faults)
+        found = reading.read(written, Nominal(joint, self.path.parent), self.place, self._faults)
         self._accepted = {bonus.diameter for bonus in found.rejecting}
         drawn: dict[str, list[str]] = {}
         for quantity in found.distributions:
@@ -211,15 +221,21 @@ class StudyFile:
             return swept.read(sweep, variants, nominal.joint, nominal_first, self.place)
         return None
 
-    def limits(self) -> dict[str, float]:
-        """``[limits]``: limit of each load that has one (SI)."""
+    def limits(self, at: Sequence[Point]) -> dict[str, float]:
+        """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""
         limits: dict[str, float] = {}
         claims = Assignments(self.place)
+        every = [point.name for point in at]
         for entry in self._entries("limits"):
             with gather(self._faults):
-                names = selection.resolve(entry, UNIT_OF_LOAD, self.place)
+                pattern, where = split(entry.pattern)
+                found = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LOAD, self.place)
+                value = selection.quantity(entry, UNIT_OF_LOAD[found[0]], self.place)
+                names = found
+                if every:  # if not, the points have faults of their own
+                    chosen = points.names_of(where, every, f"{self.place}: {strict.dotted(entry.path)}")
+                    names = [points.at(name, chosen, every) for name in found]
                 claims.claim(entry, names)
-                value = selection.quantity(entry, UNIT_OF_LOAD[names[0]], self.place)
                 if value <= 0:
                     self._fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")
                 limits |= dict.fromkeys(names, value)
@@ -237,6 +253,17 @@ class StudyFile:
         with gather(self._faults):
             return listing.read(self.data, nominal, self.place, self.path.parent)
         return None
+
+    def check_points(self, sampling: Sampling, sweep: tuple[SweepAxis, ...], at: Sequence[Point]) -> None:
+        """Note several operating points where the joints have points of their own."""
+        if len(at) < 2:
+            return
+        if sampling.method == "cases":
+            remedy = "write one [operation], and the others in [[variant]]: operation = { ... }"
+            self._fault(("operation",), "several operating points are not possible with 'cases'", remedy)
+        for name in (name for axis in sweep for name in axis.names if name.startswith("operation.")):
+            remedy = "write one [operation], or sweep other errors"
+            self._fault(("sweep", name), "is given by several [[operation]] already", remedy)
 
     def check_method(self, sampling: Sampling, sweep: tuple[SweepAxis, ...]) -> None:
         """Note sections that the sampling method needs or does not use."""
@@ -294,7 +321,7 @@ class StudyFile:
     def check_limits(self, output: Output, limits: Mapping[str, float]) -> None:
         """Note limits of loads that are not stored."""
         held = {c.name for c in output.columns}
-        lacking = [name for load in limits for name in LOADS[load].columns if name not in held]
+        lacking = [name for load in limits for name in load_of(load).columns if name not in held]
         if lacking:
             found = f"leaves out columns that [limits] needs: {', '.join(lacking)}"
             self._fault(("output", "results"), found, "add these columns, or remove their limits")

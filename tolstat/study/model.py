@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model
 
 from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
+from tolstat.common.loads import Limit
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Fidelity, Method, Options, Start
 from tolstat.study import selection
@@ -22,6 +23,18 @@ MAX_SAMPLES = 1_000_000_000
 """Maximum number of joints of a campaign that is drawn in parts: 30-bit Sobol' sequences end soon after."""
 
 Number = units.Number
+
+
+def key(meaning: str, example: Any, **bounds: Any) -> Any:
+    """Field of a key: its meaning, an example, and bounds as `pydantic.Field` has them."""
+    return Field(description=meaning, examples=[example], **bounds)
+
+
+def whole(least: int, most: int, meaning: str, example: int) -> Any:
+    """Field of a key whose value is a whole number from `least` to `most`."""
+    return key(meaning, example, strict=True, ge=least, le=most)
+
+
 Flag = Annotated[bool, Field(strict=True)]
 
 
@@ -30,98 +43,61 @@ class Solver(Strict):
 
     fidelity: Annotated[
         Literal["dynamic", "quasistatic", "ideal", "auto"],
-        Field(
-            description="what is solved: `dynamic`, integration until settled; `quasistatic`, equilibrium at "
-            "each angle; "
+        key(
+            "what is solved: `dynamic`, integration until settled; `quasistatic`, equilibrium at each angle; "
             "`ideal`, closed forms of the joint without errors; `auto`, the cheapest fidelity and steps per revolution "
             "that meet `error_budget`",
-            examples=["quasistatic"],
+            "quasistatic",
         ),
     ] = "dynamic"
     error_budget: Annotated[
         Number,
-        Field(
+        key(
+            "largest error of a load that `auto` allows, relative to the joint's largest load of the kind",
+            0.01,
             ge=1e-6,
             lt=1,
-            description="largest error of a load that `auto` allows, relative to the joint's largest load of the kind",
-            examples=[0.01],
         ),
     ] = 0.005
     method: Annotated[
         Literal["bdf2", "generalized_alpha", "tr_bdf2"],
-        Field(description="time integration; `bdf2` alone runs joints in SIMD lanes", examples=["tr_bdf2"]),
+        key("time integration; `bdf2` alone runs joints in SIMD lanes", "tr_bdf2"),
     ] = "bdf2"
     start: Annotated[
         Literal["static", "ramp"],
-        Field(
-            description="start from the equilibrium at theta = 0, or from the ideal pose with a torque that rises",
-            examples=["ramp"],
-        ),
+        key("start from the equilibrium at theta = 0, or from the ideal pose with a torque that rises", "ramp"),
     ] = "static"
-    steps_per_rev: Annotated[
-        int, Field(strict=True, ge=12, le=20_000, description="equal steps per revolution", examples=[360])
-    ] = _DEFAULTS.steps_per_rev
-    max_revs: Annotated[
-        int, Field(strict=True, ge=2, le=1000, description="most revolutions until a joint settles", examples=[60])
-    ] = _DEFAULTS.max_revs
-    settle_tol: Annotated[
-        Number, Field(gt=0, lt=1, description="closure error below which a joint is settled", examples=[1e-3])
-    ] = _DEFAULTS.settle_tol
+    steps_per_rev: Annotated[int, whole(12, 20_000, "equal steps per revolution", 360)] = _DEFAULTS.steps_per_rev
+    max_revs: Annotated[int, whole(2, 1000, "most revolutions until a joint settles", 60)] = _DEFAULTS.max_revs
+    settle_tol: Annotated[Number, key("closure error below which a joint is settled", 1e-3, gt=0, lt=1)] = (
+        _DEFAULTS.settle_tol
+    )
     newton_tol: Annotated[
-        Number,
-        Field(
-            ge=1e-12,
-            le=1e-2,
-            description="residual that ends Newton's iteration, relative to torque / (2 R)",
-            examples=[1e-7],
-        ),
+        Number, key("residual that ends Newton's iteration, relative to torque / (2 R)", 1e-7, ge=1e-12, le=1e-2)
     ] = _DEFAULTS.newton_tol
-    newton_max_iter: Annotated[
-        int, Field(strict=True, ge=2, le=100, description="most Newton iterations of a step", examples=[20])
-    ] = _DEFAULTS.newton_max_iter
-    max_halvings: Annotated[
-        int,
-        Field(
-            strict=True,
-            ge=0,
-            le=20,
-            description="most halvings of a step that Newton's iteration fails on",
-            examples=[8],
-        ),
-    ] = _DEFAULTS.max_halvings
-    rho_inf: Annotated[
-        Number,
-        Field(ge=0, le=1, description="spectral radius of `generalized_alpha` at infinite frequency", examples=[0.9]),
-    ] = _DEFAULTS.rho_inf
+    newton_max_iter: Annotated[int, whole(2, 100, "most Newton iterations of a step", 20)] = _DEFAULTS.newton_max_iter
+    max_halvings: Annotated[int, whole(0, 20, "most halvings of a step that Newton's iteration fails on", 8)] = (
+        _DEFAULTS.max_halvings
+    )
+    rho_inf: Annotated[Number, key("spectral radius of `generalized_alpha` at infinite frequency", 0.9, ge=0, le=1)] = (
+        _DEFAULTS.rho_inf
+    )
     peak_substeps: Annotated[
         int,
-        Field(
-            strict=True,
-            ge=1,
-            le=64,
-            description="parts of a step where a contact switches on a load's peak; with 1 these steps are not "
-            "repeated",
-            examples=[1],
+        whole(
+            1, 64, "parts of a step where a contact switches on a load's peak; with 1 these steps are not repeated", 1
         ),
     ] = _DEFAULTS.peak_substeps
     max_refinements: Annotated[
-        int,
-        Field(
-            strict=True,
-            ge=0,
-            le=4,
-            description="most halvings of the steps of a refined joint; 0 leaves all joints at `steps_per_rev`",
-            examples=[0],
-        ),
+        int, whole(0, 4, "most halvings of the steps of a refined joint; 0 leaves all joints at `steps_per_rev`", 0)
     ] = _DEFAULTS.max_refinements
     duration: Annotated[
         int,
-        Field(
-            strict=True,
-            ge=1,
-            le=1_000_000_000,
-            description="revolutions for which the largest loads of a joint that never repeats are estimated",
-            examples=[1000],
+        whole(
+            1,
+            1_000_000_000,
+            "revolutions for which the largest loads of a joint that never repeats are estimated",
+            1000,
         ),
     ] = _DEFAULTS.duration
 
@@ -138,21 +114,10 @@ class Solver(Strict):
 
     def options(self) -> Options:
         """Return the settings for the kernel; ``auto``, which a campaign resolves, becomes ``dynamic``."""
-        return Options(
-            method=int(Method[self.method.upper()]),
-            start=int(Start[self.start.upper()]),
-            steps_per_rev=self.steps_per_rev,
-            max_revs=self.max_revs,
-            settle_tol=self.settle_tol,
-            newton_tol=self.newton_tol,
-            newton_max_iter=self.newton_max_iter,
-            max_halvings=self.max_halvings,
-            rho_inf=self.rho_inf,
-            peak_substeps=self.peak_substeps,
-            max_refinements=self.max_refinements,
-            duration=self.duration,
-            fidelity=int(Fidelity.DYNAMIC if self.fidelity == "auto" else Fidelity[self.fidelity.upper()]),
-        )
+        dynamic = Fidelity.DYNAMIC if self.fidelity == "auto" else Fidelity[self.fidelity.upper()]
+        codes = {"method": Method[self.method.upper()], "start": Start[self.start.upper()], "fidelity": dynamic}
+        numbers = self.model_dump(include=set(Options._fields) - set(codes))
+        return Options(**numbers, **{name: int(code) for name, code in codes.items()})
 
 
 SamplingMethod = Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"]
@@ -168,49 +133,56 @@ class Sampling(Strict):
 
     method: Annotated[
         SamplingMethod,
-        Field(
-            description="`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `importance`, "
-            "random, from "
-            "[tolerances] and [[proposal]]; `pick_freeze`, joints that share errors, for Sobol' indices; "
-            "`sweep`, the grid "
-            "of [sweep]; `cases`, the joints of [[case]], [[variant]] and [grid]",
-            examples=["sobol"],
+        key(
+            "`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `importance`, random, from "
+            "[tolerances] and [[proposal]]; `pick_freeze`, joints that share errors, for Sobol' indices; `sweep`, the "
+            "grid of [sweep]; `cases`, the joints of [[case]], [[variant]] and [grid]",
+            "sobol",
             json_schema_extra=_of_a_file,
         ),
     ] = "random"
     n: Annotated[
         int | None,
-        Field(
-            strict=True,
-            ge=1,
-            le=MAX_SAMPLES,
-            description="number of joints without the nominal one; needed by all methods but `sweep` and `cases`; "
+        whole(
+            1,
+            MAX_SAMPLES,
+            "number of joints without the nominal one; needed by all methods but `sweep` and `cases`; "
             "with `pick_freeze` of pairs of random joints",
-            examples=[1024],
+            1024,
         ),
     ] = None
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63, description="seed of all draws", examples=[2021])] = 0
+    seed: Annotated[int, key("seed of all draws", 2021, strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Annotated[
-        Flag,
-        Field(
-            description="whether row 0 is the joint without errors, which statistics leave out; not with `cases`",
-            examples=[False],
-        ),
+        Flag, key("whether row 0 is the joint without errors, which statistics leave out; not with `cases`", False)
     ] = True
     groups: Annotated[
         Literal["tolerance", "error"],
-        Field(
-            description="what `pick_freeze` exchanges together: all errors of an entry of [tolerances], or each alone",
-            examples=["error"],
-        ),
+        key("what `pick_freeze` exchanges together: all errors of an entry of [tolerances], or each alone", "error"),
     ] = "tolerance"
+
+    replicates: Annotated[
+        int,
+        Field(
+            strict=True,
+            ge=1,
+            le=1000,
+            description="number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares "
+            "and quantiles then have intervals",
+            examples=[8],
+        ),
+    ] = 1
 
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out `groups` unless the method is ``pick_freeze``: identities of other methods do not have it."""
+        """Leave out `groups` unless the method is ``pick_freeze``, and `replicates` unless there are several.
+
+        Identities of other methods do not have them.
+        """
         data: dict[str, Any] = write(self)
         if self.method != "pick_freeze":
             data.pop("groups", None)
+        if self.replicates == 1:
+            data.pop("replicates", None)
         return data
 
     @model_validator(mode="before")
@@ -228,6 +200,11 @@ class Sampling(Strict):
             raise refuse("missing key n", "add n, the number of joints, for example n = 1024")
         if self.method == "lhs" and self.n is not None and self.n > MAX_ROWS:
             raise refuse(f"a Latin hypercube of {self.n} joints", f"give at most n = {MAX_ROWS}, or another method")
+        if self.replicates > 1 and self.method not in ("sobol", "lhs"):
+            raise refuse(f"replicates is given with {self.method!r}", 'remove it, or write method = "sobol" or "lhs"')
+        if self.n is not None and self.n % self.replicates:
+            least = self.replicates * -(-self.n // self.replicates)
+            raise refuse(f"n = {self.n} is no multiple of replicates = {self.replicates}", f"give n = {least}")
         if self.method != "pick_freeze" and "groups" in self.model_fields_set:
             raise refuse(f"groups is given with {self.method!r}", 'remove it, or write method = "pick_freeze"')
         if self.method == "cases" and self.nominal_first:
@@ -256,9 +233,9 @@ class Subset(Sampling):
     p0 : float
         Share of them that seeds the next level.
     load : str
-        Load whose exceedance is estimated, ``cross1.F``.
-    above : float
-        Value of the load whose exceedance is estimated, SI.
+        Name of the limit whose exceedance is estimated: ``cross1.F``, ``cross*.F``, ``all limits``.
+    levels : dict of str to float
+        Level of each load of the limit, SI.
     unresolved : str
         Whether a joint without a valid load counts as above every level or below.
     """
@@ -270,8 +247,13 @@ class Subset(Sampling):
     per_level: Annotated[int, Field(strict=True, ge=20, le=MAX_ROWS)]
     p0: Annotated[Number, Field(gt=0, le=0.5)]
     load: str
-    above: Number
+    levels: Annotated[dict[str, Number], Field(min_length=1)]
     unresolved: Literal["above", "below"] = "below"
+
+    @property
+    def limit(self) -> Limit:
+        """The limit whose exceedance is estimated."""
+        return Limit(self.load, tuple(self.levels), tuple(self.levels.values()))
 
     @model_validator(mode="after")
     def _whole_seeds(self) -> Self:
@@ -296,28 +278,21 @@ class Output(Strict):
 
     results: Annotated[
         list[Annotated[str, AfterValidator(_check_pattern)]] | None,
-        Field(
+        key(
+            "names or patterns of result columns to store beside status and course; all by default",
+            ["cross*.[FT]_max"],
             min_length=1,
-            description="names or patterns of result columns to store beside status and course; all by default",
-            examples=[["cross*.[FT]_max"]],
         ),
     ] = None
     histories: Annotated[
         Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"],
-        Field(
-            description="what is stored of the last revolution: all samples, Fourier coefficients, counted load cycles",
-            examples=["harmonics+cycles"],
+        key(
+            "what is stored of the last revolution: all samples, Fourier coefficients, counted load cycles",
+            "harmonics+cycles",
         ),
     ] = "none"
     harmonics: Annotated[
-        int,
-        Field(
-            strict=True,
-            ge=0,
-            le=10_000,
-            description="highest order of the Fourier coefficients, where `histories` has them",
-            examples=[32],
-        ),
+        int, whole(0, 10_000, "highest order of the Fourier coefficients, where `histories` has them", 32)
     ] = 16
 
     def identity(self) -> dict[str, Any]:
@@ -338,11 +313,9 @@ class Output(Strict):
 class SweepEntry(Strict):
     """The errors that a name or pattern selects go from one value to another together; several entries make a grid."""
 
-    start: Annotated[Value, Field(alias="from", description="first value", examples=["0.14 mm"])]
-    stop: Annotated[Value, Field(alias="to", description="last value", examples=["-0.60 mm"])]
-    points: Annotated[
-        int, Field(strict=True, ge=2, le=MAX_ROWS, description="number of equally spaced values", examples=[38])
-    ]
+    start: Annotated[Value, key("first value", "0.14 mm", alias="from")]
+    stop: Annotated[Value, key("last value", "-0.60 mm", alias="to")]
+    points: Annotated[int, whole(2, MAX_ROWS, "number of equally spaced values", 38)]
 
     @model_validator(mode="after")
     def _moves(self) -> Self:

@@ -1,56 +1,87 @@
-"""Statements on a probability as they are written on the command line: ``"P(cross1.F > 700 N) < 0.001"``."""
+"""Limits and statements on a probability as the command line has them: ``"P(cross*.F > 700 N) < 0.001"``."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, UNIT_OF_LOAD, Limit
 from tolstat.common.strict import did_you_mean
 from tolstat.study.selection import Entry, quantity, resolve
 
-_STATEMENT = re.compile(
-    r"\s*P\s*\(\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>[^)]+?)\s*\)\s*(?P<what>\w*)\s*<\s*(?P<bound>\S+)\s*"
-)
+_STATEMENT = re.compile(r"\s*P\s*\((?P<limit>[^)]*)\)\s*(?P<what>\w*)\s*<\s*(?P<bound>\S+)\s*")
+_LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
 
 
 class Statement(NamedTuple):
-    """Statement that P(load > level), or the width of its interval, is below a bound.
+    """Statement that the probability of a load above a limit, or the width of its interval, is below a bound.
 
     Attributes
     ----------
     text : str
         The statement as written.
-    loads : tuple of str
-        Names of the loads that the pattern selects; the statement is on the largest of them.
-    level : float
-        In SI units.
+    limit : Limit
+        The limit.
     bound : float
         Upper bound, between 0 and 1.
     """
 
     text: str
-    loads: tuple[str, ...]
-    level: float
+    limit: Limit
     bound: float
 
 
-def parse(text: str, what: str, option: str, example: str) -> Statement:
+def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) -> Limit:
+    """Read a limit.
+
+    Parameters
+    ----------
+    text : str
+        ``"cross1.F > 700 N"``; ``"cross*.F > 700 N"``, any of the loads that the pattern selects; or `ANY_LIMIT`, any
+        limit of the study.
+    limits : mapping
+        Limits of the study, SI.
+    option : str
+        Option of the command line, shown in faults.
+    example : str
+        Remedy shown for a text that is not a limit.
+
+    Raises
+    ------
+    InputError
+        With every fault of it.
+    """
+    if text.split() == ANY_LIMIT.split():
+        if not limits:
+            raise InputError([Fault(option, "the study has no limits", f"add [limits] to it, or {example}")])
+        return Limit(ALL_LIMITS, tuple(limits), tuple(limits.values()))
+    found = _LIMIT.fullmatch(text)
+    if found is None:
+        raise InputError([Fault(option, f"{text.strip()!r} is not a limit", example)])
+    entry = Entry(found["load"], (found["load"],), found["level"])
+    if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LOAD:
+        remedy = did_you_mean(entry.pattern, list(UNIT_OF_LOAD))
+        raise InputError([Fault(option, f"{entry.pattern!r} is not a load", remedy)])
+    loads = resolve(entry, UNIT_OF_LOAD, option)
+    level = quantity(entry, UNIT_OF_LOAD[loads[0]], option)
+    return Limit(entry.pattern, tuple(loads), (level,) * len(loads))
+
+
+def parse(text: str, what: str, option: str, example: str, limits: Mapping[str, float]) -> Statement:
     """Read a statement.
 
     Parameters
     ----------
     text : str
-        ``"P(cross*.F > 700 N) < 0.001"``.
+        ``"P(LIMIT) < 0.001"``, with a LIMIT as in `limit_of`.
     what : str
         Word before the ``<``; empty for the probability itself.
-    option : str
-        Option of the command line, shown in faults.
-    example : str
-        Remedy shown for a text that is not a statement.
+    limits, option, example
+        As in `limit_of`.
 
     Returns
     -------
@@ -66,18 +97,13 @@ def parse(text: str, what: str, option: str, example: str) -> Statement:
     if found is None or found["what"] != what:
         raise InputError([Fault(option, f"{text!r} is not a rule", example)])
     faults: list[Fault] = []
-    loads, level, bound = [], math.nan, math.nan
-    entry = Entry(found["load"], (found["load"],), found["level"])
+    limit, bound = None, math.nan
     with gather(faults):
-        if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LOAD:
-            remedy = did_you_mean(entry.pattern, list(UNIT_OF_LOAD))
-            raise InputError([Fault(option, f"{entry.pattern!r} is not a load", remedy)])
-        loads = resolve(entry, UNIT_OF_LOAD, option)
-        level = quantity(entry, UNIT_OF_LOAD[loads[0]], option)
+        limit = limit_of(found["limit"], limits, option, example)
     with suppress(ValueError):
         bound = float(found["bound"])
     if not 0.0 < bound < 1.0:
         faults.append(Fault(option, f"{what} {found['bound']} is not between 0 and 1".strip(), example))
-    if faults:
+    if faults or limit is None:
         raise InputError(faults)
-    return Statement(text.strip(), tuple(loads), level, bound)
+    return Statement(text.strip(), limit, bound)

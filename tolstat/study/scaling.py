@@ -20,6 +20,7 @@ from tolstat.study.tolerances.zones import ZoneEntry
 SCALED = ("normal", "uniform", "triangular", "beta", "rayleigh")
 """Distributions that can be scaled; those of measured parts and lognormal ones cannot."""
 _WIDTHS = ("plus_minus", "std", "sigma", "zone")
+_PLACES = {"lower", "upper", "peak", "mean"}
 
 
 class Tolerance(NamedTuple):
@@ -45,8 +46,21 @@ class Tolerance(NamedTuple):
     site: Site
     width: float
 
+    @property
+    def fixed(self) -> float | None:
+        """Value that stays where it is when the tolerance is scaled, SI; None for an entry without a band.
+
+        It is the middle of the band, or zero where one limit is zero, as for H7.
+        """
+        if "lower" not in self.entry:
+            return self.site.center if {"plus_minus", "iso2768"} & self.entry.keys() else None
+        ends = [units.to_si(self.entry[key], self.site.unit) for key in ("lower", "upper")]
+        return 0.0 if 0.0 in ends else 0.5 * sum(ends)
+
     def scaled(self, factor: float, digits: int = 12) -> dict[str, Any]:
-        """Entry with the tolerance `factor` times as wide, about the middle of the band; Cpk is unchanged.
+        """Entry with the tolerance `factor` times as wide; Cpk is unchanged.
+
+        Limits, peak and mean keep their place in the band, which is scaled about the value `fixed`.
 
         Parameters
         ----------
@@ -69,13 +83,13 @@ class Tolerance(NamedTuple):
             if key in entry:
                 value = factor * units.to_si(entry[key], self.site.unit, DIAMETER if key == "zone" else PLUS_MINUS)
                 entry[key] = units.written(value, self.site.unit, entry[key], digits)
-        ends = [key for key in ("lower", "upper") if key in entry]
-        if ends:
-            values = {key: units.to_si(entry[key], self.site.unit) for key in (*ends, "peak") if key in entry}
-            middle = 0.5 * (values["lower"] + values["upper"])
-            for key, value in values.items():
-                moved = middle + factor * (value - middle)
-                entry[key] = units.written(moved, self.site.unit, entry[key], digits + 1)
+        if (fixed := self.fixed) is not None:
+            for key in _PLACES & entry.keys():
+                value = units.to_si(entry[key], self.site.unit)
+                moved = fixed + factor * (value - fixed)
+                entry[key] = (
+                    entry[key] if moved == value else units.written(moved, self.site.unit, entry[key], digits + 1)
+                )
         return entry
 
     def distribution(self, entry: Mapping[str, Any]) -> Distribution:

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 from pydantic_core import PydanticCustomError
 
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.strict import did_you_mean, dotted
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import to_si
@@ -72,19 +71,6 @@ def quantity(entry: Entry, unit: str, place: str) -> float:
     except PydanticCustomError as error:
         context = error.context or {}
         raise InputError([Fault(f"{place}: {dotted(entry.path)}", context["found"], context["remedy"])]) from error
-
-
-def limit_of(load: str, level: str, place: str) -> float:
-    """Level of a load that can have a limit, SI.
-
-    Raises
-    ------
-    InputError
-        When there is no such load, or the level is no quantity of its unit.
-    """
-    if load not in UNIT_OF_LOAD:
-        raise InputError([Fault(place, f"{load!r} is not a load", did_you_mean(load, list(UNIT_OF_LOAD)))])
-    return quantity(Entry(load, (load,), level), UNIT_OF_LOAD[load], place)
 
 
 def fixed_errors(

@@ -30,7 +30,7 @@ def _found(name: str, other: str, value: float | None) -> str:
     return f"has neither {name} nor {other}" if value is None else f"has both {name} and {other}"
 
 
-class PointEntry(Strict):
+class StressPointEntry(Strict):
     """Point of a part: its stress is a sum of the bushing's load components, each times a factor."""
 
     bushing: Annotated[
@@ -75,7 +75,7 @@ class PointEntry(Strict):
     ] = -1.0
 
     @model_validator(mode="after")
-    def _complete(self) -> PointEntry:
+    def _complete(self) -> StressPointEntry:
         if not any(self.per_load):
             raise refuse("no load stresses the point", 'give a stress per load, for example T_e = "0.2 MPa/(N*m)"')
         if (self.S_D is None) == (self.S_aD is None):
@@ -135,7 +135,7 @@ def read(table: Mapping[str, Any], place: str) -> tuple[StressPoint, ...]:
     for name, value in table.items():
         prefix = ("fatigue", "point", name)
         with gather(faults):
-            entry = strict.validate(PointEntry, value, place, prefix=prefix)
+            entry = strict.validate(StressPointEntry, value, place, prefix=prefix)
             bushings = select(entry.bushing, BUSHINGS)
             if not bushings:
                 where = f"{place}: {strict.dotted((*prefix, 'bushing'))}"

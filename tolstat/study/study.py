@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results, shown
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words
+from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
 from tolstat.common.strict import with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import AFFECT_NOTHING, Joint, Operation
@@ -24,6 +24,7 @@ from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
+from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.proposal import Proposal
 from tolstat.study.swept import Swept
 from tolstat.study.tolerances.correlation import Copula
@@ -78,8 +79,7 @@ class Case:
 
     def _entries(self) -> list[tuple[str, object]]:
         """Named values that a notebook shows."""
-        point, solver = self.operation, self.solver
-        turned = f"{math.degrees(point.alpha):.4g} deg, {point.speed * 30 / math.pi:.4g} rpm, {point.torque:.4g} N m"
+        solver, turned = self.solver, Point("", self.operation).in_words
         words = f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution"
         errors = ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none"
         return [("file", str(self.path)), ("operation", turned), ("solver", words), ("fixed errors, SI", errors)]
@@ -91,6 +91,10 @@ class Study(Case):
 
     Attributes
     ----------
+    operation : Operation
+        Operating point; of several the first, see `at`.
+    points : tuple of Point
+        All operating points; the same joints are simulated at each.
     errors : dict
         Fixed errors of every joint except the nominal one (SI).
     tolerances : dict
@@ -113,7 +117,8 @@ class Study(Case):
     listed : Design, optional
         The joints listed one by one; None unless ``sampling.method`` is ``cases``.
     limits : dict
-        Result name (``cross1.F``, ``fork2.T``, ``pin1.contact``, ``psi``) to limit (SI).
+        Result name (``cross1.F``, ``fork2.T``, ``pin1.contact``, ``psi``) to limit (SI), which holds at all operating
+        points; or only at those that it names, ``cross1.F at cruise``.
     fatigue : Fatigue
         Settings for the evaluation of load cycles.
     output : Output
@@ -126,6 +131,7 @@ class Study(Case):
 
     sampling: Sampling
     output: Output
+    points: tuple[Point, ...]
     tolerances: dict[str, Distribution] = field(default_factory=dict)
     entries: tuple[Toleranced, ...] = ()
     axes: Mapping[str, Axis] = field(default_factory=dict)
@@ -149,6 +155,25 @@ class Study(Case):
     def solvers(self) -> tuple[Solver, ...]:
         """Numerical settings of each of `joints`."""
         return self.listed.solvers if self.listed else (self.solver,) * len(self.joints)
+
+    @property
+    def operations(self) -> tuple[Operation, ...]:
+        """Operating point of each of `joints`."""
+        return self.listed.operations if self.listed else (self.operation,) * len(self.joints)
+
+    def at(self, name: str) -> Study:
+        """Return the study at one of its operating points alone, with the limits that hold there.
+
+        Raises
+        ------
+        InputError
+            When there is no such point, or several and no name.
+        """
+        names = [point.name for point in self.points]
+        only_one(name, names, f"{self.path}: operation")
+        own = self.points[names.index(name)]
+        limits = limits_at(self.limits, [own.name], names)
+        return replace(self, operation=own.operation, points=(Point("", own.operation, 1.0),), limits=limits)
 
     @property
     def variants(self) -> tuple[Variant, ...]:
@@ -196,18 +221,22 @@ class Study(Case):
     def asked(self) -> list[str]:
         """Loads of interest: those with limits, else those that ``output.results`` selects; else none."""
         if self.limits or self.output.results is None:
-            return list(self.limits)
+            return list(dict.fromkeys(split(name)[0] for name in self.limits))
         return [load for load in UNIT_OF_LOAD if selected_results.holds(self.output.columns, load)]
 
     def __repr__(self) -> str:
         parts = [f"{self.samples} joints ({self.sampling.method})", f"{len(self.tolerances)} toleranced errors"]
         parts.append(f"{len(self.limits)} limit{'s' * (len(self.limits) != 1)}")
+        if len(self.points) > 1:
+            parts.append(f"{len(self.points)} operating points")
         return f"<study {self.name!r}: {', '.join(parts)}>"
 
     def _entries(self) -> list[tuple[str, object]]:
         sampling = f"{self.sampling.method}, {self.samples} joints, seed {self.sampling.seed}"
         toleranced = ("toleranced", ", ".join(self.tolerances) or "none")
-        return [*super()._entries(), ("sampling", sampling), toleranced, ("limits", limits_in_words(self.limits))]
+        named = [(f"operation {point.name}", point.in_words) for point in self.points if point.name]
+        entries = [entry for entry in super()._entries() if not named or entry[0] != "operation"]
+        return [*entries, *named, ("sampling", sampling), toleranced, ("limits", limits_in_words(self.limits))]
 
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.
@@ -217,7 +246,7 @@ class Study(Case):
         """
         parts: dict[str, Any] = {
             "joint": {k: v for k, v in self.joint.given("json").items() if k not in AFFECT_NOTHING},
-            "operation": self.operation.model_dump(),
+            "operation": self._operation_identity(),
             "solver": self.solver.model_dump(),
             "errors": self.errors,
             "tolerances": {name: d.describe() for name, d in self.tolerances.items()},
@@ -235,6 +264,10 @@ class Study(Case):
         if self.swept:
             parts["swept"] = [variant.values for variant in self.swept.variants]
         return dict(flat(parts | (self.listed.identity() if self.listed else {})))
+
+    def _operation_identity(self) -> dict[str, Any]:
+        named = {point.name: point.operation.model_dump() for point in self.points}
+        return named.get("", named)
 
 
 def load_case(path: str | Path) -> Case:
@@ -298,15 +331,16 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         file.override("sampling", "n", n)
     fit = file.fit()
     joint = file.joint(fit) if joint is None else joint
-    operation = file.model("operation", Operation, required=True)
+    points = file.points()
+    operation = points[0].operation if points else None
     solver = file.model("solver", Solver)
     errors = file.errors()
-    read = file.tolerances(joint, operation, fit)
+    read = file.tolerances(joint, fit)
     copula = file.correlation()
     proposals = file.proposals()
     sampling = file.model("sampling", Sampling, required=True)
     sweep = file.sweep()
-    limits = file.limits()
+    limits = file.limits(points)
     fatigue = file.fatigue()
     output = file.model("output", Output)
     listed = None
@@ -320,6 +354,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         joints_swept = file.swept(listing.Nominal(joint, operation, solver), sweep, sampling.nominal_first)
     if sampling is not None:
         file.check_method(sampling, sweep)
+        file.check_points(sampling, sweep, points)
     if output is not None:
         file.check_fatigue(output)
         file.check_limits(output, limits)
@@ -336,6 +371,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         text=file.text,
         joint=joint,
         operation=operation,
+        points=points,
         solver=solver,
         errors=errors,
         sampling=sampling,

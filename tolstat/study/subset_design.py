@@ -39,10 +39,10 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
     if not study.tolerances:
         remedy = 'give a study with [tolerances] and sampling.method = "random"'
         faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
-    load = LOADS[str(sampling["load"])]
-    if not selected_results.holds(study.output.columns, load.name):
-        remedy = f"add {', '.join(load.columns)}"
-        faults.append(study.fault("output.results", f"leaves out {load.name}, which --limit needs", remedy))
+    for load in (LOADS[name] for name in sampling["levels"]):
+        if not selected_results.holds(study.output.columns, load.name):
+            remedy = f"add {', '.join(load.columns)}"
+            faults.append(study.fault("output.results", f"leaves out {load.name}, which --limit needs", remedy))
     own = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
     with gather(faults):
         read = validate(Subset, own | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")

@@ -42,6 +42,30 @@ class Swept(NamedTuple):
     table: NDArray[np.void]
 
 
+def meaning(axes: Sequence[SweepAxis], joint: Joint) -> list[str]:
+    """Describe the axes of clearances and diameters, whose values are deviations from those of the joint.
+
+    Returns
+    -------
+    list of str
+        One line for each such axis, with the key that has the value itself; empty for other sweeps.
+    """
+    of = joint.contact
+    keys = {"clearance": "clearance"} | {f"{part}.diameter": key for part, key in (("hole", "D_H"), ("pin", "D_P"))}
+    lines = []
+    for axis in axes:
+        part, _, kind = axis.names[0].partition(".")
+        key = keys.get(kind) or keys.get(f"{part.rstrip('1234')}.{kind}")
+        if axis.names[0] not in KEYS and key is not None:
+            ends = (f"{1e3 * end:.6g}" for end in (axis.start, axis.stop))
+            whole = (f"{1e3 * (getattr(of, key) + end):.6g}" for end in (axis.start, axis.stop))
+            others = len(axis.names) - 1
+            what = f"{axis.names[0]}{f' and {others} others' if others else ''}"
+            lines.append(f"sweep of {what}: deviations from {' to '.join(ends)} mm,")
+            lines.append(f"  the {kind} is {' to '.join(whole)} mm; to sweep it itself: contact.{key}")
+    return lines
+
+
 def read(axes: Sequence[SweepAxis], variants: Variants, joint: Joint, nominal_first: bool, place: str) -> Swept | None:
     """Make the joints of a sweep.
 

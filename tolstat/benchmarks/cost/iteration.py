@@ -63,6 +63,7 @@ class Iteration:
 
 def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
     """Yield the last recorded state of each of the first n joints."""
+    from tolstat.kernel.integrators.state import UNLIMITED
     from tolstat.kernel.revolution.simulate import simulate_joint
 
     params, options = these
@@ -70,7 +71,7 @@ def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
     state = scratch.state
     out = np.zeros(1, KERNEL_RESULT).view(np.recarray)
     for i in range(min(n, len(params))):
-        simulate_joint(params.view(np.recarray)[i], options, scratch, out[0])
+        simulate_joint(params.view(np.recarray)[i], options, UNLIMITED, scratch, out[0])
         h = 2 * np.pi / (abs(float(params["omega"][i])) * options.steps_per_rev)
         cv = 1.5 / h
         t = float(out["revolutions"][0]) * options.steps_per_rev * h
@@ -96,6 +97,7 @@ def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
 
 def _tally(these: Sample) -> NDArray[np.int64]:
     """Counts of all joints in lock-step: rounds, lanes with a joint summed over rounds, rounds with new tangents."""
+    from tolstat.kernel.integrators.state import UNLIMITED
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
@@ -106,7 +108,8 @@ def _tally(these: Sample) -> NDArray[np.int64]:
     out = np.zeros(len(params), KERNEL_RESULT).view(np.recarray)
     samples, blocks = make_samples(0, options.steps_per_rev), np.zeros((0, 0), KERNEL_RESULT).view(np.recarray)
     rows = params.view(np.recarray)
-    lockstep(rows, words, options, PATIENCE, simulation.scratch(options), batch, samples, blocks, out, tally)
+    left, scratch = np.full(len(params), UNLIMITED), simulation.scratch(options)
+    lockstep(rows, words, left, options, PATIENCE, scratch, batch, samples, blocks, out, tally)
     return tally
 
 

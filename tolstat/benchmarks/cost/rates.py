@@ -89,13 +89,14 @@ def sample(study: Study, n: int) -> Sample:
 
 def alone(params: Params, options: Options) -> NDArray[np.void]:
     """Simulate joints one after the other, without lanes; results, (n,) RESULT."""
+    from tolstat.kernel.integrators.state import UNLIMITED
     from tolstat.kernel.revolution.simulate import simulate_joint
 
     results = np.zeros(len(params), RESULT)
     rows, out = params.view(np.recarray), for_kernels(results)
     scratch = simulation.scratch(options)
     for i in range(len(params)):
-        simulate_joint(rows[i], options, scratch, out[i])
+        simulate_joint(rows[i], options, UNLIMITED, scratch, out[i])
     return results
 
 

@@ -88,7 +88,7 @@ def measure(path: Path, n: int, quick: bool, cold: bool, say: Callable[[str], No
     InputError
         When the study cannot be used.
     """
-    study = load(path)
+    study = load(path).at("")
     rounds = QUICK_ROUNDS if quick else ROUNDS
     these = rates.sample(study, min(n, 32) if quick else n)
     say(f"{len(these.params)} joints, in lanes, alone and quasi-static")

@@ -82,7 +82,7 @@ def first_joint(study_path: str) -> None:
     from tolstat.benchmarks.joints import parameters
     from tolstat.solver import simulation
 
-    loaded = study.load(study_path, n=1)
+    loaded = study.load(study_path, n=1).at("")
     simulation.simulate_rows(parameters(loaded, np.arange(1)), loaded.solver.options())
 
 

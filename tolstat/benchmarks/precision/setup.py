@@ -87,7 +87,7 @@ def load(path: Path, quick: bool = False) -> tuple[Setup, Study]:
     data = strict.read_toml(path)
     with strict.lines_of(path):
         setup = strict.validate(Setup, data, str(path))
-        base = study.load(path.parent / setup.study)
+        base = study.load(path.parent / setup.study).at("")
         first = base.first_sample
         if base.variants:
             raise InputError([Fault(f"{path}: study", f"{setup.study} lists its joints", "name one that draws them")])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import queue
+import signal
 import tempfile
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
@@ -26,7 +27,6 @@ from tolstat.campaign.executors.common import (
     never_stop,
 )
 from tolstat.campaign.executors.processes import map_in_processes, one_thread_each, signals_blocked
-from tolstat.campaign.executors.worker import alarm
 from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -169,11 +169,17 @@ def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapp
     check(expected, _own(fingerprint), "a Dask worker")
     with _ONE_AT_A_TIME:
         _prepare(work.prepare)
-        alarm(work.limit_s)
+        _alarm(work.limit_s and work.limit_s * work.size(block))
         try:
             return work.function(block)
         finally:
-            alarm(None)
+            _alarm(None)
+
+
+def _alarm(seconds: float | None) -> None:
+    """Let the operating system kill this process after some processor time, s; None cancels the timer."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, seconds or 0.0)
 
 
 @cache

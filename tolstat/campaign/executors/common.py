@@ -34,7 +34,7 @@ class Lost(NamedTuple):
     Attributes
     ----------
     kind : {"crashed", "timeout"}
-        Whether the block crashed its process (or raised), or exceeded the time limit.
+        Whether the block crashed its process (or raised), or made no progress in the time allowed.
     reason : str
         What happened at the last attempt, such as ``"killed by SIGKILL"``.
     """
@@ -46,6 +46,11 @@ class Lost(NamedTuple):
 def unsplit(block: BlockT) -> Sequence[BlockT]:
     """Return a block as its only piece."""
     return [block]
+
+
+def of_one(block: object) -> int:
+    """Return the size of a block of one joint."""
+    return 1
 
 
 def no_preparation() -> None:
@@ -61,15 +66,19 @@ class Work(Generic[BlockT, ResultT]):
     function : callable
         Function of one block. Function, blocks and results must be picklable if other processes are used.
     split : callable
-        Block -> its pieces, which are processed one by one if the block's process died or hung.
+        Block -> its halves, which are processed next if the block's process died or hung; itself if it is one joint.
+    size : callable
+        Block -> its number of joints.
     prepare : callable
         Called once in each process before the first block, outside the time limit.
     limit_s : float, optional
-        Time limit of a block, s. A block that exceeds it is split; a single piece is finally given up.
+        Processor time that a joint may take, s, without changing `progress_memory`. A block may take as many times as
+        long as it has joints, until it first does. One that takes longer is split; a single joint is given up.
     """
 
     function: Callable[[BlockT], ResultT]
     split: Callable[[BlockT], Sequence[BlockT]] = unsplit
+    size: Callable[[BlockT], int] = of_one
     prepare: Callable[[], object] = no_preparation
     limit_s: float | None = None
 

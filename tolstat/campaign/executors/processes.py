@@ -6,10 +6,11 @@ pipes and their locks: one that is killed while it sends a result keeps the lock
 out, after 60 s; one that is killed before it has a task breaks the pool. Here each worker has a pipe and one block at a
 time.
 
-A block whose worker died, hung or raised is split, and its pieces are processed one by one after all other blocks. A
-piece that fails twice alone is given up as `Lost`, but only after another block has succeeded since; if none is left, a
-block that succeeded before is repeated as a control. The reason: when the machine is at fault (no memory left, a broken
-installation) all blocks fail, and none of them is the cause.
+A block whose worker died, hung or raised is halved, and its halves go next, down to single joints. One that fails twice
+alone is given up as `Lost`. If it hung, that is final: the time is processor time without progress, so that nothing but
+the joint can be the cause. If it crashed, the machine may be at fault (no memory left, a broken installation), and then
+all blocks fail. Therefore another block has to succeed first; if none is left, one that succeeded before is repeated as
+a control. Only a control that fails ends the map, or many crashes before anything has succeeded.
 
 Workers are spawned, because a forked child inherits locks of threads that it does not have.
 """
@@ -19,13 +20,13 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
+from multiprocessing.reduction import ForkingPickler
 from typing import Any, Generic, Literal, NamedTuple
 
 from tolstat.campaign.executors.common import (
@@ -38,16 +39,21 @@ from tolstat.campaign.executors.common import (
     WorkerDied,
     never_stop,
 )
+from tolstat.campaign.executors.watch import Watch, shared_memory
 from tolstat.campaign.executors.worker import RAISED, READY, serve
 
 MAX_FAILURES = 2
-"""Number of failures at which a single piece is given up."""
+"""Number of failures at which a single joint is given up."""
 LOSSES_BEFORE_CONTROL = 3
-"""Number of consecutive failures after which a block that succeeded before is repeated, to test the workers."""
+"""Number of consecutive crashes after which a block that succeeded before is repeated, to test the workers."""
+MAX_FAILED_CONTROLS = 3
+"""Number of times that a control may fail, one after the other."""
+MOST_UNPROVEN = 100
+"""Number of joints that may be given up because they crashed before any block has succeeded."""
 MAX_FAILED_STARTS = 3
 """Number of consecutive workers ending before they are ready at which `WorkerDied` is raised."""
 START_LIMIT_S = 600.0
-"""Time limit for a worker to get ready, s: it may have to compile."""
+"""Processor time for a worker to get ready, s: it may have to compile."""
 
 HINT = (
     "hint: if memory is short, use fewer workers: --workers 1; in a Python script, start the campaign under: "
@@ -76,15 +82,15 @@ def map_in_processes(
     Yields
     ------
     tuple
-        A block or a piece of one, and its result, or `Lost` for a piece that was given up; in the order in which they
+        A block or a piece of one, and its result, or `Lost` for a joint that was given up; in the order in which they
         are finished.
 
     Raises
     ------
     WorkerDied
-        When workers cannot be started, or die one after the other without finishing anything.
+        When workers cannot be started, or the machine is at fault.
     Exception
-        The function's own, when block after block fails and the last one raised it.
+        The function's own, when it raised one for block after block and no block succeeded.
     """
     team: _Team[BlockT, ResultT] = _Team(work, iter(blocks), workers)
     try:
@@ -92,6 +98,22 @@ def map_in_processes(
             yield from team.run(stop)
     finally:
         team.end()
+
+
+@contextmanager
+def kept_workers() -> Iterator[None]:
+    """Keep workers that have nothing left to do for the next map inside that does the same work."""
+    global _kept
+    if _kept is not None:  # somebody above keeps them
+        yield
+        return
+    _kept = []
+    try:
+        yield
+    finally:
+        for worker in _kept:
+            _end_worker(worker)
+        _kept = None
 
 
 class _Task(NamedTuple, Generic[BlockT]):
@@ -104,11 +126,17 @@ class _Task(NamedTuple, Generic[BlockT]):
 
 @dataclass
 class _Worker(Generic[BlockT]):
+    """A process, the pickled work that it does, its pipe, the watch over it, and its block."""
+
     process: SpawnProcess
+    work: bytes
     connection: Connection
-    deadline: float
+    watch: Watch
     ready: bool = False
     task: _Task[BlockT] | None = None
+
+
+_kept: list[_Worker[Any]] | None = None
 
 
 class _Team(Generic[BlockT, ResultT]):
@@ -116,16 +144,16 @@ class _Team(Generic[BlockT, ResultT]):
 
     def __init__(self, work: Work[BlockT, ResultT], blocks: Iterator[BlockT], size: int) -> None:
         self.work = work
+        self.pickled = bytes(ForkingPickler.dumps(work))
         self.size = size
-        self.max_losses = 5 + size
         self.workers: list[_Worker[BlockT]] = []
         self.fresh: Iterator[_Task[BlockT]] = (_Task(block) for block in blocks)
         self.ahead: _Task[BlockT] | None = None
         self.suspects: deque[_Task[BlockT]] = deque()
         self.given_up: list[tuple[BlockT, Lost]] = []
+        self.doubtful: list[tuple[BlockT, Lost]] = []
         self.control: _Task[BlockT] | None = None
-        self.losses = 0
-        self.failed_starts = 0
+        self.losses = self.failed_controls = self.failed_starts = 0
 
     def run(self, stop: Callable[[], bool]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
         while True:
@@ -138,28 +166,30 @@ class _Team(Generic[BlockT, ResultT]):
             finished = [result for worker in self._wait_for_workers() for result in self._receive(worker)]
             self._hand_out()
             yield from finished
-        yield from self.given_up
+            while self.given_up:
+                yield self.given_up.pop()
+        yield from self.doubtful
 
     def end(self) -> None:
         for worker in self.workers:
-            self._end_worker(worker)
+            if _kept is not None and worker.ready and worker.task is None:
+                _kept.append(worker)
+            else:
+                _end_worker(worker)
 
     def _drop_tasks(self) -> None:
         self.fresh, self.ahead = iter(()), None
         self.suspects.clear()
-        self.given_up.clear()
+        self.doubtful.clear()
 
     def _next_task(self) -> _Task[BlockT] | None:
         task, self.ahead = self.ahead, None
         if task is not None:
             return task
-        in_doubt = self.given_up or self.losses >= LOSSES_BEFORE_CONTROL
+        in_doubt = self.doubtful or self.losses >= LOSSES_BEFORE_CONTROL
         if in_doubt and self.control and not any(w.task and w.task.control for w in self.workers):
             return self.control
-        task = next(self.fresh, None)
-        if task is None and self.suspects:
-            return self.suspects.popleft()
-        return task
+        return self.suspects.popleft() if self.suspects else next(self.fresh, None)
 
     def _has_task(self) -> bool:
         self.ahead = self._next_task()
@@ -173,26 +203,34 @@ class _Team(Generic[BlockT, ResultT]):
                     return
                 self._give(worker, task)
         while len(self.workers) < self.size and self._has_task():
-            self.workers.append(_start(self.work))
+            kept = next((worker for worker in _kept or () if worker.work == self.pickled), None)
+            if kept is None:
+                self.workers.append(_start(self.work, self.pickled))
+                continue
+            assert _kept is not None
+            _kept.remove(kept)
+            self.workers.append(kept)
+            task = self._next_task()
+            if task is not None:
+                self._give(kept, task)
 
     def _give(self, worker: _Worker[BlockT], task: _Task[BlockT]) -> None:
         worker.task = task
-        limit = self.work.limit_s
-        worker.deadline = time.monotonic() + limit if limit else float("inf")
+        worker.watch.begin(self.work.limit_s, self.work.size(task.block))
         with suppress(OSError):  # the worker has died: `_receive` will find its pipe closed
             worker.connection.send(task.block)
 
     def _wait_for_workers(self) -> list[_Worker[BlockT]]:
-        """Wait for workers and return those with a message, a closed pipe (the worker died) or an expired deadline."""
-        nearest = min(worker.deadline for worker in self.workers) - time.monotonic()
-        ready = wait([w.connection for w in self.workers], timeout=max(0.0, min(POLL_S, nearest)))
-        now = time.monotonic()
-        return [w for w in self.workers if w.connection in ready or w.deadline <= now]
+        """Wait for workers and return those with a message, a closed pipe (the worker died) or no time left."""
+        ready = wait([worker.connection for worker in self.workers], timeout=POLL_S)
+        busy = [worker for worker in self.workers if worker.task or not worker.ready]
+        over = [worker for worker in busy if worker.connection not in ready and worker.watch.is_over()]
+        return [worker for worker in self.workers if worker.connection in ready] + over
 
     def _receive(self, worker: _Worker[BlockT]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
         if not worker.connection.poll():
             limit = self.work.limit_s if worker.ready else START_LIMIT_S
-            self._drop_worker(worker, "timeout", f"took more than {limit:g} s")
+            self._drop_worker(worker, "timeout", f"made no progress in {limit:g} s of processor time")
             return
         try:
             kind, content = worker.connection.recv()
@@ -200,7 +238,7 @@ class _Team(Generic[BlockT, ResultT]):
             worker.process.join(1.0)
             self._drop_worker(worker, "crashed", _cause(worker.process.exitcode))
             return
-        task, worker.task, worker.deadline = worker.task, None, float("inf")
+        task, worker.task = worker.task, None
         if kind == READY:
             worker.ready, self.failed_starts = True, 0
         elif kind == RAISED and task is not None:
@@ -209,16 +247,16 @@ class _Team(Generic[BlockT, ResultT]):
             yield from self._succeed(task, content)
 
     def _succeed(self, task: _Task[BlockT], result: ResultT) -> Iterator[tuple[BlockT, ResultT | Lost]]:
-        self.losses = 0
+        self.losses = self.failed_controls = 0
         if self.control is None:
             self.control = task._replace(control=True)
         if not task.control:
             yield task.block, result
-        yield from self.given_up
-        self.given_up.clear()
+        yield from self.doubtful
+        self.doubtful.clear()
 
     def _drop_worker(self, worker: _Worker[BlockT], kind: Literal["crashed", "timeout"], reason: str) -> None:
-        self._end_worker(worker)
+        _end_worker(worker)
         self.workers.remove(worker)
         if worker.ready and worker.task is not None:
             self._handle_failure(worker.task, Lost(kind, reason), None)
@@ -229,39 +267,50 @@ class _Team(Generic[BlockT, ResultT]):
             raise WorkerDied(f"{found}\n  {HINT}")
 
     def _handle_failure(self, task: _Task[BlockT], lost: Lost, error: Exception | None) -> None:
-        self.losses += 1
-        if self.losses >= self.max_losses:
-            if error is not None:
-                raise error
-            found = f"{self.losses} worker processes in a row died, each at a block, and no block was finished"
-            raise WorkerDied(f"{found}; the last worker: {lost.reason}\n  {HINT}")
         if task.control:
+            self.failed_controls += 1
+            if self.failed_controls == MAX_FAILED_CONTROLS:
+                found = f"{self.failed_controls} worker processes in a row died at a block that was finished before"
+                raise error or WorkerDied(f"{found}; the last worker: {lost.reason}\n  {HINT}")
             return
+        self.losses += lost.kind == "crashed"
+        if error is not None and self.control is None and self.losses >= 5 + self.size:
+            raise error
         pieces = self.work.split(task.block)
         if len(pieces) > 1:
             self.suspects.extend(_Task(piece) for piece in pieces)
         elif task.failures + 1 < MAX_FAILURES:
             self.suspects.append(task._replace(failures=task.failures + 1))
-        else:
+        elif lost.kind == "timeout":
             self.given_up.append((task.block, lost))
+        else:
+            self.doubtful.append((task.block, lost))
+            if self.control is None and len(self.doubtful) == MOST_UNPROVEN:
+                found = f"worker processes died at each of {MOST_UNPROVEN} joints, and no block was finished"
+                raise WorkerDied(f"{found}; the last worker: {lost.reason}\n  {HINT}")
 
-    def _end_worker(self, worker: _Worker[BlockT]) -> None:
-        worker.process.kill()
-        worker.process.join()
-        worker.connection.close()
+
+def _end_worker(worker: _Worker[Any]) -> None:
+    worker.process.kill()
+    worker.process.join()
+    worker.connection.close()
 
 
-def _start(work: Work[Any, Any]) -> _Worker[Any]:
+def _start(work: Work[Any, Any], pickled: bytes) -> _Worker[Any]:
     """Start a worker; it inherits a mask that blocks signals until `serve` ignores them."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
-    process = context.Process(target=serve, args=(there, work), daemon=True)
+    memory = shared_memory(context)
+    process = context.Process(target=serve, args=(there, work, memory), daemon=True)
     try:
         with signals_blocked():
             process.start()
     finally:
         there.close()
-    return _Worker(process, here, time.monotonic() + START_LIMIT_S)
+    assert process.pid is not None
+    watch = Watch(process.pid, memory)
+    watch.begin(START_LIMIT_S, 1)
+    return _Worker(process, pickled, here, watch)
 
 
 def _cause(exit_code: int | None) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import traceback
 from multiprocessing.connection import Connection
@@ -12,18 +13,23 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 from tolstat.campaign.executors.common import Work
+from tolstat.common import progress_memory
 
 READY, RESULT, RAISED = "ready", "result", "raised"
 """Kinds of messages from a worker."""
+F_SETSIG = 10
+"""Command of Linux's fcntl that says which signal a file sends; the standard library has no name for it."""
 
-ORPHAN_GRACE_S = 10.0
-"""Time beyond the time limit after which a worker kills itself, s; a living parent kills it earlier."""
 
+def serve(connection: Connection, work: Work[Any, Any], memory: Any) -> None:
+    """Process blocks until the parent closes the pipe or ends; signals are ignored, the parent decides when to stop.
 
-def serve(connection: Connection, work: Work[Any, Any]) -> None:
-    """Process blocks until the parent closes the pipe or ends; signals are ignored, the parent decides when to stop."""
+    `memory`, shared with the parent, shows it that the worker makes progress, see `progress_memory`.
+    """
+    progress_memory.attach(memory)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
+    _kill_with_parent()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     work.prepare()
     connection.send((READY, None))
@@ -32,20 +38,7 @@ def serve(connection: Connection, work: Work[Any, Any]) -> None:
             block = connection.recv()
         except (EOFError, OSError):
             return
-        alarm(work.limit_s and work.limit_s + ORPHAN_GRACE_S)
-        message = _answer(work, block)
-        alarm(None)
-        connection.send(message)
-
-
-def alarm(seconds: float | None) -> None:
-    """Let the operating system kill this process after some time; None cancels the timer.
-
-    Compiled code blocks Python's threads and signal handlers, so a joint in an endless loop would outlive a parent
-    that was killed. The operating system's timer needs neither.
-    """
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, seconds or 0.0)
+        connection.send(_answer(work, block))
 
 
 def _answer(work: Work[Any, Any], block: Any) -> tuple[str, Any]:
@@ -60,7 +53,24 @@ def _answer(work: Work[Any, Any], block: Any) -> tuple[str, Any]:
         return RAISED, error
 
 
+def _kill_with_parent() -> None:
+    """Let the operating system kill this process when its parent ends (Linux).
+
+    Compiled code blocks Python's threads and signal handlers, so that a joint in an endless loop would outlive its
+    parent. The pipe that ends with the parent then sends a signal, which needs neither.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is None or not sys.platform.startswith("linux"):
+        return
+    import fcntl
+
+    fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(parent.sentinel, F_SETSIG, signal.SIGKILL)
+    fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, fcntl.fcntl(parent.sentinel, fcntl.F_GETFL) | os.O_ASYNC)
+
+
 def _end_with_parent() -> None:
+    """End this process when its parent ends, between two calls of compiled code."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

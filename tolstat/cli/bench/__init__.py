@@ -2,8 +2,12 @@
 
 from collections.abc import Callable
 
-from tolstat.cli.bench import cost, precision
+from tolstat.cli.bench import cost, coverage, precision
 
-INSTRUMENTS: dict[str, Callable[..., None]] = {"bench": cost.cost, "bench precision": precision.precision}
+INSTRUMENTS: dict[str, Callable[..., None]] = {
+    "bench": cost.cost,
+    "bench precision": precision.precision,
+    "bench coverage": coverage.coverage,
+}
 """Functions by the words that call them."""
 SEE_ALSO = f"Measurements, each with --help: {', '.join(f'tolstat {words}' for words in INSTRUMENTS)}."

@@ -78,10 +78,22 @@ def _names(ax: Axes, d: Dimensions, k: int, marked: Container[str]) -> None:
     ink.triad(ax, (d.end + 0.15 * d.R) * e, d.triads[k], FRONT, 0.25 * d.R, f"front.pin{k + 1}")
     if upright:
         at = place - np.sign(t[0]) * np.array([d.eye + 0.06 * d.R, 0.0])
+        if _is_short(d):
+            at += max(0.0, _beside(d) + 0.11 * d.R - d.R) * e
         ink.label(ax, at, f"arm {arm}", ha="right" if at[0] < 0 else "left")
     else:
         ink.label(ax, place + np.array([0.0, d.eye + 0.09 * d.R]), f"arm {arm}")
     _bushing(ax, d, k, upright, f"cross{k + 1}" in marked)
+
+
+def _is_short(d: Dimensions) -> bool:
+    """Whether there is no room for a name between hub and arm."""
+    return d.R - 0.5 * d.z - max(d.root, d.r_b) < 0.15 * d.R
+
+
+def _beside(d: Dimensions) -> float:
+    """Distance from O of the name of a bushing beside the arm, clear of the hub."""
+    return max(d.root, d.r_b) + 0.075 * d.R
 
 
 def _bushing(ax: Axes, d: Dimensions, k: int, upright: bool, marked: bool) -> None:
@@ -90,6 +102,8 @@ def _bushing(ax: Axes, d: Dimensions, k: int, upright: bool, marked: bool) -> No
     marker = FRONT.of(d.markers[k])
     free = 0.5 * d.neck + 0.07 * d.R if upright else max(0.5 * d.neck, d.root) + 0.03 * d.R
     far = 0.5 * (max(d.root, d.r_b) + d.R - 0.5 * d.z) if upright else max(d.root, d.r_b) + 0.06 * d.R
+    if upright and _is_short(d):
+        free, far = d.eye + 0.06 * d.R, _beside(d)
     at = far * e - free * t
     ink.line(ax, marker, at, lw=0.6, zorder=3.9)
     ink.bushing(ax, marker, f"cross{k + 1}", 0.045 * d.R, marked)

@@ -16,9 +16,9 @@ HEADS = (("e", "µm"), ("t", "µm"), ("z", "µm"), ("tilt t", "deg"), ("tilt z",
 WAYS = {"along_z": ALONG_Z, "along_t": ALONG_T}
 HEAD, FOOT, VIEW = 0.12, 0.1, 0.225
 """Shares of the drawing: height of head and foot, width of a view."""
-PLACES = (0.0, *np.linspace(0.27, 0.985, 6))
+PLACES = (0.0, 0.235, 0.375, 0.515, 0.7, 0.88, 1.0)
 """Places of names and numbers, relative to the width left for them."""
-SIZE = 7.6
+SIZE = 7.2
 
 
 def enlargement(pairs: Sequence[Pair], pin: float, z: float) -> float:
@@ -128,7 +128,7 @@ def _numbers(ax: Axes, pair: Pair) -> None:
 
 def _written(kind: str, value: float) -> str:
     if kind.startswith("tilt"):
-        number = f"{np.degrees(value):.2f}"
+        number = f"{np.degrees(value):.4f}"
     else:
         number = f"{1e6 * value:.{0 if abs(value) >= 1e-4 else 1}f}"
     return number.replace("-", "−") if float(number) else "0"

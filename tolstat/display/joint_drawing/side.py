@@ -131,7 +131,7 @@ def _names(ax: Axes, d: Dimensions, marked: Container[str], yoke: float, shaft: 
     marker, along = SIDE.of(d.markers[7]), SIDE.of(d.triads[7, 2])
     across = np.array([-along[1], along[0]])
     free = -1.0 if d.alpha >= 0.0 else 1.0  # side of the input axis that the output fork leaves free
-    places = [np.array([d.eye + 0.16 * d.R, free * row * d.R]) for row in (0.53, 0.7)]
+    places = [np.array([max(d.eye + 0.16 * d.R, d.root + 0.02 * d.R), free * row * d.R]) for row in (0.53, 0.7)]
     edge = yoke * along + 0.3 * free * min(d.arm[0], 2.0 * d.eye) * across
     _called(ax, edge, places[0], "arm 4, arm 3 behind", {}, d.R)
     _called(ax, marker, places[1], "fork4, fork3 behind", _look(marked, "fork3", "fork4"), d.R)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.joint import Joint, ideal, perturb
+from tolstat.joint import Joint, Operation, ideal, perturb
 from tolstat.joint.perturbation import PIN_TRIADS
 from tolstat.joint.rccc.closure import Pose, Side, close, forward, rates
 from tolstat.joint.rccc.constraints import Array, Lines
@@ -65,7 +65,13 @@ class Revolution(NamedTuple):
 
 
 def solve(
-    joint: Joint, errors: NDArray[np.void], theta: ArrayLike, *, input_pin: int = 3, output_pin: int = 1
+    joint: Joint,
+    operation: Operation,
+    errors: NDArray[np.void],
+    theta: ArrayLike,
+    *,
+    input_pin: int = 3,
+    output_pin: int = 1,
 ) -> Revolution:
     """Solve the RCCC linkage of one joint over input angles, quasi-statically.
 
@@ -73,8 +79,10 @@ def solve(
     ----------
     joint : Joint
         The nominal joint; only its ``cross.R`` is used.
+    operation : Operation
+        The operating point; its speed is not used.
     errors : ndarray, shape () or (1,), dtype ERROR
-        Errors and operating point (``operation.alpha`` and ``operation.torque``) of the joint: one row.
+        Errors of the joint: one row.
     theta : array_like, shape (k,)
         Input angles, rad.
     input_pin : {3, 4}
@@ -96,7 +104,7 @@ def solve(
         raise ValueError(
             f"pins {input_pin} and {output_pin} kept: keep pin 3 or 4 in the input fork, 1 or 2 in the output fork"
         )
-    row = perturb(joint, np.atleast_1d(errors))
+    row = perturb(joint, operation, np.atleast_1d(errors))
     if len(row) != 1:
         raise ValueError(f"errors holds {len(row)} joints: give one row")
     alpha, torque, radius = (float(row[name][0]) for name in ("alpha", "torque", "R"))

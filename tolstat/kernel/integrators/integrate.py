@@ -13,6 +13,7 @@ from tolstat.common.tables import Method
 from tolstat.kernel.integrators import bdf2, generalized_alpha, quadrature, trbdf2
 from tolstat.kernel.integrators.state import (
     AHEAD,
+    ALLOWED,
     ATTEMPTS_LEFT,
     CV_FACTORISED,
     FACTORISATIONS,
@@ -22,6 +23,7 @@ from tolstat.kernel.integrators.state import (
     LAST_ITERATION_BELOW,
     STAGED_STEP,
     STEPS,
+    UNLIMITED,
 )
 from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.kernel.simd.lane import where
@@ -43,7 +45,6 @@ bdf2_predict = bdf2.predict
 alpha_predict, alpha_accept = generalized_alpha.predict, generalized_alpha.accept
 tr_predict, keep_stage, embedded_error = trbdf2.predict, trbdf2.keep_stage, trbdf2.error
 quadrature_error = quadrature.error
-UNLIMITED = 2**62
 
 
 @njit
@@ -102,9 +103,9 @@ def next_substep_level(level, done, whole, error):
 
 @njit
 def reset(state):
-    """Clear memory and counters; keep only the last accepted point."""
+    """Clear memory and counters; keep only the last accepted point and the number of iterations allowed."""
     state.memory[:] = 0.0
-    state.counters[:] = 0
+    state.counters[:ALLOWED] = 0
     state.counters[ATTEMPTS_LEFT] = UNLIMITED
     for i in range(state.q.size):
         state.q1[i], state.v1[i], state.a1[i] = state.q0[i], state.v0[i], state.a0[i]
@@ -156,6 +157,8 @@ def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding
             if negligible == IF_STALLED and SLOW * before < now <= before / SLOW:
                 return True
             if not now < 1e300 or iteration == options.newton_max_iter:
+                break
+            if state.counters[ITERATIONS] >= state.counters[ALLOWED]:
                 break
             fresh = state.memory[CV_FACTORISED] != cv or (iteration > 0 and now > SLOW * before)
             last = now <= state.memory[LAST_ITERATION_BELOW] and not fresh

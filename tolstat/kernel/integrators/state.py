@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-STEPS, ITERATIONS, HALVINGS, FACTORISATIONS, ATTEMPTS_LEFT = 0, 1, 2, 3, 4
+STEPS, ITERATIONS, HALVINGS, FACTORISATIONS, ATTEMPTS_LEFT, ALLOWED = range(6)
+"""Indices into ``State.counters``; `ALLOWED` is the number of iterations at which Newton's iteration gives up."""
+UNLIMITED = 2**62
 H_OLD, CV_FACTORISED, AHEAD, STAGED_STEP, LAST_ITERATION_BELOW, TOLERANCE, FORCE, TORQUE = range(8)
 MEMORY = 8
 """Indices into ``State.memory``: last accepted step, s; cv of the tangent in use (0: none); whether `ahead` is used
@@ -29,7 +31,8 @@ class State(NamedTuple):
     weight: np.ndarray  # factors that make residuals dimensionless
     ahead: np.ndarray  # expected change of q in the next step, where a better prediction than a Taylor series is known
     memory: np.ndarray  # (8,) indices `H_OLD` to `TORQUE`
-    counters: np.ndarray  # (5,) steps, Newton iterations, halvings, factorisations, attempts at a step still allowed
+    counters: np.ndarray  # (6,) steps, Newton iterations, halvings, factorisations, attempts at a step still allowed,
+    # Newton iterations allowed
 
 
 def make_state(n: int) -> State:
@@ -37,18 +40,25 @@ def make_state(n: int) -> State:
     arrays = {name: np.zeros(shape, dtype) for name, (dtype, shape) in layout(n).items()}
     for name in State._fields[:13]:
         arrays[name][...] = np.nan
+    arrays["counters"][ALLOWED] = UNLIMITED
     return State(**arrays)
 
 
 def layout(n: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Type and shape of each array."""
     arrays: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(State._fields[:13], ("f8", (n,)))
-    return arrays | {"memory": ("f8", (MEMORY,)), "counters": ("i8", (5,))}
+    return arrays | {"memory": ("f8", (MEMORY,)), "counters": ("i8", (6,))}
 
 
-def make_state_record(n: int) -> np.record:
-    """Allocate the same arrays as one record: passing it counts no references, and its shapes are constants."""
-    state = np.zeros(1, [(name, *kind) for name, kind in layout(n).items()]).view(np.recarray)[0]
+def record_dtype(n: int) -> np.dtype[np.void]:
+    """Type of the record with the same arrays: passing it counts no references, and its shapes are constants."""
+    return np.dtype([(name, *kind) for name, kind in layout(n).items()])
+
+
+def make_state_record(n: int, memory: np.ndarray | None = None) -> np.record:
+    """Allocate the record, or lay it into `memory`, an array of `record_dtype`, shape (1,)."""
+    state = (np.zeros(1, record_dtype(n)) if memory is None else memory).view(np.recarray)[0]
     for name in State._fields[:13]:
         state[name][...] = np.nan
+    state["counters"][ALLOWED] = UNLIMITED
     return state

@@ -342,8 +342,8 @@ def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
             predict_increment(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
     if c % past.mesh.size == 0:
         point = motion.q0[:, lane], motion.v0[:, lane], motion.a0[:, lane]
-        spent, halved = int(control.iterations[lane]), turns.halved
-        status, goes_on = after_revolution(point, spent, par, options, samples, past, out)
+        halved = turns.halved
+        status, goes_on = after_revolution(point, par, options, samples, past, out)
         adapt_mesh(halved, par, options, motion.memory[:, lane], motion.weight[:, lane], past)
         if turns.beside == 1:
             c -= past.mesh.size

@@ -8,7 +8,7 @@ import math
 
 from tolstat.common.tables import STEPS_PER_ITERATION
 from tolstat.kernel.integrators.stability import fewest_steps
-from tolstat.kernel.integrators.state import FACTORISATIONS, ITERATIONS
+from tolstat.kernel.integrators.state import ALLOWED, FACTORISATIONS, ITERATIONS
 from tolstat.kernel.lanes.batch import empty, get_counters, put_joint, samples_of
 from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.mechanics.topology import N_DOF
@@ -73,12 +73,13 @@ def start_revolution(lane, par, options, batch):
 
 
 @njit
-def load_joint(lane, joint, rows, words, steps, options, alone, batch, samples, past, results):
+def load_joint(lane, joint, rows, words, steps, left, options, alone, batch, samples, past, results):
     """Put a joint into a lane, at its start; one outside the model ends at once. For the arguments see `explicit`."""
     work, state, _, _ = alone
     par, control, motion, out = rows[joint], batch.control, batch.motion, results[joint]
     clear_results(out)
     state.counters[:] = 0
+    state.counters[ALLOWED] = left[joint]
     if not inside_model(par):
         finish(OUTSIDE_MODEL, -1, options.steps_per_rev, options, state.counters, out)
         return
@@ -98,7 +99,13 @@ def load_joint(lane, joint, rows, words, steps, options, alone, batch, samples, 
 
 
 @njit
-def arrive(lane, par, lanes, options, alone, batch, samples, past, out):
+def spent(lane, control):
+    """Work of a lane's joint so far, in Newton iterations."""
+    return int(control.iterations[lane]) + int(control.steps[lane] + control.count[lane]) // STEPS_PER_ITERATION
+
+
+@njit
+def arrive(lane, par, lanes, left, options, alone, batch, samples, past, out):
     """Record the grid point that a lane has reached, decide after a revolution; return status and whether to go on."""
     control, motion, turns = batch.control, batch.motion, past.turns
     n, work = options.steps_per_rev, alone.work
@@ -106,6 +113,10 @@ def arrive(lane, par, lanes, options, alone, batch, samples, past, out):
     steps = steps_of(turns)
     k = int(control.count[lane]) // (steps // n)
     control.until[lane] = steps // n
+    if spent(lane, control) >= left:
+        control.steps[lane] += control.count[lane]
+        out.failed_step = k
+        return NEWTON_FAILED, False
     if turns.beside == 0:
         force = largest_at_an_end(lane, lanes[2])
         if not is_stable(force, point[0], turns):
@@ -122,8 +133,7 @@ def arrive(lane, par, lanes, options, alone, batch, samples, past, out):
     control.steps[lane] += steps
     if turns.beside == 0:
         write_peaks(lane, lanes[2], past.extremes[1])
-    spent = int(control.steps[lane]) // STEPS_PER_ITERATION
-    status, goes_on = after_revolution(point, spent, par, options, samples, past, out)
+    status, goes_on = after_revolution(point, par, options, samples, past, out)
     if goes_on:
         begin_revolution(point, steps, par, work, past)
         start_revolution(lane, par, options, batch)
@@ -131,9 +141,11 @@ def arrive(lane, par, lanes, options, alone, batch, samples, past, out):
 
 
 @njit
-def finish_joint(lane, status, options, alone, batch, blocks, results):
+def finish_joint(lane, status, left, options, alone, batch, blocks, results):
     """Write the results of a joint that has ended, and empty its lane; for the arguments see `explicit`."""
     joint, counters = batch.control.joint[lane], alone.state.counters
+    batch.control.count[lane] = 0.0  # is part of the steps by now
+    left[joint] -= spent(lane, batch.control)
     get_counters(lane, batch, counters)
     failed = max(1, results[joint].failed_step) if status == NEWTON_FAILED else -1
     finish(status, failed, steps_of(batch.pasts.turns[lane]), options, counters, results[joint])
@@ -144,7 +156,7 @@ def finish_joint(lane, status, options, alone, batch, blocks, results):
 
 
 @njit
-def explicit(rows, words, steps, options, alone, batch, samples, blocks, results):
+def explicit(rows, words, steps, left, options, alone, batch, samples, blocks, results, tally):
     """Simulate joints with equal numbers of contact stations; row i of the results is joint i.
 
     Parameters
@@ -155,6 +167,9 @@ def explicit(rows, words, steps, options, alone, batch, samples, blocks, results
         The same memory as doubles.
     steps : ndarray of int, shape (n,)
         Steps of the first revolution of each joint, multiples of ``options.steps_per_rev``, see `count_steps`.
+    left : ndarray of int, shape (n,)
+        Work still allowed to each joint, in Newton iterations; reduced by that done. A joint without any ends as
+        `NEWTON_FAILED`.
     options : Options
         Numerical settings, with ``max_refinements``; its tolerance plays no part.
     alone : Scratch
@@ -167,6 +182,8 @@ def explicit(rows, words, steps, options, alone, batch, samples, blocks, results
         Written unless empty: statistics of the last revolutions of every joint, revolution r at r modulo their number.
     results : ndarray of KERNEL_RESULT, shape (n,)
         Written.
+    tally : ndarray of int
+        Its first element is increased whenever a lane reaches a point of the output grid.
     """
     rows, words, samples, results = (
         without_refcount(rows),
@@ -175,6 +192,7 @@ def explicit(rows, words, steps, options, alone, batch, samples, blocks, results
         without_refcount(results),
     )
     blocks, steps = without_refcount(blocks), without_refcount(steps)
+    left, tally = without_refcount(left), without_refcount(tally)
     alone, batch = without_refcount(alone), without_refcount(batch)
     lanes = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.peaks)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
@@ -183,6 +201,7 @@ def explicit(rows, words, steps, options, alone, batch, samples, blocks, results
         put_joint(lane, words[0], batch)
         rest(lane, batch)
     while queued < len(rows) or any_of(control.live > 0):
+        tally[0] += 1
         arrived = bits_of(control.until <= 0)
         for lane in range(WIDTH):
             trail = Trail(pasts.modulus[lane], pasts.revolution[lane], pasts.notes[lane])
@@ -190,11 +209,11 @@ def explicit(rows, words, steps, options, alone, batch, samples, blocks, results
             if (arrived >> lane) & 1:
                 joint = at.joint[lane]
                 own, out = samples_of(lane, batch, samples), results[joint]
-                status, goes_on = arrive(lane, rows[joint], lanes, options, alone, batch, own, past, out)
+                status, goes_on = arrive(lane, rows[joint], lanes, left[joint], options, alone, batch, own, past, out)
                 if not goes_on:
-                    finish_joint(lane, status, options, alone, batch, blocks, results)
+                    finish_joint(lane, status, left, options, alone, batch, blocks, results)
             while queued < len(rows) and at.live[lane] == 0:
-                load_joint(lane, queued, rows, words, steps, options, alone, batch, samples, past, results)
+                load_joint(lane, queued, rows, words, steps, left, options, alone, batch, samples, past, results)
                 queued += 1
         fresh = control.fresh > 0
         if any_of(fresh):

@@ -9,6 +9,7 @@ of the result.
 """
 
 from tolstat.kernel.integrators.mesh import cells_of, load_error, parts_of
+from tolstat.kernel.integrators.state import ITERATIONS
 from tolstat.kernel.lanes.batch import (
     ANGLE,
     HOLD,
@@ -76,12 +77,12 @@ that wait stand still."""
 
 
 @njit
-def finish_joint(lane, status, rows, options, alone, batch, samples, results):
+def finish_joint(lane, status, rows, left, options, alone, batch, samples, results):
     """Continue a lane whose joint has ended, or whose step of a closer look has: next closer look, or results.
 
-    A joint that has not settled gets no closer look. A joint in which a step has failed is simulated again, alone; a
-    failed step of a closer look ends that look. `status` is that of the joint or step; for the other arguments see
-    `lockstep`.
+    A joint that has not settled gets no closer look. A joint in which a step has failed is simulated again, alone, with
+    the iterations that are left; a failed step of a closer look ends that look. `status` is that of the joint or step;
+    for the other arguments see `lockstep`.
     """
     _, state, ring, _ = alone
     control, joint, own = batch.control, batch.control.joint[lane], samples_of(lane, batch, samples)
@@ -105,15 +106,30 @@ def finish_joint(lane, status, rows, options, alone, batch, samples, results):
             return
         get_counters(lane, batch, state.counters)
         write_counters(status, options.steps_per_rev, state.counters, out)
+        left[joint] -= state.counters[ITERATIONS]
     else:
-        simulate_joint(par, options, alone, out)
+        left[joint] -= int(control.iterations[lane])
+        simulate_joint(par, options, left[joint], alone, out)
+        left[joint] -= state.counters[ITERATIONS]
         for s in range(own.size):
             own[s] = ring.samples[s]
     empty(lane, batch)
 
 
 @njit
-def finish_adaptive_joint(lane, status, options, alone, batch, blocks, results):
+def give_up(lane, left, options, alone, batch, results):
+    """Write how a joint without iterations left has ended, and empty its lane; for the arguments see `lockstep`."""
+    joint, k, counters = batch.control.joint[lane], batch.control.k[lane], alone.state.counters
+    if follows_error(options):
+        k = -(-k // cells_of(options.steps_per_rev))
+    get_counters(lane, batch, counters)
+    left[joint] -= counters[ITERATIONS]
+    finish(NEWTON_FAILED, max(1, k), options.steps_per_rev, options, counters, results[joint])
+    empty(lane, batch)
+
+
+@njit
+def finish_adaptive_joint(lane, status, left, options, alone, batch, blocks, results):
     """Write the results of a joint with error-controlled steps that has ended, and empty its lane.
 
     `status` is that of the joint; for the other arguments see `lockstep`.
@@ -121,6 +137,7 @@ def finish_adaptive_joint(lane, status, options, alone, batch, blocks, results):
     joint, counters = batch.control.joint[lane], alone.state.counters
     cells = cells_of(options.steps_per_rev)
     get_counters(lane, batch, counters)
+    left[joint] -= counters[ITERATIONS]
     failed = (batch.control.k[lane] + cells - 1) // cells if status == NEWTON_FAILED else -1
     finish(status, failed, parts_of(batch.pasts.mesh[lane]), options, counters, results[joint])
     for r in range(blocks.shape[1]):
@@ -165,7 +182,7 @@ def next_closeup_step(lane, k, par, options, alone, batch, samples, out):
 
 
 @njit
-def load_joint(lane, joint, rows, words, options, alone, batch, samples, results):
+def load_joint(lane, joint, rows, words, left, options, alone, batch, samples, results):
     """Put a joint into a lane and set up its start: equilibrium from the pose where all pins just touch, or ramp.
 
     A joint outside the model ends at once. For the arguments see `lockstep`.
@@ -174,9 +191,10 @@ def load_joint(lane, joint, rows, words, options, alone, batch, samples, results
     par, control, motion = rows[joint], batch.control, batch.motion
     clear_results(results[joint])
     control.joint[lane], control.phase[lane] = joint, HOLD
+    control.k[lane], control.iterations[lane] = 0, 0.0
     put_joint(lane, words[joint], batch)
     if not inside_model(par):
-        finish_joint(lane, NEWTON_FAILED, rows, options, alone, batch, samples, results)
+        finish_joint(lane, NEWTON_FAILED, rows, left, options, alone, batch, samples, results)
         return
     clear(par, state, samples_of(lane, batch, samples), batch.notes[lane])
     control.origin[lane], control.grid[lane] = 0.0, grid_step(par, options)
@@ -197,19 +215,19 @@ def load_joint(lane, joint, rows, words, options, alone, batch, samples, results
 
 
 @njit
-def fill(lane, queued, rows, words, options, alone, batch, samples, results):
+def fill(lane, queued, rows, words, left, options, alone, batch, samples, results):
     """Give an empty lane the next joint of the queue, if there is one; return how many have left the queue.
 
     `queued` is the number that had left it before; for the other arguments see `lockstep`.
     """
     while queued < len(rows) and batch.control.live[lane] == 0:
-        load_joint(lane, queued, rows, words, options, alone, batch, samples, results)
+        load_joint(lane, queued, rows, words, left, options, alone, batch, samples, results)
         queued += 1
     return queued
 
 
 @njit
-def lockstep(rows, words, options, patience, alone, batch, samples, blocks, results, tally):
+def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks, results, tally):
     """Simulate joints with equal numbers of contact stations; row i of the results is joint i.
 
     Parameters
@@ -218,6 +236,9 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
         The joints, n > 0.
     words : ndarray, shape (n, words)
         The same memory as doubles.
+    left : ndarray of int, shape (n,)
+        Newton iterations still allowed to each joint; reduced by those taken. A joint without any ends as
+        `NEWTON_FAILED`.
     options : Options
         Numerical settings; quasi-static, or dynamic with BDF2 or with error-controlled steps.
     patience : int
@@ -242,7 +263,7 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
         without_refcount(samples),
         without_refcount(results),
     )
-    blocks = without_refcount(blocks)
+    blocks, left, tally = without_refcount(blocks), without_refcount(left), without_refcount(tally)
     alone, batch = without_refcount(alone), without_refcount(batch)
     par, work, kept = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.kept)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
@@ -252,7 +273,7 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
     for lane in range(WIDTH):
         put_joint(lane, words[0], batch)
         empty(lane, batch)
-        queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)
+        queued = fill(lane, queued, rows, words, left, options, alone, batch, samples, results)
     while any_of(control.live > 0):
         if any_of(control.fresh > 0):
             begin(options, motion, control)
@@ -276,6 +297,10 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
             if (acting >> lane) & 1 == 0:
                 continue
             joint, phase, status = at.joint[lane], at.phase[lane], NOT_SETTLED
+            if at.iterations[lane] >= left[joint]:
+                give_up(lane, left, options, alone, batch, results)
+                queued = fill(lane, queued, rows, words, left, options, alone, batch, samples, results)
+                continue
             here, goes_on = samples_of(lane, batch, samples), True
             trail = Trail(pasts.modulus[lane], pasts.revolution[lane], pasts.notes[lane])
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
@@ -302,9 +327,9 @@ def lockstep(rows, words, options, patience, alone, batch, samples, blocks, resu
             if at.phase[lane] == PART and at.k[lane] == 0:
                 start_cells(lane, rows[joint], options, at, own, past)
             if not goes_on:
-                finish_adaptive_joint(lane, status, options, alone, batch, blocks, results)
+                finish_adaptive_joint(lane, status, left, options, alone, batch, blocks, results)
             elif status != NOT_SETTLED:
-                finish_joint(lane, status, rows, options, alone, batch, samples, results)
+                finish_joint(lane, status, rows, left, options, alone, batch, samples, results)
             else:
                 continue
-            queued = fill(lane, queued, rows, words, options, alone, batch, samples, results)
+            queued = fill(lane, queued, rows, words, left, options, alone, batch, samples, results)

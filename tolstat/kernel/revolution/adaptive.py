@@ -10,7 +10,7 @@ from tolstat.kernel.integrators.mesh import (
     refine_mesh,
     set_scale,
 )
-from tolstat.kernel.integrators.state import CV_FACTORISED, HALVINGS, ITERATIONS, STAGED_STEP, TOLERANCE
+from tolstat.kernel.integrators.state import CV_FACTORISED, HALVINGS, STAGED_STEP, TOLERANCE
 from tolstat.kernel.revolution.closeup import count_in
 from tolstat.kernel.revolution.resolve import (
     NEWTON_FAILED,
@@ -156,9 +156,8 @@ def build_resolve(newton, begin):
                 record(k, 0, True, par, work, state.v0, ring.samples)
                 predict_increment(k, state.q0, state.v0, state.ahead, ring.samples)
             if c % past.mesh.size == 0:
-                point, spent = (state.q0, state.v0, state.a0), state.counters[ITERATIONS]
-                halved = past.turns.halved
-                status, goes_on = after_revolution(point, spent, par, options, ring.samples, past, out)
+                point, halved = (state.q0, state.v0, state.a0), past.turns.halved
+                status, goes_on = after_revolution(point, par, options, ring.samples, past, out)
                 adapt_mesh(halved, par, options, state.memory, state.weight, past)
                 if past.turns.beside == 1:
                     c -= past.mesh.size

@@ -8,8 +8,7 @@ among the largest and smallest loads; the recorded samples stay as they are.
 
 import math
 
-from tolstat.kernel.integrators.integrate import UNLIMITED
-from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD
+from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD, UNLIMITED
 from tolstat.kernel.mechanics.loads import FORCES, INTERPOLATED, N_AVERAGED, N_LOADS, TORQUES
 from tolstat.kernel.revolution.settle import peak, record
 from tolstat.kernel.simd.jit import njit, njit_inner

@@ -57,8 +57,6 @@ BESIDE, ALIGNING = 16, 4
 to the direction that grows fastest. A joint limited to no more than `BESIDE` revolutions is not classified."""
 EXPONENT = 0.25
 """Magnitude of an exponent (per revolution) up to which it counts as zero."""
-MOST_ITERATIONS = 3_000_000
-"""Bound on the Newton iterations of a joint: half a minute of a core."""
 
 TURNS = np.dtype(
     [
@@ -318,15 +316,13 @@ def neighbour_done(q, v, a, par, options, turns):
 
 
 @njit
-def after_revolution(point, iterations, par, options, samples, past, out):
+def after_revolution(point, par, options, samples, past, out):
     """Decide how a joint continues after a revolution.
 
     Parameters
     ----------
     point : tuple of ndarray, shape (55,)
         q, v, a of the joint; exchanged for those of the neighbour, and back.
-    iterations : int
-        Newton iterations so far, or explicit steps in units of one.
     par, options
         Joint and settings.
     samples : ndarray of SAMPLE
@@ -350,8 +346,6 @@ def after_revolution(point, iterations, par, options, samples, past, out):
         if turns.revolution == turns.limit:
             return conclude_watch(options, trail, turns, out), False
         return NOT_SETTLED, True
-    if iterations > MOST_ITERATIONS:
-        return NEWTON_FAILED, False
     last = turns.revolution
     turns.revolution += 1
     own = keep_revolution(par, samples, past.extremes[1], trail, last)

@@ -8,7 +8,15 @@ import numpy as np
 from tolstat.common.tables import MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
 from tolstat.kernel.integrators import integrate
 from tolstat.kernel.integrators.mesh import parts_of
-from tolstat.kernel.integrators.state import AHEAD, FACTORISATIONS, HALVINGS, ITERATIONS, STEPS, make_state_record
+from tolstat.kernel.integrators.state import (
+    AHEAD,
+    ALLOWED,
+    FACTORISATIONS,
+    HALVINGS,
+    ITERATIONS,
+    STEPS,
+    make_state_record,
+)
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.guess import rigid_guess
 from tolstat.kernel.mechanics.ideal_loads import ideal_loads
@@ -273,7 +281,7 @@ def write_diagnostics(status, par, options, notes, samples, out):
 
 
 @njit
-def simulate_joint(par, options, alone, out):
+def simulate_joint(par, options, allowed, alone, out):
     """Simulate one joint.
 
     Parameters
@@ -282,6 +290,8 @@ def simulate_joint(par, options, alone, out):
         The joint.
     options : Options
         Numerical settings.
+    allowed : int
+        Newton iterations at which the joint is given up.
     alone : Scratch
         Work arrays; nothing is carried over from one joint to the next. The ring holds the last revolution.
     out : record of KERNEL_RESULT
@@ -290,6 +300,7 @@ def simulate_joint(par, options, alone, out):
     work, state, ring, past = alone
     clear_results(out)
     state.counters[:] = 0
+    state.counters[ALLOWED] = allowed
     controlled = follows_error(options)
     status = run(par, options, alone, out)
     failed = out.failed_step
@@ -302,6 +313,8 @@ def simulate_joint(par, options, alone, out):
         if status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1:
             look_closer(par, options, work, state, ring.samples, ring.fine, out)
     taken = parts_of(past.mesh) if controlled else options.steps_per_rev
+    if status in (OK, NOT_SETTLED, NOT_PERIODIC, NEWTON_FAILED) and state.counters[ITERATIONS] >= allowed:
+        status, failed, taken = NEWTON_FAILED, max(1, failed), options.steps_per_rev
     finish(status, failed, taken, options, state.counters, out)
 
 
@@ -314,6 +327,7 @@ class Scratch(NamedTuple):
     past: Past
 
 
-def make_scratch(options: Options) -> Scratch:
-    """Allocate the work arrays of a process."""
-    return Scratch(make_work(), make_state_record(N_DOF), make_ring(options.steps_per_rev), make_past(options))
+def make_scratch(options: Options, memory: np.ndarray | None = None) -> Scratch:
+    """Allocate the work arrays of a process; `memory`: place of the state, see `make_state_record`."""
+    state = make_state_record(N_DOF, memory)
+    return Scratch(make_work(), state, make_ring(options.steps_per_rev), make_past(options))

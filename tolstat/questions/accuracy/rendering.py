@@ -6,6 +6,7 @@ import numpy as np
 
 from tolstat.analysis.accuracy import FIDELITY, REFERENCE
 from tolstat.common.tables import Status
+from tolstat.display import text
 from tolstat.display.table import Column
 from tolstat.questions.accuracy.query import TOTAL, distribution
 from tolstat.store.verification import Verification
@@ -24,6 +25,15 @@ ERRORS = (
     Column("worst", lambda row: _small(row["worst"])),
 )
 """Columns of the table `query.distribution`."""
+
+
+LEAST = 1e-5
+"""Smallest error that is given as a number in per cent."""
+
+
+def in_percent(error: float) -> str:
+    """Format an error in per cent; below `LEAST` the number says no more than that it is small."""
+    return f"< {text.percent(LEAST)}" if error < LEAST else text.percent(error)
 
 
 def basis(verification: Verification) -> str:
@@ -48,9 +58,9 @@ def note(verification: Verification) -> str:
         if not np.isnan(worst)
     ]
     noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
-    text = f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}"
+    said = f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}"
     unknown = joints_without_error(verification)
-    return f"{text}; {unknown}" if unknown else text
+    return f"{said}; {unknown}" if unknown else said
 
 
 def joints_without_error(verification: Verification) -> str:

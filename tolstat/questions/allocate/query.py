@@ -4,24 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import allocation, reweight
-from tolstat.analysis.reweight import Weights
+from tolstat.analysis import allocation, prediction, reweight
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.analysis.reweight import Ratios
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.questions.allocate.ratios import DensityRatios, Entries
+from tolstat.store import error_budget
+from tolstat.store.several_loads import load_of
 from tolstat.store.view import View
 from tolstat.study import Study, axes, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
+from tolstat.study.tolerances.density_ratio import Exact
 
 EXAMPLE = 'write --target "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3
@@ -46,12 +51,15 @@ class Allocation(NamedTuple):
         One row per tolerance that may change: ``tolerance`` (pattern), ``errors`` (how many), ``unit``, ``before`` and
         ``proposed`` (half band, SI), ``factor``, ``cost_before``, ``cost``.
     limits : DataFrame
-        One row per limit, from joints that the search did not use: ``limit``, ``target``, ``before`` (share of all
-        joints as drawn), ``estimate``, ``lower``, ``upper`` (NaN if the weights are not usable), ``ess``.
+        One row per limit, and `ALL_LIMITS` for a joint above any of several (its target is NaN), from joints that the
+        search did not use: ``limit``, ``target``, ``before`` (share of all joints as drawn), ``estimate``, ``lower``,
+        ``upper`` (with the numerical error near the limit where ``numerical``, that is, where it is known),
+        ``next_lower``, ``next_upper`` (prediction interval for the joints above in the next delivery), ``ess``,
+        ``usable``. Numbers are NaN if not ``usable``.
     entries : dict
         Keys of the changed entries of ``[tolerances]`` by pattern.
-    weights : Weights
-        Weights of the joints of the final check.
+    ratios : Ratios
+        Density ratios of the joints of the final check.
     aim : str
         See `analysis.allocation.Choice`.
     joints_needed : float
@@ -62,27 +70,26 @@ class Allocation(NamedTuple):
     tolerances: pd.DataFrame
     limits: pd.DataFrame
     entries: Entries
-    weights: Weights
+    ratios: Ratios
     aim: str
     joints_needed: float
 
     @property
     def holds(self) -> bool:
-        """Whether the final check confirms the proposal: reliable weights, and all upper ends below the targets."""
-        return self.weights.usable and bool((self.limits["upper"] < self.limits["target"]).all())
+        """Whether the final check confirms the proposal: usable shares, and all upper ends below the targets."""
+        own = self.limits[self.limits["target"].notna()]
+        return bool((own["usable"] & (own["upper"] < own["target"])).all())
 
     @property
     def verdict(self) -> str:
         """Sentence on whether the proposal holds, or why it needs new runs."""
-        w = self.weights
-        figures = (
-            f"{len(w.values)} joints in the check count as {w.ess:.0f}; Pareto k {w.k:.2f}, {w.allowed:.2f} allowed"
-        )
+        figures = f"{len(self.ratios.values)} joints in the check count as {self.ratios.effective:.0f}"
         if self.holds:
             return f"holds: the upper ends of the intervals are below the targets ({figures})"
-        if not w.usable:
+        own = self.limits[self.limits["target"].notna()]
+        if not own["usable"].all():
             return f"needs new runs: the weights of the joints are unreliable ({figures})"
-        if (self.limits["estimate"] < self.limits["target"]).all():
+        if (own["estimate"] < own["target"]).all():
             joints = f"about {self.joints_needed:.0f} joints of the proposed study would show it"
             return f"needs new runs: expected to hold, {joints} ({figures})"
         return f"needs new runs: a step towards the targets; run the proposed study and allocate again ({figures})"
@@ -119,6 +126,7 @@ def allocated(
     cost_file: Path | None = None,
     keep: Sequence[str] = (),
     confidence: float = 0.95,
+    delivery: int = DELIVERY,
 ) -> Allocation:
     """Propose the cheapest tolerances that keep the limits.
 
@@ -135,6 +143,8 @@ def allocated(
         Names or patterns of errors whose tolerances stay as they are.
     confidence : float
         Confidence level of the intervals.
+    delivery : int
+        Number of joints of the next delivery.
 
     Returns
     -------
@@ -170,20 +180,29 @@ def allocated(
         for t, f in zip(request.tolerances, choice.factors, strict=True)
         if abs(f - 1) > MIN_CHANGE
     }
-    blocks = view.error_blocks(request.columns)
-    logs = np.concatenate(
-        [DensityRatios(view.study, request.tolerances, errors).of_entries(entries) for errors in blocks]
-    )
-    weights = reweight.smooth(logs[done[checked]])
-    table = _limits(request.statements, above, above[checked], weights, view.iid, confidence)
+    ratios = _check_ratios(view, request, entries, done[checked])
+    ends = [_ends_above(view, statement, done[checked]) for statement in request.statements]
+    table = _limits(request.statements, above, above[checked], ends, ratios, view.iid, confidence, delivery)
     growth = [
         allocation.joints_needed(share, ess, target, confidence)
-        for share, ess, target in table[["estimate", "ess", "target"]].to_numpy(float)
+        for share, ess, target in table[["estimate", "ess", "target"]].to_numpy(float)[: len(request.statements)]
     ]
-    needed = max(growth) * weights.ess
-    if not weights.usable:
-        table[["estimate", "lower", "upper"]] = np.nan
-    return Allocation(view.study, _tolerances(request, entries), table, entries, weights, choice.aim, needed)
+    needed = max(growth) * ratios.effective
+    table.loc[~table["usable"], ["estimate", "lower", "upper", "next_lower", "next_upper"]] = np.nan
+    return Allocation(view.study, _tolerances(request, entries), table, entries, ratios, choice.aim, needed)
+
+
+def _check_ratios(view: View, request: _Request, entries: Entries, samples: NDArray[np.intp]) -> Ratios:
+    """Density ratios of the joints of the check, for changed entries."""
+    logs = []
+    for errors in view.error_blocks(request.columns):
+        block = DensityRatios(view.study, request.tolerances, errors)
+        logs.append(block.of_entries(entries))
+    return _ratios(np.concatenate(logs)[samples], block.exact_of_entries(entries))
+
+
+def _ratios(logs: NDArray[np.float64], exact: Exact) -> Ratios:
+    return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
 
 
 def _check_joints(view: View) -> None:
@@ -203,8 +222,8 @@ def _read_request(view: View, limits: Sequence[str], cost_file: Path | None, kee
     statements: list[Statement] = []
     for text in limits:
         with gather(faults):
-            statements.append(rule.parse(text, "", "--target", EXAMPLE))
-            lacking = [name for name in statements[-1].loads if not selected_results.holds(view.columns, name)]
+            statements.append(rule.parse(text, "", "--target", EXAMPLE, view.limits))
+            lacking = [name for name in statements[-1].limit.loads if not selected_results.holds(view.columns, name)]
             if lacking:
                 kept = f"give one of: {', '.join(view.kept_loads)}"
                 faults.append(Fault("--target", f"the file does not keep {', '.join(lacking)}", kept))
@@ -233,9 +252,14 @@ def _read_request(view: View, limits: Sequence[str], cost_file: Path | None, kee
 
 def _above(view: View, statement: Statement) -> NDArray[np.bool_]:
     """Which joints are above the level in any load of a statement, or have no valid load, (n,)."""
-    loads = view.loads(statement.loads)
-    valid = np.all([load.is_valid for load in loads], axis=0)
-    return np.asarray(~valid | (np.max([load.values for load in loads], axis=0) > statement.level))
+    load = load_of(view, statement.limit)
+    return np.asarray(~load.is_valid | (load.values > statement.limit.level))
+
+
+def _ends_above(view: View, statement: Statement, samples: NDArray[np.intp]) -> list[NDArray[np.bool_]]:
+    """As `_above` with both ends of the numerical error near the limit, for some samples; empty if it is not known."""
+    ends = error_budget.near(view, load_of(view, statement.limit)) or ()
+    return [(~load.is_valid | (load.values > statement.limit.level))[samples] for load in ends]
 
 
 def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: NDArray[np.intp]) -> allocation.Choice:
@@ -245,6 +269,7 @@ def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: ND
     problem = allocation.Problem(
         log_ratios=ratios.log_ratios,
         log_spread=ratios.log_mean_square,
+        usable=lambda factors: _ratios(ratios.log_ratios(factors), ratios.exact(factors)).usable,
         above=above,
         targets=request.targets,
         cost=request.cost,
@@ -260,16 +285,39 @@ def _limits(
     statements: Sequence[Statement],
     above: NDArray[np.bool_],
     above_checked: NDArray[np.bool_],
-    weights: Weights,
+    ends: Sequence[Sequence[NDArray[np.bool_]]],
+    ratios: Ratios,
     iid: bool,
     confidence: float,
+    delivery: int,
 ) -> pd.DataFrame:
-    """Table `Allocation.limits`, from which joints are above each limit: all, and those of the check."""
+    """Table `Allocation.limits`.
+
+    `above`, `above_checked` and `ends` tell which joints are above each limit: all of them, those of the check, and
+    these with both ends of the numerical error.
+    """
+
+    def share(own: NDArray[np.bool_], confidence: float) -> reweight.Share:
+        sample = reweight.sort_out(own, np.full(own.size, Status.OK), ratios)
+        return reweight.share_above(sample, ratios, 0.5, confidence, iid)
+
+    columns: list[tuple[str, float, Any, list[Any], bool]] = [
+        (s.text, s.bound, above[:, i], [above_checked[:, i], *ends[i]], bool(ends[i])) for i, s in enumerate(statements)
+    ]
+    if len(statements) > 1:
+        known = all(ends)
+        worst = [np.any(parts, axis=0) for parts in zip(*ends, strict=True)] if known else []
+        columns.append((ALL_LIMITS, np.nan, np.any(above, 1), [np.any(above_checked, 1), *worst], known))
     rows = []
-    for i, statement in enumerate(statements):
-        found = reweight.share_above(above_checked[:, i], weights, 0.5, confidence, iid)
-        before = float(above[:, i].mean())
-        rows.append({"limit": statement.text, "target": statement.bound, "before": before, **found._asdict()})
+    for name, target, own, checked, known in columns:
+        found = [share(one, confidence) for one in checked]
+        wide = [share(one, prediction.half(confidence)) for one in checked]
+        row = {"limit": name, "target": target, "before": float(own.mean()), "estimate": found[0].estimate}
+        row |= {"lower": min(one.lower for one in found), "upper": max(one.upper for one in found)}
+        least, most = min(one.lower for one in wide), max(one.upper for one in wide)
+        following = prediction.of_share(least, most, delivery, confidence)
+        row |= dict(zip(("next_lower", "next_upper"), following, strict=True))
+        rows.append(row | {"ess": found[0].ess, "usable": found[0].support.usable, "numerical": known})
     return pd.DataFrame(rows)
 
 

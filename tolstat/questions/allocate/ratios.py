@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -14,7 +14,7 @@ from tolstat import sampling
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.study import Study
 from tolstat.study.scaling import Tolerance
-from tolstat.study.tolerances.density_ratio import log_mean_square, unbounded
+from tolstat.study.tolerances.density_ratio import Exact, exact, log_mean_square
 from tolstat.study.tolerances.distributions import Distribution, Normal
 from tolstat.study.tolerances.radial import Rayleigh
 
@@ -53,6 +53,19 @@ class DensityRatios:
             sum(len(t.names) * self._one_mean_square(i, float(factors[i])) for i, t in enumerate(self._tolerances))
         )
 
+    def exact(self, factors: FloatArray) -> Exact:
+        """Exact numbers of the ratio for tolerances scaled by factors."""
+        new = (self._scaled(i, float(f)) for i, f in enumerate(factors))
+        return self._exact(new)
+
+    def exact_of_entries(self, entries: Entries) -> Exact:
+        """Exact numbers of the ratio for changed entries."""
+        return self._exact(t.distribution(entries.get(t.pattern, t.entry)) for t in self._tolerances)
+
+    def _exact(self, new: Iterable[Distribution]) -> Exact:
+        each = zip(self._tolerances, new, self._old, strict=True)
+        return exact((own, old) for t, own, old in each for _ in t.names)
+
     def of_entries(self, entries: Entries) -> FloatArray:
         """Logarithms of the ratios for changed entries, (n,)."""
         new = [t.distribution(entries.get(t.pattern, t.entry)) for t in self._tolerances]
@@ -66,8 +79,12 @@ class DensityRatios:
 
     def _scaled(self, i: int, factor: float) -> Distribution:
         old, t = self._old[i], self._tolerances[i]
-        if isinstance(old, (Normal, Rayleigh)) and unbounded(old) and "mean" not in t.entry:
-            return replace(old, sigma=factor * old.sigma)  # as the scaled entry gives it, but without parsing
+        # as the scaled entry gives it, but without parsing
+        if isinstance(old, Normal):
+            mean = old.mean if t.fixed is None else t.fixed + factor * (old.mean - t.fixed)
+            return replace(old, mean=mean, sigma=factor * old.sigma)
+        if isinstance(old, Rayleigh) and old.upper is None:
+            return replace(old, sigma=factor * old.sigma)
         return t.distribution(t.scaled(factor))
 
     def _log_density(self, i: int, found: Distribution) -> FloatArray:

@@ -27,6 +27,8 @@ LIMITS = (
     Column("before", lambda row: text.percent(row["before"])),
     Column("proposed", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("ppm", lambda row: text.ppm(row["estimate"]), rank=2),
+    Column("above in delivery", text.delivery, rank=3),
     Column("counts as joints", lambda row: text.formed(row["ess"], ".0f"), rank=1),
 )
 """Columns of the table `Allocation.limits`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +11,10 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
-from tolstat.common.errors import Fault, StoreError
+from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.shown import shown
-from tolstat.common.tables import PINS, VALID
-from tolstat.joint import Bearing
+from tolstat.common.tables import LIFE_EXPONENT, PINS, VALID
+from tolstat.joint import Bearing, operating
 from tolstat.store.recorded import joint_of
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -22,6 +23,7 @@ JOINT = "joint"
 PLACES = (*PINS, JOINT)
 """Bearings, named by their pins, and the joint: it lasts until the first of its four bearings fails."""
 HOUR = 3600.0
+FIELDS = ("equivalent_load",)
 
 
 @shown
@@ -35,8 +37,10 @@ class Lives:
         Name of the study.
     bearing : Bearing
         Section ``[bearing]`` of the joint.
+    duty : dict of str to float
+        Share of the service time at each operating point; their sum is 1.
     loads : ndarray, shape (n, 4)
-        Dynamic equivalent load of each pin's bearing, N; NaN without a result.
+        Dynamic equivalent load of each pin's bearing over the duty cycle, N; NaN without a result.
     hours : ndarray, shape (n, 5)
         Life of each bearing and of the joint, as in `PLACES`, h; NaN without a result or without a rating.
     nominal_loads, nominal_hours : ndarray, shape (4,) and (5,)
@@ -55,6 +59,7 @@ class Lives:
 
     name: str
     bearing: Bearing
+    duty: Mapping[str, float]
     loads: FloatArray
     hours: FloatArray
     nominal_loads: FloatArray
@@ -106,12 +111,15 @@ def lives_of(view: View) -> Lives:
     Parameters
     ----------
     view : View
-        Joints drawn from tolerances, of a study whose joint has a section ``[bearing]``.
+        Joints drawn from tolerances, of a study whose joint has a section ``[bearing]``; its operating points are a
+        duty cycle.
 
     Raises
     ------
     StoreError
         When the joint has no such section, the equivalent loads are not kept, or the joints are no sample.
+    InputError
+        When the view has several operating points, and the study does not give their shares of the time.
     """
     view.check_sample()
     bearing = bearing_of(view)
@@ -124,18 +132,27 @@ def lives_of(view: View) -> Lives:
     if not keeps_loads(view):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise StoreError(str(Fault(str(view.path), "does not keep the equivalent loads of the bearings", remedy)))
-    loads = view.read_results(("equivalent_load",))["equivalent_load"]
-    operation = view.errors(np.arange(view.n), ("operation.alpha", "operation.speed"))
+    duty = duty_of(view)
+    samples = np.arange(view.n)
+    operation = [
+        operating(
+            part.store.operation, part.errors(samples, ("operation.alpha", "operation.speed", "operation.torque"))
+        )
+        for part in view.parts
+    ]
+    loads, hours = _lives(duty, [_loads(part.read_results(FIELDS)) for part in view.parts], operation, bearing)
+    unrated = np.isin(view.status, VALID) & _unrated(operation, bearing)
     nominal_loads, nominal_hours = np.full(len(PINS), np.nan), np.full(len(PLACES), np.nan)
     if len(view.nominal):
-        nominal_loads = view.nominal["equivalent_load"][0]
-        nominal_hours = _hours(view.nominal["equivalent_load"], view.store.errors(slice(0, 1)), bearing)[0]
-    unrated = np.isin(view.status, VALID) & _unrated(operation, bearing)
+        operation = [operating(part.store.operation, part.store.errors(slice(0, 1))) for part in view.parts]
+        found = _lives(duty, [_loads(part.nominal) for part in view.parts], operation, bearing)
+        nominal_loads, nominal_hours = found[0][0], found[1][0]
     return Lives(
         name=view.name,
         bearing=bearing,
+        duty=dict(zip(view.points, duty, strict=True)),
         loads=loads,
-        hours=_hours(loads, operation, bearing),
+        hours=hours,
         nominal_loads=nominal_loads,
         nominal_hours=nominal_hours,
         unrated=int(unrated.sum()),
@@ -146,19 +163,66 @@ def lives_of(view: View) -> Lives:
     )
 
 
-def _unrated(operation: NDArray[np.void], bearing: Bearing) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(operation["operation.alpha"]) < bearing.critical_amplitude * (1.0 - 1e-9))
+def duty_of(view: View) -> list[float]:
+    """Share of the service time at each operating point of a view; their sum is 1.
+
+    Raises
+    ------
+    InputError
+        When the study does not give the shares.
+    """
+    shares = [view.store.points[name].share for name in view.points] if len(view.parts) > 1 else [1.0]
+    if np.isnan(shares).any():
+        remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
+        remedy += f"; or look at one point: --point {view.points[0]}"
+        raise InputError([Fault(str(view.path), "has operating points without a share of the time", remedy)])
+    return [share / sum(shares) for share in shares]
 
 
-def _hours(loads: FloatArray, operation: NDArray[np.void], bearing: Bearing) -> FloatArray:
-    """Lives of bearings and joint, (m, 5), h, from equivalent loads (m, 4) and a table with the columns of ERROR."""
-    turns = turns_per_revolution(operation["operation.alpha"])
-    hourly = np.abs(operation["operation.speed"]) / (2.0 * np.pi) * turns * HOUR
-    with np.errstate(divide="ignore"):
-        pins = bearing.factor * basic_life(loads, bearing.C) / hourly[:, None]
+def _loads(results: NDArray[np.void]) -> FloatArray:
+    return np.asarray(results["equivalent_load"])
+
+
+def _unrated(operation: Sequence[Mapping[str, FloatArray]], bearing: Bearing) -> NDArray[np.bool_]:
+    """Whether a joint swings too little for a rating, at one operating point at least, (m,)."""
+    least = np.min([np.abs(own["alpha"]) for own in operation], axis=0)
+    return np.asarray(least < bearing.critical_amplitude * (1.0 - 1e-9))
+
+
+def _lives(
+    duty: Sequence[float], loads: Sequence[FloatArray], operation: Sequence[Mapping[str, FloatArray]], bearing: Bearing
+) -> tuple[FloatArray, FloatArray]:
+    """Equivalent loads, (m, 4), N, and lives of bearings and joint, (m, 5), h, over a duty cycle.
+
+    Operating points count by the turns that the bearings make there (Palmgren 1924, Miner 1945; ISO 281).
+
+    Parameters
+    ----------
+    duty : sequence of float
+        Share of the time at each operating point; the sum is 1.
+    loads : sequence of ndarray, shape (m, 4)
+        Equivalent loads at each point, N.
+    operation : sequence of mapping
+        ``alpha`` (rad) and ``speed`` (rad/s) of the joints at each point, (m,).
+    bearing : Bearing
+        The bearings.
+    """
+    hourly = np.stack(
+        [
+            share * np.abs(own["speed"]) / (2.0 * np.pi) * turns_per_revolution(own["alpha"]) * HOUR
+            for share, own in zip(duty, operation, strict=True)
+        ]
+    )
+    turns = hourly.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weights = np.where(turns > 0.0, hourly / turns, np.array(duty)[:, None])[:, :, None]
+        largest = np.maximum.reduce(loads)
+        relative = np.where(largest > 0.0, np.stack(loads) / largest, 0.0 * np.stack(loads))
+        load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
+        pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
     hours = np.column_stack([pins, system_life(pins)])
     hours[_unrated(operation, bearing)] = np.nan
-    return hours
+    return load, hours
 
 
 def load_error(view: View) -> float:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from tolstat.common.tables import LIFE_EXPONENT, PINS, Mode
 from tolstat.display import text
-from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, keeps_loads, lives_of
+from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, duty_of, keeps_loads, lives_of
 from tolstat.store.error_budget import total_interval
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -122,6 +122,8 @@ def _with_error(rate: SampleLoad, error: float) -> tuple[SampleLoad, SampleLoad]
 def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
     """Share of the joints in which a bearing is mostly loaded at one end, at opposite ends, or along its length.
 
+    Of several operating points each counts by its share of the revolutions.
+
     Returns
     -------
     DataFrame
@@ -131,7 +133,11 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
     """
     if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
         return pd.DataFrame()
-    spent = view.read_results(("mode_share",))["mode_share"]
+    times = duty_of(view)
+    turns = [share * abs(part.store.operation.speed) for share, part in zip(times, view.parts, strict=True)]
+    weights = [own / sum(turns) for own in turns] if any(turns) else times
+    modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
+    spent = np.tensordot(weights, np.stack(modes), 1)
     rows = []
     for place in (*PINS, ANY):
         own = spent[:, [PINS.index(place)]] if place in PINS else spent

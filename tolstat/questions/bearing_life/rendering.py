@@ -165,6 +165,9 @@ def notes(lives: Lives, contacts: pd.DataFrame) -> list[str]:
             f"{text.number(bearing.C / 1e3)} kN, {factors}) at the joint's speed and misalignment; all four: until the "
             "first of the four bearings fails, Weibull slope 9/8"
         )
+    if len(lives.duty) > 1:
+        shares = ", ".join(f"{text.percent(share)} at {point}" for point, share in lives.duty.items())
+        lines.append(f"over a duty cycle: {shares} of the time; P: the constant load with the same life")
     edge = "the rating knows no edge load: it takes the resultant force as spread along the needles"
     if len(contacts):
         any_ = contacts.iloc[-1]

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from tolstat.analysis import capability, exceedance, extreme
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
 from tolstat.store import error_budget
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
-TOGETHER = "all limits"
 NOT_NORMAL = 0.01
 """p-value of the test of normality below which no index of a normal load is given."""
-NO_TAIL = 0.05
-"""p-value of the test of the fit below which a tail is not extrapolated."""
 
 
-def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
+def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
     """Capability against each limit, and against all limits together.
 
     Parameters
@@ -31,6 +28,8 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         A campaign of a study with limits.
     confidence : float
         Confidence level of the intervals.
+    delivery : int
+        Number of joints of the next delivery.
 
     Returns
     -------
@@ -38,23 +37,22 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         One row per limit: ``load``, ``unit``, ``limit``, ``n``, ``n_failed``, ``n_unsettled``, ``count`` (above);
         ``good`` and ``ppm`` with ``_lower`` and ``_upper``, total intervals: they cover sampling, unresolved joints
         and, if known, the numerical error; ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``,
-        ``needed``. The last row, `TOGETHER`, is for the largest ratio of load to limit of each joint. ``cpk_normal``
-        is NaN where the load is not normal (``normal_p`` below `NOT_NORMAL`), both indices where unresolved joints
-        matter (`analysis.exceedance.unresolved_matter`).
+        ``needed``; ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the
+        delivery. The last row, `ALL_LIMITS`, is for the largest ratio of load to limit of each joint. ``cpk_normal`` is
+        NaN where the load is not normal (``normal_p`` below `NOT_NORMAL`), both indices where unresolved joints matter
+        (`analysis.exceedance.unresolved_matter`).
     """
-    loads = view.loads(list(view.limits))
-    ends = [error_budget.shifted(view, load) for load in loads]
-    known = [pair for pair in ends if pair is not None]
-    whole = (_largest([low for low, _ in known]), _largest([high for _, high in known])) if all(ends) else None
     rows = []
-    for load, pair in zip([*loads, _largest(loads)], [*ends, whole], strict=True):
+    for load in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
         assert load.limit is not None
+        pair = error_budget.shifted(view, load)
         c = capability.of_sample(load.sample, load.limit, confidence, view.iid)
         row = {"load": load.name, "unit": load.unit, "limit": load.limit, "n": c.above.n}
         row |= {key: getattr(c.above, key) for key in ("n_failed", "n_unsettled", "count")}
         low, high = error_budget.total_interval(load, pair, load.limit, confidence)
         row |= {"good": 1.0 - c.above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
         row |= {"ppm": 1e6 * c.above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
+        row |= error_budget.delivery(load, pair, load.limit, delivery, confidence)
         names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
         row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
         if exceedance.unresolved_matter(c.above.count, c.above.n, c.above.n_failed + c.above.n_unsettled):
@@ -63,16 +61,6 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
             row |= dict.fromkeys(names[3:], np.nan)
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _largest(loads: Sequence[SampleLoad]) -> SampleLoad:
-    """Largest ratio of load to limit of each joint, with the limit 1; computed load by load to save memory."""
-    parts = [load.of_limit() for load in loads]
-    ends = (np.maximum.reduce([part.ends[k] for part in parts]) for k in (0, 1))
-    largest = np.maximum.reduce([part.values for part in parts])
-    return replace(
-        parts[0], name=TOGETHER, nominal=max(part.nominal for part in parts), values=largest, ends=tuple(ends)
-    )
 
 
 def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidence: float = 0.95) -> pd.DataFrame:
@@ -94,8 +82,8 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
     DataFrame
         One row per load and N: ``load``, ``unit``, ``one_in``, ``estimate``, ``lower``, ``upper``, ``bound_lower`` and
         ``bound_upper`` (unresolved joints counted below, above), ``fleet``, ``fleet_lower``, ``fleet_upper``,
-        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``. SI units. Loads and shape
-        are NaN where the tail is not generalised Pareto (``p`` below `NO_TAIL`).
+        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``, ``refusal`` (why the
+        tail is not extrapolated, see `extreme.Tail`; else empty). SI units. Loads and shape are NaN where it is not.
 
     Raises
     ------
@@ -112,9 +100,9 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
             row["bound_lower"], row["bound_upper"] = tail.bounds(1.0 / number)
             row |= dict(zip(("fleet", "fleet_lower", "fleet_upper"), tail.largest(int(number)), strict=True))
             row |= dict(zip(("shape", "shape_lower", "shape_upper"), tail.shape, strict=True))
-            if tail.p < NO_TAIL:
+            if tail.refusal:
                 row |= dict.fromkeys(list(row)[3:], np.nan)
-            rows.append({**row, "p": tail.p, "n_above": tail.n_above})
+            rows.append({**row, "p": tail.p, "n_above": tail.n_above, "refusal": tail.refusal})
     return pd.DataFrame(rows)
 
 

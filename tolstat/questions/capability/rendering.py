@@ -8,9 +8,10 @@ from typing import NamedTuple
 import pandas as pd
 
 from tolstat.analysis import exceedance
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
 from tolstat.display.table import Column, Row
-from tolstat.questions.capability.query import NO_TAIL, NOT_NORMAL, TOGETHER
+from tolstat.questions.capability.query import NOT_NORMAL
 
 
 def _with_ends(row: Row, key: str, form: str) -> str:
@@ -19,12 +20,13 @@ def _with_ends(row: Row, key: str, form: str) -> str:
 
 LIMITS = (
     Column("load", lambda row: str(row["load"])),
-    Column("limit", lambda row: "-" if row["load"] == TOGETHER else text.value(row["limit"], row["unit"])),
+    Column("limit", lambda row: "-" if row["load"] == ALL_LIMITS else text.value(row["limit"], row["unit"])),
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("yield", lambda row: text.percent(row["good"])),
     Column("total interval", lambda row: text.span(row["good_lower"], row["good_upper"])),
     Column("ppm", lambda row: text.number(row["ppm"]), rank=1),
     Column("interval of ppm", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1"), rank=2),
+    Column("above in delivery", text.delivery, rank=3),
     Column("Cpk", lambda row: text.formed(row["cpk"], ".2f")),
     Column("interval of Cpk", lambda row: _with_ends(row, "cpk", ".2f")),
     Column("Cpk if normal", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),
@@ -103,7 +105,6 @@ def note(table: pd.DataFrame) -> str:
 
 def no_tail(table: pd.DataFrame) -> str:
     """Sentence on the loads of `query.returns` whose tail cannot be extrapolated; empty if there are none."""
-    names = list(dict.fromkeys(table["load"][table["p"] < NO_TAIL]))
-    if not names:
-        return ""
-    return f"{', '.join(names)}: the tail is not generalised Pareto (p < {NO_TAIL:g}) and is not extrapolated"
+    refused = table[table["refusal"] != ""].drop_duplicates("load")
+    parts = [f"{', '.join(rows['load'])}: {reason}" for reason, rows in refused.groupby("refusal", sort=False)]
+    return f"{'; '.join(parts)}: not extrapolated" if parts else ""

@@ -55,6 +55,11 @@ def _has(name: str) -> Callable[[pd.DataFrame], bool]:
     return lambda table: bool(table[name].notna().any())
 
 
+def heading(causes: Causes) -> str:
+    """Line above the table where another one stands before it: what the shares are of."""
+    return f"scatter of {causes.load} over all joints, not of exceeding the limit; by error:"
+
+
 def note(causes: Causes, log: bool = False) -> str:
     """Notes to the table: number of joints, explained variance, restrictions."""
     unit = unit_text(causes.unit)
@@ -97,17 +102,19 @@ def worst_columns(tail: Tail) -> list[Column]:
     return [
         Column("row", lambda row: str(row["row"])),
         Column(f"{tail.by}{unit}", lambda row: f"{row['value']:.6g}"),
+        *([Column("at", lambda row: str(row["point"]), words=True)] if any(j.point for j in tail.joints) else []),
         Column("status", lambda row: str(row["status"]), words=True),
         *(error(place) for place in range(ERRORS)),
     ]
 
 
 def worst_rows(tail: Tail) -> pd.DataFrame:
-    """One row per joint: ``row``, ``value``, ``status``, and its `ERRORS` largest errors in words, a list."""
+    """One row per joint: ``row``, ``value``, ``point``, ``status``, and its `ERRORS` largest errors in words."""
     return pd.DataFrame(
         {
             "row": [joint.row for joint in tail.joints],
             "value": [joint.value for joint in tail.joints],
+            "point": [joint.point for joint in tail.joints],
             "status": [joint.status.label for joint in tail.joints],
             "errors": [
                 [f"{name} {z:+.2f}" for name, z in list(joint.scores.items())[:ERRORS]] for joint in tail.joints

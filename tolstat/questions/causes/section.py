@@ -16,7 +16,7 @@ from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.display.table import as_block
-from tolstat.questions.causes import angles_figure, rendering, tail_section
+from tolstat.questions.causes import angles_figure, pairs_section, rendering, tail_section
 from tolstat.questions.causes.angles import AgainstAngle, against_angle
 from tolstat.questions.causes.query import Causes, causes_of
 from tolstat.store.view import View
@@ -29,14 +29,14 @@ ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
-    """Sections ``causes`` and ``worst`` of the leading loads; none for a sweep or without a valid joint.
+    """Sections ``pairs``, ``causes`` and ``worst`` of the leading loads; none for a sweep or without a valid joint.
 
     The causes of a load with a long tail are those of its logarithm. What cannot be evaluated is left out, and a note
     says why.
     """
     if view.method == "sweep" or not view.count(*VALID):
         return []
-    made: list[Section] = []
+    made = pairs_section.sections(view, asked)
     with asked.noting("causes and worst joints are left out"):
         logarithmic = frozenset(load.name for load in view.loads(view.leading) if load.long_tailed)
         is_design = bool(view.study.groups)
@@ -112,7 +112,7 @@ def _tornado_panel(causes: Causes, quantity: str) -> Panel:
     part = causes.table.head(SHOWN)
     top = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in part.head(5).to_dict("records"))
     return Panel(
-        f"tornado-{causes.load.replace('.', '-')}",
+        f"tornado-{causes.load}",
         f"{quantity}: share of the variance by error",
         f"Largest first-order indices: {top}; all errors alone {100 * causes.additive:.0f} %",
         partial(_tornado, causes=causes, quantity=quantity),
@@ -144,7 +144,7 @@ def _tornado(ax: Axes, causes: Causes, quantity: str) -> None:
 
 
 def _angle_panels(angle: AgainstAngle, quantity: str) -> list[Panel]:
-    key, unit = angle.load.replace(".", "-"), unit_text(angle.unit)
+    key, unit = angle.load, unit_text(angle.unit)
     middle = angle.spread[1]
     loads = Panel(
         f"angle-{key}",

@@ -29,6 +29,8 @@ class TailJoint(NamedTuple):
         The load, SI.
     status : Status
         Its status; the load of a joint that is not settled is that of the recorded revolution.
+    point : str
+        Operating point with the largest value; empty where there is one only.
     scores : dict of str to float
         Each error that scatters, in sigma (`sampling.normal_scores`), in descending order of the modulus.
     """
@@ -36,6 +38,7 @@ class TailJoint(NamedTuple):
     row: int
     value: float
     status: Status
+    point: str
     scores: dict[str, float]
 
 
@@ -67,7 +70,8 @@ def worst_joints(view: View, by: str, n: int = 10) -> Tail:
     view : View
         A campaign.
     by : str
-        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or a column of the results.
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or a column of the results; of some
+        operating points ``cross1.F at cruise``.
     n : int
         Maximum number of joints.
 
@@ -84,13 +88,25 @@ def worst_joints(view: View, by: str, n: int = 10) -> Tail:
     StoreError
         When the study is not that of the file.
     """
-    values, unit = _values(view, by)
-    samples = np.flatnonzero(np.isin(view.status, SIMULATED) & np.isfinite(values))
+    narrowed, name = view.narrowed(by)
+    values, unit = _values(narrowed, name)
+    samples = np.flatnonzero(np.isin(narrowed.status, SIMULATED) & np.isfinite(values))
     samples = samples[np.argsort(-values[samples], kind="stable")][:n]
-    return Tail(by, unit, samples, _with_errors(view, samples, values[samples]))
+    points = _points(narrowed, name, samples)
+    return Tail(by, unit, samples, _with_errors(narrowed, samples, values[samples], points))
 
 
-def _with_errors(view: View, samples: NDArray[np.intp], values: NDArray[np.float64]) -> list[TailJoint]:
+def _points(view: View, by: str, samples: NDArray[np.intp]) -> list[str]:
+    """Operating point with the largest value in each joint; a load, unless there is one point only."""
+    if len(view.parts) == 1:
+        return [view.points[0]] * len(samples)
+    each = np.stack([LOADS[by].of(part.results)[samples] for part in view.parts])
+    return [view.points[k] for k in np.argmax(each, axis=0)]
+
+
+def _with_errors(
+    view: View, samples: NDArray[np.intp], values: NDArray[np.float64], points: list[str]
+) -> list[TailJoint]:
     """Combine the values of joints with their errors."""
     ascending, place = np.unique(samples, return_inverse=True)
     errors = view.errors(ascending, sampling.columns(view.study))[place]
@@ -99,7 +115,7 @@ def _with_errors(view: View, samples: NDArray[np.intp], values: NDArray[np.float
     for i, row in enumerate(view.rows(samples).tolist()):
         own = {name: float(z[i]) for name, z in scores.items()}
         ordered = dict(sorted(own.items(), key=lambda item: -abs(item[1])))
-        joints.append(TailJoint(row, float(values[i]), Status(view.status[samples[i]]), ordered))
+        joints.append(TailJoint(row, float(values[i]), Status(view.status[samples[i]]), points[i], ordered))
     return joints
 
 

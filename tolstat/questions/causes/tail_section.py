@@ -73,7 +73,8 @@ def section(view: View, loads: Sequence[str], against: Sequence[AgainstAngle], h
     ]
     blocks: list[Block] = [Panels(panels)] if panels else []
     blocks += [_table(tail) for tail in tails]
-    blocks.append(Text("To simulate one of them again: tolstat replay FILE --row ROW --out trace.csv", small=True))
+    at = " --point POINT" if len(view.points) > 1 else ""
+    blocks.append(Text(f"To simulate one of them again: tolstat replay FILE --row ROW{at} --out trace.csv", small=True))
     return Section("worst", "The worst joints", blocks)
 
 
@@ -81,9 +82,11 @@ def _table(tail: Tail) -> Table:
     rows = []
     for joint in tail.joints:
         errors = ",  ".join(f"{name} {z:+.1f} σ" for name, z in list(joint.scores.items())[:ERRORS])
-        rows.append([str(joint.row), text.value(joint.value, tail.unit), joint.status.label, errors])
-    head = ["row", tail.by, "status", "largest errors, in standard deviations"]
-    return Table(f"Largest {tail.by}", head, rows, frozenset({0, 2, 3}))
+        point = [joint.point] if joint.point else []
+        rows.append([str(joint.row), text.value(joint.value, tail.unit), *point, joint.status.label, errors])
+    at = ["at"] if any(joint.point for joint in tail.joints) else []
+    head = ["row", tail.by, *at, "status", "largest errors, in standard deviations"]
+    return Table(f"Largest {tail.by}", head, rows, frozenset({0, *range(2, len(head))}))
 
 
 def _histories(view: View, tail: Tail, against: Sequence[AgainstAngle]) -> _Histories:
@@ -97,7 +100,7 @@ def _history_panel(found: _Histories) -> Panel:
     tail = found.tail
     rows = ", ".join(f"row {joint.row} up to {text.value(joint.value, tail.unit)}" for joint in tail.joints[:DRAWN])
     return Panel(
-        f"worst-{tail.by.replace('.', '-')}",
+        f"worst-{tail.by}",
         f"{tail.by} of the worst joints over the revolution",
         f"Histories of the worst joints: {rows}",
         partial(_draw, found=found),

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from tolstat.analysis import difference
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.store.counts import Counts
 from tolstat.store.sample_load import SampleLoad
+from tolstat.store.several_loads import together
 from tolstat.store.view import DRAWN, View
 
 SHARES = (0.5, 0.9, 0.99)
@@ -108,7 +110,8 @@ class Comparison(NamedTuple):
     changes : list of Change
         What differs between the studies.
     shares : DataFrame
-        One row per limit of either study: ``load``, ``unit``, ``level`` (SI), fields of `difference.ShareDifference`.
+        One row per limit of either study, and `ALL_LIMITS` if both have some (each side against its own): ``load``,
+        ``unit``, ``level`` (SI), fields of `difference.ShareDifference`.
     loads : DataFrame
         One row per load and ``statistic`` (``mean``, ``50 %`` ...): ``load``, ``unit``, ``statistic``, then the fields
         of `analysis.difference.Difference`.
@@ -167,6 +170,7 @@ def compared(a: View, b: View, by: Sequence[str] = (), confidence: float = 0.95)
     sides = _sides(a, b)
     try:
         shares = [_share(sides, name, level, confidence) for name, level in limits]
+        shares += [_together(sides, confidence)] if a.limits and b.limits else []
         loads = [row for name in names for row in _load(sides, name, confidence)]
     except ValueError as error:
         raise StoreError(str(Fault(f"{a.path}, {b.path}", str(error), "resume both campaigns"))) from error
@@ -234,6 +238,14 @@ def _share(sides: Sides, name: str, level: float, confidence: float) -> dict[str
     found = difference.shares(a, b, [level], sides.paired, confidence, sides.iid)
     values = {key: value if key == "n" else value[0] for key, value in found._asdict().items()}
     return {"load": name, "unit": unit, "level": level, **values}
+
+
+def _together(sides: Sides, confidence: float) -> dict[str, object]:
+    """Joints above any limit of their own study: one less the yields."""
+    a, b = (together(side.view).only(side.samples).valid_or_nan for side in (sides.a, sides.b))
+    found = difference.shares(a, b, [1.0], sides.paired, confidence, sides.iid)
+    values = {key: value if key == "n" else value[0] for key, value in found._asdict().items()}
+    return {"load": ALL_LIMITS, "unit": "1", "level": 1.0, **values}
 
 
 def _load(sides: Sides, name: str, confidence: float) -> list[dict[str, object]]:

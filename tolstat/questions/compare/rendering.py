@@ -173,6 +173,7 @@ def _share_columns(paired: bool) -> tuple[Column, ...]:
         Column("A", lambda row: percent(row["a"])),
         Column("B", lambda row: percent(row["b"])),
         Column("B - A", lambda row: f"{100 * row['estimate']:+.3g} %"),
+        Column("ppm", lambda row: f"{1e6 * row['estimate']:+.4g}", rank=2),
         Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
         Column("only A", only("a"), rank=1),
         Column("only B", only("b"), rank=1),

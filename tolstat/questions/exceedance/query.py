@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import ALL_LIMITS, load_of, split, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
@@ -46,18 +46,52 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
-        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence`` and the error budget, see
-        `_error_budget`. Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
+        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
+        `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
+        Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `SampleLoad.supports`.
+    """
+    return pd.DataFrame([_above_limit(view, view.load(name), confidence) for name in view.limits])
+
+
+def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
+    """Share of the joints above at least one limit of the study: a row as those of `limits`, of the load `ALL_LIMITS`.
+
+    Its level is 1, and its loads are the largest ratios of load to limit.
+    """
+    return _above_limit(view, view.load(ALL_LIMITS), confidence)
+
+
+def _above_limit(view: View, load: SampleLoad, confidence: float) -> dict[str, Any]:
+    level = load.limit
+    assert level is not None
+    head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
+    budget = _error_budget(view, load, level, confidence)
+    row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
+    # the load with its numerical error, where that is known
+    top = (error_budget.shifted(view, load) or (load, load))[1]
+    row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
+    return row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan)
+
+
+def at_points(view: View) -> pd.DataFrame:
+    """Share of the joints above each limit at each of the operating points that it holds at.
+
+    Returns
+    -------
+    DataFrame
+        One row per limit that holds at several points, in the study's order: ``load``, ``unit``, ``level``, and under
+        the name of each point of the view the share there; NaN where the limit does not hold, or weighted joints do not
+        support it. No rows for a view of one point.
     """
     rows = []
     for name, level in view.limits.items():
-        load = view.load(name)
-        head = {"load": name, "unit": load.unit, "nominal": load.nominal}
-        budget = _error_budget(view, load, level, confidence)
-        row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
-        rows.append(row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan))
-    return pd.DataFrame(rows)
+        at, plain = view.narrowed(name)
+        if len(at.points) > 1:
+            loads = {part.points[0]: part.load(plain) for part in at.parts}
+            shares = {p: own.above(level).estimate if own.supports(level) else np.nan for p, own in loads.items()}
+            rows.append({"load": name, "unit": load_of(name).unit, "level": level} | shares)
+    return pd.DataFrame(rows, columns=["load", "unit", "level", *view.points])
 
 
 def _error_budget(view: View, load: SampleLoad, level: float, confidence: float) -> dict[str, float]:
@@ -93,13 +127,6 @@ def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
         for share in SHARES:
             rows.append({**head, **load.quantile(share, confidence)._asdict(), "confidence": confidence})
     return pd.DataFrame(rows)
-
-
-def most_exceeded(view: View) -> str:
-    """Name of the leading load whose limit the largest share of the joints exceeds; see `View.leading`."""
-    shares = {load.name: load.above(load.limit).estimate for load in view.loads(view.leading) if load.limit}
-    known = {name: share for name, share in shares.items() if share == share}
-    return max(known, key=lambda name: known[name]) if known else next(iter((*view.leading, "cross1.F")))
 
 
 def tolerance_limits(view: View) -> dict[str, float]:
@@ -147,14 +174,15 @@ def readings(view: View) -> dict[str, Any]:
     Returns
     -------
     dict
-        By load: ``unit``; ``n``, ``failed``, ``unsettled``; ``start``, index of the level shown first (nearest to the
-        limit or, without one, to the 90 % quantile); lists of equal length ``x``, ``count``, ``share`` and, for
-        independent samples, ``lower``, ``upper``, ``outer_lower``, ``outer_upper``, otherwise ``bound_lower``,
-        ``bound_upper``.
+        By load, and by load at the operating points that a limit names: ``unit``; ``n``, ``failed``, ``unsettled``;
+        ``start``, index of the level shown first (nearest to the limit or, without one, to the 90 % quantile); lists of
+        equal length ``x``, ``count``, ``share`` and, for independent samples, ``lower``, ``upper``, ``outer_lower``,
+        ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``.
     """
     found = {}
-    ends = ("lower", "upper", "outer_lower", "outer_upper") if view.iid else ("bound_lower", "bound_upper")
-    for load in view.loads(view.shown_loads):
+    ends = ("lower", "upper", "outer_lower", "outer_upper") if view.has_intervals else ("bound_lower", "bound_upper")
+    named = [name for name in view.limits if split(name)[1]]
+    for load in view.loads([*view.shown_loads, *named]):
         if not load.valid.size:
             continue
         x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)
@@ -184,8 +212,9 @@ def _round_levels(low: float, high: float, limit: float | None) -> NDArray[np.fl
 
 
 def summary(view: View, confidence: float) -> dict[str, Any]:
-    """JSON values: ``limits`` and ``quantiles``, the rows of the tables of these names."""
+    """JSON values: ``limits``, ``at_points`` and ``quantiles``, the rows of the tables of these names."""
     return {
         "limits": text.records(limits(view, confidence)) if view.limits else [],
+        "at_points": text.records(at_points(view)),
         "quantiles": text.records(quantiles(view, confidence)) if view.shown_loads else [],
     }

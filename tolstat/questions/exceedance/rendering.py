@@ -39,6 +39,14 @@ def _outer(row: Row) -> str:
     return text.span(row[f"{kind}_lower"], row[f"{kind}_upper"])
 
 
+def _is_weighted(table: pd.DataFrame) -> bool:
+    return bool(table["unsearched_upper"].notna().any())
+
+
+def _unsearched(row: Row) -> str:
+    return text.percent(row["unsearched_upper"])
+
+
 def above(row: Row) -> str:
     """Joints above a limit, and of how many with a valid load."""
     return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
@@ -53,9 +61,24 @@ LIMITS = (
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
     Column("with unresolved joints", _outer, shown=_has_unresolved, rank=2),
     Column("total interval", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=_has_error, rank=3),
+    Column("at most, if ways are missed", _unsearched, shown=_is_weighted),
 )
 """Columns of the table `query.limits`. Joints above are counted among the valid ones, as the share is; the last two
 columns count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""
+
+
+def at_points(view: View) -> tuple[Column, ...]:
+    """Columns of the table `query.at_points`: the share above each limit at each operating point."""
+
+    def share(point: str) -> Column:
+        return Column(point, lambda row: text.percent(row[point]))
+
+    head = (Column("load", lambda row: str(row["load"])), Column("limit", lambda r: text.value(r["level"], r["unit"])))
+    return (*head, *map(share, view.points))
+
+
+AT_POINTS = "share of the joints above each limit at each operating point"
+"""Title of the table `query.at_points`."""
 
 
 def _numerical(row: Row) -> str:
@@ -117,8 +140,11 @@ def note(view: View) -> str:
     if view.weighted:
         text = (
             "joints counted by their weights; bands: pointwise 95 % Clopper–Pearson intervals of as many equal joints "
-            f"as would be as sure{_distrust(view)}"
+            f"as would be as sure{_distrust(view)}; intervals hold if the proposals reach every way to the limit, the "
+            "last column, from the joints of the tolerances alone, whatever they miss"
         )
+    elif view.replicates > 1:
+        text = f"bands: pointwise 95 % intervals of the settled joints, {view.interval_of}"
     elif view.iid:
         text = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
     else:
@@ -129,7 +155,7 @@ def note(view: View) -> str:
 
 
 def _distrust(view: View) -> str:
-    """Words on limits without a share, because too few effective joints are above them."""
+    """Words on limits without a share, because few joints have most of the weight above them."""
     poor = []
     for name, level in view.limits.items():
         load = view.load(name)
@@ -196,7 +222,7 @@ def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.9
             nominal = view.load(names[i]).nominal
             if low <= nominal <= high:
                 style.mark(ax, nominal, 1.0, style.COLOURS[i])
-    if view.iid:
+    if view.has_intervals:
         ends = [table["outer_upper"][-1] for table in tables if table.size]
         ax.axhline(max(ends), color=style.FAINT, lw=1.1, ls=ZERO_DASH, zorder=1.5)
     limit_lines(ax, marked, unit)
@@ -293,7 +319,7 @@ def _legend(page: Figure, view: View) -> None:
         Line2D([], [], color=c, ls=dash) for c, dash in zip(style.COLOURS, style.DASHES, strict=True)
     ]
     labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
-    if view.iid:
+    if view.has_intervals:
         handles += [Patch(color=style.FAINT, alpha=0.4, lw=0)]
         handles += [Line2D([], [], color=style.FAINT, lw=1.1, ls=ZERO_DASH)]
         labels += ["95 % band", "upper end where none exceeds x"]

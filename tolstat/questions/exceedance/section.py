@@ -15,6 +15,7 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Reader, Section, Table, Text
 from tolstat.display.table import as_block
 from tolstat.questions.exceedance import query, rendering, sweep
+from tolstat.store.recorded import joint_of
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
@@ -31,7 +32,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
         return []
     blocks: list[Block] = [Panels([_leading_panel(view, name) for name in view.leading])] if view.leading else []
     blocks.append(Text(_note(view), small=True))
-    blocks.append(Reader(query.readings(view), query.most_exceeded(view)))
+    blocks.append(Reader(query.readings(view), view.most_exceeded))
     blocks.append(_quantiles(view))
     if view.limits and view.sampled and view.numerical_error:
         title = "What makes the shares above limits uncertain, in per cent of the joints"
@@ -42,9 +43,23 @@ def sections(view: View, asked: Asked) -> list[Section]:
 def _note(view: View) -> str:
     said = text.sentence(rendering.note(view))
     if len(view.nominal):
-        said += " Triangle: the joint without errors."
+        said += f" Triangle: the joint without errors.{_beyond(view)}"
+    if len(view.points) > 1:
+        said += " Loads are the largest over all operating points, unless they name some."
     missing = view.missing()
     return f"{said} {text.sentence(missing)}" if missing else said
+
+
+def _beyond(view: View) -> str:
+    """Why the force without errors is smaller than T/(2 R); empty where it is not, or at several operating points."""
+    forces = [view.load(name).nominal for name in ("cross1.F", "cross2.F") if name in view.bushing_loads]
+    if not forces or len(view.points) > 1:
+        return ""
+    torque, radius = abs(view.store.operation.torque), joint_of(view.store, 0).cross.R
+    if not max(forces) < torque / (2.0 * radius):
+        return ""
+    at_middle = text.value(torque / (2.0 * radius), "N")
+    return f" Its force on the cross is below T/(2 R) = {at_middle}: without errors pins bear at their outer ends."
 
 
 def _described(load: SampleLoad) -> str:
@@ -54,14 +69,15 @@ def _described(load: SampleLoad) -> str:
 
 def _leading_panel(view: View, name: str) -> Panel:
     """Curve of a leading load with its band; on switches the other bushings, and a band for the whole curve."""
-    load = view.load(name)
-    others = [other for other in view.bushing_loads if other != name and name in view.bushing_loads]
-    others = [other for other in others if other.rpartition(".")[2] == name.rpartition(".")[2]]
+    load, plain = view.load(name), view.narrowed(name)[1]
+    others = [other for other in view.bushing_loads if other != plain and plain in view.bushing_loads]
+    others = [other for other in others if other.rpartition(".")[2] == plain.rpartition(".")[2]]
+    others = [f"{other}{name.removeprefix(plain)}" for other in others]
     switches = [("others", "other bushings, without bands (cross solid, fork dashed)")] if others else []
     if view.iid and not view.weighted:
         switches.append(("curve-band", "95 % band for the whole curve (DKW)"))
     return Panel(
-        f"leading-{name.replace('.', '-')}",
+        f"leading-{name}",
         f"{name}: share of the joints above x",
         _described(load) if load.valid.size else f"{name}: no joint with a valid result",
         partial(_leading, view=view, load=load, others=others),
@@ -109,9 +125,10 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
 def _quantiles(view: View) -> Table:
     """Quantiles of every load with their intervals, and its tolerance limit."""
     table = rendering.by_load(query.quantiles(view))
-    title = "Quantiles with 95 % intervals of order statistics, and one-sided tolerance limits (Wilks)"
+    kind = "over replicates" if view.replicates > 1 else "of order statistics"
+    title = f"Quantiles with 95 % intervals {kind}, and one-sided tolerance limits (Wilks)"
     columns = rendering.quantile_columns(query.tolerance_limits(view))
-    return as_block(title if view.iid else "Quantiles", columns, table)
+    return as_block(title if view.has_intervals else "Quantiles", columns, table)
 
 
 def _of_sweep(view: View) -> Section:

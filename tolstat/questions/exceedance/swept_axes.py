@@ -14,6 +14,7 @@ from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.store import recorded
 from tolstat.store.view import View
+from tolstat.study.selection import UNITS
 from tolstat.study.swept import KEYS
 
 
@@ -52,6 +53,9 @@ def swept_axes(view: View) -> list[Axis]:
     """
     errors, patterns = view.errors(np.arange(view.n)), _patterns(tomllib.loads(view.store.study_text).get("sweep", {}))
     columns = {(field.name, field.unit): errors[field.name] for field in ERROR_FIELDS}
+    if len(view.parts) == 1:  # of several operating points none is swept
+        own = recorded.operating_points(view.store, slice(view.store.first_sample, None))
+        columns |= {(f"operation.{key}", UNITS[f"operation.{key}"]): values for key, values in own.items()}
     if view.store.variants:
         columns |= {(key, KEYS[key]): of[view.store.first_sample :] for key, of in recorded.swept(view.store).items()}
     groups: dict[bytes, list[tuple[str, str]]] = {}

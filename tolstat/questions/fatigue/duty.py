@@ -8,20 +8,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.tables import ERROR_FIELDS, Status
+from tolstat.common.tables import ERROR_FIELDS
+from tolstat.store import worst
 from tolstat.store.view import View
 
 
-def check(views: Sequence[View], shares: Sequence[float]) -> list[float]:
-    """Refuse campaigns that make no duty cycle; return the shares of the revolutions with the exact sum 1.
+def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequence[View], list[float]]:
+    """Views of a duty cycle at one operating point each, and their shares of the revolutions with the exact sum 1.
+
+    Parameters
+    ----------
+    views : sequence of View
+        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
+        each operating point.
+    shares : sequence of float, optional
+        Share of the revolutions in each of several campaigns.
 
     Raises
     ------
     InputError
-        When the shares are not shares, or the campaigns have different joints.
+        When the shares are not shares or not known, or the campaigns have different joints.
     StoreError
         When a file holds joints that are no sample of a production.
     """
+    if any(len(view.parts) > 1 for view in views):
+        views, shares = _of_points(views, shares)
+    shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
         found = f"{list(shares)} for {len(views)} files"
         raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
@@ -30,19 +42,46 @@ def check(views: Sequence[View], shares: Sequence[float]) -> list[float]:
         if view is not views[0]:
             _check_same_joints(view, views[0])
     total = sum(shares)
-    return [share / total for share in shares]
+    return views, [share / total for share in shares]
 
 
 def status(views: Sequence[View], samples: int | None) -> NDArray[np.uint8]:
-    """Status of the first samples: of several operating points the first that is not ``OK``, (n,)."""
-    found = views[0].status[:samples]
-    for view in views[1:]:
-        found = np.where(found == Status.OK, view.status[:samples], found)
-    return found
+    """Status of the first samples, of several operating points that of the point that decides, (n,)."""
+    own = [view.status[:samples] for view in views]
+    return np.asarray(np.choose(worst.deciding(own), own))
+
+
+def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[list[View], list[float]]:
+    """Views of a campaign at each of its operating points, and their shares of the revolutions."""
+    view, place = views[0], str(views[0].path)
+    if len(views) > 1:
+        remedy = "give this file alone, or files with one operating point each"
+        raise InputError([Fault(place, "has several operating points", remedy)])
+    if shares is not None:
+        remedy = "leave --share out: the study gives share in [[operation]]"
+        raise InputError([Fault(place, "has several operating points", remedy)])
+    return view.parts, revolutions_at(view)
+
+
+def revolutions_at(view: View) -> list[float]:
+    """Share of the revolutions at each operating point of a view: share of the time times speed, summing to 1.
+
+    Raises
+    ------
+    InputError
+        When the study does not give the shares of the time.
+    """
+    points = [view.store.points[name] for name in view.points]
+    turns = np.array([point.share * abs(point.operation.speed) for point in points])
+    if np.isnan(turns).any():
+        remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
+        remedy += f"; or look at one point: --point {view.points[0]}"
+        raise InputError([Fault(str(view.path), "has operating points without a share of the time", remedy)])
+    return [float(own) for own in turns / turns.sum()]
 
 
 def _check_same_joints(view: View, first: View) -> None:
-    names = [f.name for f in ERROR_FIELDS if not f.name.startswith("operation.")]
+    names = [f.name for f in ERROR_FIELDS]
     if view.n == first.n and all(
         np.array_equal(own[name], other[name])
         for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)

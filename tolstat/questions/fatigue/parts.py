@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance, quantile, strength
+from tolstat.analysis import exceedance, prediction, quantile, strength
 from tolstat.analysis.cycles import FloatArray
+from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.strength import Collective, Failures, Line
 from tolstat.common.tables import Status
 from tolstat.questions.fatigue.stress import Stressed, Stresses
@@ -66,7 +67,7 @@ class Course(NamedTuple):
         return strength.failures(self.chances(lives), self.n_failed, self.n_unsettled, confidence, self.iid)
 
 
-def part_failures(stressed: Stressed, confidence: float = 0.95) -> pd.DataFrame:
+def part_failures(stressed: Stressed, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
     """Damage, life and probability of failure at each point of the parts.
 
     Parameters
@@ -75,6 +76,8 @@ def part_failures(stressed: Stressed, confidence: float = 0.95) -> pd.DataFrame:
         Stress cycles of the joints, from `load_stresses`.
     confidence : float
         Confidence level of the intervals.
+    delivery : int
+        Number of joints of the next delivery.
 
     Returns
     -------
@@ -84,7 +87,8 @@ def part_failures(stressed: Stressed, confidence: float = 0.95) -> pd.DataFrame:
         (damage sum at the median strength: of the nominal joint, and not exceeded by half and by 99 % of the joints);
         ``life`` (revolutions after which a tenth of the parts has failed), ``life_lower``, ``life_upper`` (joints
         without a valid load counted both ways); ``nominal_failures`` (share of the parts that fail in the nominal
-        joint); the fields of `analysis.strength.Failures`, ``confidence``.
+        joint); the fields of `analysis.strength.Failures`, ``confidence``, ``next_lower`` and
+        ``next_upper`` (prediction interval for the failures in the next delivery).
     """
     own, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
     each = [(_damage(stressed, p, own[p], nominal[p]), [p]) for p in range(len(own))]
@@ -95,6 +99,9 @@ def part_failures(stressed: Stressed, confidence: float = 0.95) -> pd.DataFrame:
         ideal = Course([nominal[p] for p in group], np.ones(len(stressed.nominal.low), bool), 0, 0, False)
         life = _life(course, stressed.settings.revolutions, confidence)
         found = course.failures(1.0, confidence)._asdict()
+        wide = course.failures(1.0, prediction.half(confidence))
+        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, confidence)
+        head |= dict(zip(("next_lower", "next_upper"), following, strict=True))
         head |= life | {"nominal_failures": ideal.failures().estimate} | found | {"confidence": confidence}
         rows.append(head)
     return pd.DataFrame(rows)

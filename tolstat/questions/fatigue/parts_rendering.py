@@ -55,6 +55,8 @@ PARTS = (
     Column("point", lambda row: str(row["point"])),
     Column("failures", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["outer_lower"], row["outer_upper"])),
+    Column("ppm", lambda row: text.ppm(row["estimate"]), rank=6),
+    Column("failures in delivery", text.delivery, rank=7),
     Column("B10 life", lambda row: _life(row["life"])),
     Column("its 95 % interval", _life_span, rank=5),
     Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=3),

@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import cycles, damage, exceedance, quantile
+from tolstat.analysis import cycles, damage, exceedance, prediction, quantile
 from tolstat.analysis.cycles import Cycles, FloatArray
+from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.shown import shown
 from tolstat.common.tables import CHANNELS, Status
 from tolstat.questions.fatigue import duty
@@ -18,6 +19,8 @@ from tolstat.questions.fatigue.counting import cycles_of
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
+ANY = "any of them"
+"""Name of the row for all channels together."""
 SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints at which quantiles are given."""
 MAX_NUMBERS = 40
@@ -36,7 +39,7 @@ class Loading:
     cycles : Cycles
         Cycles of the n samples.
     status : ndarray, shape (n,)
-        `tables.Status`; with several operating points the first that is not ``OK``.
+        `tables.Status`; with several operating points the worst, see `store.worst.deciding`.
     nominal : Cycles
         Cycles of the nominal joint; no rows if there is none that settled.
     iid : bool
@@ -60,18 +63,20 @@ class Loading:
 
 def load_cycles(
     views: Sequence[View],
-    shares: Sequence[float] = (1.0,),
+    shares: Sequence[float] | None = None,
     names: Sequence[str] | None = None,
     samples: int | None = None,
 ) -> Loading:
-    """Rainflow cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
+    """Rainflow cycles of a campaign, or of the same joints at the several operating points of a duty cycle.
 
     Parameters
     ----------
     views : sequence of View
-        The campaign at each operating point; the joints of the campaigns differ in ``operation.*`` only.
-    shares : sequence of float
-        Share of the revolutions at each operating point; the sum is 1.
+        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
+        each operating point.
+    shares : sequence of float, optional
+        Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
+        campaign follow from their shares of the time and their speeds, see `duty.revolutions_at`.
     names : sequence of str, optional
         Channels to keep, keys of `tables.CHANNELS`; by default all 64: some 8 kB per joint.
     samples : int, optional
@@ -80,17 +85,18 @@ def load_cycles(
     Raises
     ------
     InputError
-        When the shares are not shares, or the campaigns have different joints.
+        When the shares are not shares or not known, or the campaigns have different joints.
     StoreError
         When a file holds no histories, or joints that are no sample of a production.
     """
-    shares = duty.check(views, shares)
+    name = " + ".join(view.name for view in views)
+    views, shares = duty.members(views, shares)
     first = views[0]
     parts = [_cycles_of(view, names, samples) for view in views]
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
     return Loading(
-        name=" + ".join(view.name for view in views),
+        name=name,
         cycles=cycles.duty_cycle([own for own, _ in parts], shares),
         status=duty.status(views, samples),
         nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares),
@@ -143,16 +149,18 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
     return pd.DataFrame(rows)
 
 
-def damages(loading: Loading, confidence: float = 0.95) -> pd.DataFrame:
+def damages(loading: Loading, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
     """Share of the joints whose damage sum in the service life exceeds 1, for each channel that has an S–N line.
 
     Returns
     -------
     DataFrame
+        One row per channel and, of several, `ANY` for joints with any of these damage sums above 1 (it has no line):
         ``channel``, ``m``, ``S0`` (N or N m), ``N0``, ``nominal`` (damage of the nominal joint), ``median`` (of the
-        joints), the fields of `analysis.exceedance.Exceedance` for the level 1, ``confidence``.
+        joints), the fields of `analysis.exceedance.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
+        (prediction interval for the joints above 1 in the next delivery), ``confidence``.
     """
-    rows = []
+    rows, worst = [], []
     for channel, values in loading.settings.lines.items():
         if channel not in loading.cycles.channels:
             continue
@@ -161,11 +169,26 @@ def damages(loading: Loading, confidence: float = 0.95) -> pd.DataFrame:
             damage.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
             for part in (loading.cycles, loading.nominal)
         )
+        worst.append((sums, nominal))
         head = {"channel": channel, **line._asdict(), "nominal": _only(nominal)}
-        head["median"] = quantile.quantile(sums, loading.status, 0.5).estimate
-        above = exceedance.exceedance(sums, loading.status, 1.0, confidence, loading.iid)
-        rows.append({**head, **asdict(above), "confidence": confidence})
+        rows.append(head | _above_one(loading, sums, confidence, delivery))
+    if len(worst) > 1:
+        sums, nominal = (np.maximum.reduce(parts) for parts in zip(*worst, strict=True))
+        head = {"channel": ANY, **dict.fromkeys(damage.Line._fields, np.nan), "nominal": _only(nominal)}
+        rows.append(head | _above_one(loading, sums, confidence, delivery))
     return pd.DataFrame(rows)
+
+
+def _above_one(loading: Loading, sums: FloatArray, confidence: float, delivery: int) -> dict[str, object]:
+    """Columns of `damages` that follow from the damage sums of the joints."""
+    above = exceedance.exceedance(sums, loading.status, 1.0, confidence, loading.iid)
+    following = (np.nan, np.nan)
+    if loading.iid:
+        least, most = round(above.n * above.bound_lower), round(above.n * above.bound_upper)
+        following = prediction.of_counts(least, most, above.n, delivery, confidence)
+    median = quantile.quantile(sums, loading.status, 0.5).estimate
+    ends = dict(zip(("next_lower", "next_upper"), following, strict=True))
+    return {"median": median} | asdict(above) | ends | {"confidence": confidence}
 
 
 def spectra(

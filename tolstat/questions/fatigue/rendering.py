@@ -15,7 +15,7 @@ from tolstat.common.loads import unit_text
 from tolstat.common.tables import CHANNELS
 from tolstat.display import style, text
 from tolstat.display.table import Column, Row
-from tolstat.questions.fatigue.query import SHARES, Loading, equivalent_loads, leading, spectra
+from tolstat.questions.fatigue.query import ANY, SHARES, Loading, equivalent_loads, leading, spectra
 
 MIN_RANGE = 1e-3
 """Smallest range drawn, relative to the largest."""
@@ -37,6 +37,8 @@ def _interval(row: Row) -> str:
 
 
 def _line(row: Row) -> str:
+    if row["channel"] == ANY:
+        return "-"
     return f"{text.value(row['S0'], CHANNELS[row['channel']])} at {row['N0']:g} cycles, m = {row['m']:g}"
 
 
@@ -55,6 +57,8 @@ DAMAGES = (
     Column("joints above 1", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("share", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("ppm", lambda row: text.ppm(row["estimate"]), rank=4),
+    Column("above in delivery", text.delivery, rank=5),
 )
 """Columns of the table `query.damages`. Joints above 1 are counted among the settled ones, as the share is."""
 

@@ -71,7 +71,7 @@ def _loads(loading: Loading) -> list[Block]:
 def _panel(loading: Loading, channel: str) -> Panel:
     spectrum = query.spectra(loading, [channel])
     return Panel(
-        f"spectrum-{channel.replace('.', '-')}",
+        f"spectrum-{channel}",
         f"{channel}: load spectrum",
         f"Ranges of {channel} that so many cycles a revolution reach, for half, 90 and 99 % of the joints",
         partial(_draw, spectrum=spectrum, revolutions=loading.settings.revolutions),

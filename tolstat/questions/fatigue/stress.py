@@ -84,7 +84,7 @@ class Stressed:
         return np.asarray(self.status == Status.OK)
 
 
-def load_stresses(views: Sequence[View], shares: Sequence[float] = (1.0,), samples: int | None = None) -> Stressed:
+def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, samples: int | None = None) -> Stressed:
     """Stress cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
 
     The stress of each point is formed from the load components at each input angle before cycles are counted. Where a
@@ -93,10 +93,10 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] = (1.0,), sampl
     Parameters
     ----------
     views : sequence of View
-        The campaign at each operating point; the joints of the campaigns differ in ``operation.*`` only. The study of
-        the first has ``[fatigue.point]``.
-    shares : sequence of float
-        Share of the revolutions at each operating point; the sum is 1.
+        One campaign, or the same joints in several, see `duty.members`. The study of the first has
+        ``[fatigue.point]``.
+    shares : sequence of float, optional
+        Share of the revolutions in each of several campaigns; the sum is 1.
     samples : int, optional
         Number of samples, from the first; by default all.
 
@@ -107,7 +107,8 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] = (1.0,), sampl
     StoreError
         When a file holds joints that are no sample of a production.
     """
-    shares = duty.check(views, shares)
+    name = " + ".join(view.name for view in views)
+    views, shares = duty.members(views, shares)
     first = views[0]
     settings = of_text(first.store.study_text, str(first.path))
     if not settings.points:
@@ -124,7 +125,6 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] = (1.0,), sampl
     skips = [_nominal(view).size for view in views]
     nominal = [part.rows(slice(min(skips))) for part in parts]  # settled at all operating points, or no row
     own = [_spread(part.rows(slice(skip, None)), settled, status.size) for part, skip in zip(parts, skips, strict=True)]
-    name = " + ".join(view.name for view in views)
     return Stressed(name, _mixed(own, shares), status, _mixed(nominal, shares), first.iid, settings, first.n, apart)
 
 

@@ -29,7 +29,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
     with asked.noting("no histograms of errors"):
         found = query.drawn(view)
         if found:
-            blocks.append(Panels([_drawn_panel(own, k) for k, own in enumerate(found)], small=True))
+            blocks.append(Panels([_drawn_panel(own, k, found) for k, own in enumerate(found)], small=True))
             blocks.append(Text(_note(view), small=True))
     return [Section("histograms", "What was drawn, and the loads that came of it", blocks)] if blocks else []
 
@@ -48,7 +48,7 @@ def _load_panel(load: SampleLoad) -> Panel:
     median, most = (text.value(load.quantile(share).estimate, load.unit) for share in (0.5, 0.95))
     scale = ", logarithmic" if load.long_tailed else ""
     return Panel(
-        f"histogram-{load.name.replace('.', '-')}",
+        f"histogram-{load.name}",
         f"{load.name}: distribution of the joints",
         f"Half of the joints are below {median}, 95 % below {most}; scale of loads{scale or ' linear'}",
         partial(_load, load=load),
@@ -80,11 +80,14 @@ def _load(ax: Axes, load: SampleLoad) -> None:
     ax.set(xlabel=f"{load.name} [{unit or '1'}], largest over the revolution", ylabel="share of the joints [%]")
 
 
-def _drawn_panel(found: Drawn, k: int) -> Panel:
+def _drawn_panel(found: Drawn, k: int, every: list[Drawn]) -> Panel:
+    """One picture; of several with one entry each says whether it is of offsets or of tilts."""
+    kinds = dict.fromkeys(name.partition(".")[2].partition("_")[0] for name in found.errors)
+    kind = f", {' and '.join(kinds)}" if sum(own.entry == found.entry for own in every) > 1 else ""
     outside = "" if found.band is None else f"; {text.percent(found.outside)} outside"
     return Panel(
         f"drawn-errors-{k}",
-        f"{found.entry}: {found.number}{outside}",
+        f"{found.entry}{kind}: {found.number}{outside}",
         f"Histogram of {', '.join(found.errors)}",
         partial(_drawn, found=found),
         (2.5, 1.4),

@@ -12,7 +12,7 @@ from tolstat.common.tables import FAILED, PINS, STATUS_TEXT, UNSETTLED, VALID, M
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
-from tolstat.questions.joints import query
+from tolstat.questions.joints import query, tolerances
 from tolstat.store.view import View
 
 SIGNIFICANT = 0.05
@@ -21,10 +21,13 @@ MODE_COLOURS = ("#E6E6E6", style.COLOURS[3], style.COLOURS[1], style.COLOURS[0])
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
-    """Contact modes if the study keeps them, and joints without a valid load once any joint has been simulated."""
+    """Contact modes if the study keeps them, joints without a valid load once any is simulated, tolerances if drawn."""
     found = [_modes_section(view)] if np.isfinite(view.mode_share).any() else []
     if view.count(*VALID, *FAILED, *UNSETTLED):
         found.append(_status_section(view, asked))
+    if view.sampled:
+        with asked.noting("the meaning of the tolerances is not shown"):
+            found.append(tolerances.section(view))
     return found
 
 

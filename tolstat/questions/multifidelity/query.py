@@ -16,7 +16,7 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.campaign.extend import grow
 from tolstat.campaign.plan import simulate_timed
-from tolstat.campaign.progress import note
+from tolstat.campaign.progress import Reporter, note, silent
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
 from tolstat.common.shown import shown
@@ -29,6 +29,7 @@ from tolstat.store.sample_load import SampleLoad
 from tolstat.study import Study
 from tolstat.study.model import Solver
 
+NAMES = ("high", "low")
 SHARES = (0.5, 0.9, 0.99)
 MAX_TIMED = 64
 """Maximum number of joints simulated to measure the cost of a fidelity."""
@@ -107,6 +108,8 @@ def two_fidelities(
     by: str | None = None,
     workers: int | None = None,
     tell: Callable[[str], None] = note,
+    stage: Callable[[str], None] = silent,
+    progress: Reporter | None = None,
 ) -> TwoFidelities:
     """Simulate a study at two fidelities and combine the results.
 
@@ -129,6 +132,10 @@ def two_fidelities(
         Number of processes; does not affect results. The budget counts the time of one core in any case.
     tell : callable, optional
         Receives a sentence on the allocation.
+    stage : callable
+        Called with the name of each stage when it begins.
+    progress : callable, optional
+        Called with the counts of the joints of each file while they are simulated.
 
     Returns
     -------
@@ -149,7 +156,8 @@ def two_fidelities(
     by = names[0] if by is None else by
     if by not in names:
         raise InputError([Fault("--by", f"{by!r} is not a load that the study asks for", did_you_mean(by, names))])
-    held = [_simulate(plan, workers) for plan in plans]
+    held = [_simulate(plan, workers, name, stage, progress) for plan, name in zip(plans, NAMES, strict=True)]
+    stage("cost of a joint")
     costs = _cost(plans[0]), _cost(plans[1])
     allocation = _allocate(_read(plans, [by], costs).pairs(by), pilot)
     tell(_sentence(allocation, by, *costs))
@@ -157,8 +165,8 @@ def two_fidelities(
         # extend both files before simulating, so that an interrupted run resumes with the numbers of joints chosen
         for plan, n in zip(plans, allocation.joints(budget, *costs, pilot), strict=True):
             _extend(plan, n)
-        for plan in plans:
-            _simulate(plan, workers)
+        for plan, name in zip(plans, NAMES, strict=True):
+            _simulate(plan, workers, name, stage, progress)
     loads = _read(plans, names, costs)
     joints = len(loads.high[by].values), len(loads.low[by].values)
     table = _table(loads, study.limits)
@@ -182,18 +190,21 @@ def _plans(study: Study, low: str, high: str, folder: Path, pilot: int) -> tuple
     output = study.output.model_copy(update={"histories": "none"})
     plans = [
         _Plan(replace(study, solver=solver, output=output), folder / f"{study.name}_{name}.h5", pilot)
-        for solver, name in zip(solvers, ("high", "low"), strict=True)
+        for solver, name in zip(solvers, NAMES, strict=True)
     ]
     return plans[0], plans[1]
 
 
-def _simulate(plan: _Plan, workers: int | None) -> int:
+def _simulate(
+    plan: _Plan, workers: int | None, name: str, stage: Callable[[str], None], progress: Reporter | None
+) -> int:
     """Simulate the pending joints of a file, a new one with the joints of the pilot; return its number of joints."""
     n = plan.pilot
     if plan.path.exists():
         with Reader.open(plan.path) as store:
             n = store.n - store.first_sample
-    campaign.run(_sized(plan.study, n), plan.path, execution=Execution(workers=workers), check=False)
+    stage(f"{name} fidelity")
+    campaign.run(_sized(plan.study, n), plan.path, execution=Execution(workers=workers), check=False, progress=progress)
     return n
 
 

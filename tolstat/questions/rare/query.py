@@ -9,34 +9,37 @@ from __future__ import annotations
 
 import json
 import math
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from tolstat import sampling
+from tolstat.analysis import prediction
 from tolstat.analysis.exceedance import FloatArray, split
 from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
+from tolstat.campaign.executors import kept_workers
 from tolstat.campaign.extend import grow
-from tolstat.campaign.progress import note
+from tolstat.campaign.progress import Reporter, note
 from tolstat.common.draw_records import SUBSET
-from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import LOADS
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.loads import Limit
 from tolstat.common.shown import shown
+from tolstat.questions.rare import numerical
 from tolstat.store import Reader, ResultStore
 from tolstat.store.recall import differing_keys
-from tolstat.study import Study, subset_of
+from tolstat.study import Study, rule, subset_of
 from tolstat.study.model import Subset
-from tolstat.study.selection import limit_of
 
 MIN_PARALLEL = 2000
-"""Minimum number of joints of a stage for which worker processes are started: some seconds of work."""
-_LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
+"""Minimum number of joints of a stage for which several worker processes are started: some seconds of work."""
+CONFIDENCE = 0.95
+EXAMPLE = 'write --limit "cross1.F > 900 N"'
 
 
 @shown
@@ -59,6 +62,12 @@ class RareEvent(NamedTuple):
         Number of these without a valid load.
     unresolved_first : int
         Number of joints of level 0 (drawn at random) without a valid load.
+    ancestors : int
+        Number of joints of level 0 that the joints above the limit descend from.
+    wide : Estimate
+        As `estimate`, with the confidence `analysis.prediction.half` for prediction intervals.
+    numerical : tuple of float, optional
+        Factors on the ends of the interval by the numerical error near the limit; None if it is not known.
     """
 
     sampling: Subset
@@ -68,6 +77,9 @@ class RareEvent(NamedTuple):
     joints: int
     unresolved: int
     unresolved_first: int
+    ancestors: int
+    wide: Estimate
+    numerical: tuple[float, float] | None
 
     @property
     def as_sure_as(self) -> float:
@@ -75,24 +87,27 @@ class RareEvent(NamedTuple):
         p, deviation = self.estimate.probability, self.estimate.deviation
         return (1.0 - p) / (p * deviation**2) if deviation > 0 else math.nan
 
+    def delivery(self, number: int) -> tuple[float, float]:
+        """Prediction interval for the joints above the limit among `number` further ones, with the numerical error."""
+        low, high = self.numerical or (1.0, 1.0)
+        upper = min(1.0, self.wide.upper * high)
+        return prediction.of_share(self.wide.lower * low, upper, number, CONFIDENCE)
+
     @property
     def upper_if_above(self) -> float:
         """Upper end if joints without a valid load are all above the limit, estimated by their share in level 0."""
         return min(1.0, self.estimate.upper + self.unresolved_first / self.sampling.per_level)
 
 
-def parse_limit(text: str) -> tuple[str, float]:
-    """Load and level (SI) from a text such as ``"cross1.F > 900 N"``.
+def parse_limit(text: str, limits: Mapping[str, float]) -> Limit:
+    """Read a limit such as ``"cross*.F > 900 N"``; `limits` are those of the study, which ``"any limit"`` names.
 
     Raises
     ------
     InputError
         When the text is not of this form.
     """
-    found = _LIMIT.fullmatch(text)
-    if found is None:
-        raise InputError([Fault("--limit", f"{text!r} is not a limit", 'write --limit "cross1.F > 900 N"')])
-    return found["load"], limit_of(found["load"], found["level"], "--limit")
+    return rule.limit_of(text, limits, "--limit", EXAMPLE)
 
 
 def subset_study(
@@ -108,9 +123,9 @@ def subset_study(
     Parameters
     ----------
     study : Study
-        Study whose tolerances are used; its number of joints and its limits are ignored.
+        Study whose tolerances are used; its number of joints is ignored.
     limit : str
-        Load and level, ``"cross1.F > 15 kN"``.
+        Load or pattern and level, ``"cross*.F > 15 kN"``, or ``"any limit"``.
     n : int
         Number of joints per level.
     p0 : float
@@ -130,9 +145,11 @@ def subset_study(
     InputError
         With every fault of limit and settings.
     """
-    load, above = parse_limit(limit)
+    study = study.at("")
+    found = parse_limit(limit, study.limits)
     own = {} if seed is None else {"seed": seed}
-    fields = {"load": load, "above": above, "per_level": n, "p0": p0, "unresolved": unresolved}
+    levels = dict(zip(found.loads, found.levels, strict=True))
+    fields = {"load": found.name, "levels": levels, "per_level": n, "p0": p0, "unresolved": unresolved}
     return subset_of(study, fields | own)
 
 
@@ -153,7 +170,7 @@ def rare_event(
     study : Study
         The study.
     limit : str
-        Load and level, ``"cross1.F > 15 kN"``.
+        Load or pattern and level, ``"cross*.F > 15 kN"``, or ``"any limit"``.
     out : str or Path
         Result file; an existing one of the same study, limit and settings is resumed.
     workers : int, optional
@@ -181,7 +198,13 @@ def rare_event(
     return run(subset_study(study, limit, n, p0, seed, unresolved), Path(out), workers)
 
 
-def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str], None] = note) -> RareEvent:
+def run(
+    plan: Study,
+    out: Path,
+    workers: int | None = None,
+    tell: Callable[[str], None] = note,
+    progress: Reporter | None = None,
+) -> RareEvent:
     """Run or resume a subset simulation.
 
     Parameters
@@ -192,9 +215,11 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
         Result file; created if it does not exist, otherwise resumed.
     workers : int, optional
         Number of processes for each stage; does not affect results. By default, stages of fewer than `MIN_PARALLEL`
-        joints run in this process, which a crash in the simulation of a joint then ends.
+        joints have one.
     tell : callable, optional
         Receives a sentence on each completed level.
+    progress : callable, optional
+        Called with the counts of the file's joints, those of completed levels included.
 
     Returns
     -------
@@ -207,24 +232,32 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
     Interrupted, WorkerDied
         As `campaign.run`; the same call resumes.
     """
+    with kept_workers():
+        return _run(plan, out, workers, tell, progress)
+
+
+def _run(
+    plan: Study, out: Path, workers: int | None, tell: Callable[[str], None], progress: Reporter | None
+) -> RareEvent:
     settings = plan.sampling
     assert isinstance(settings, Subset)
-    walk = Walk(Settings(settings.per_level, settings.p0, settings.above), lambda *which: _noise(plan, *which))
+    walk = Walk(Settings(settings.per_level, settings.p0, settings.limit.level), lambda *which: _noise(plan, *which))
     unresolved: list[int] = []
     first, told = plan.first_sample, 0
     rows = _rows(out) or first + settings.per_level
     held = _is_done(_sized(plan, rows), out)  # by any version of the code: reading it needs no simulation
+    simulate = partial(_simulate, plan, out, workers=workers, tell=tell, progress=progress)
     if not held:
-        _simulate(plan, out, rows, rows, workers, tell)  # also checks that the file is of the same plan and code
+        simulate(rows, rows)  # also checks that the file is of the same plan and code
     while not walk.done:
         stage = range(first, first + walk.next.parent.size)
         if rows < stage.stop:
             if held:
-                _simulate(plan, out, rows, rows, workers, tell)  # nothing to simulate: checks before rows are appended
+                simulate(rows, rows)  # nothing to simulate: checks before rows are appended
                 held = False
             rows = stage.stop
             _append(plan, out, stage, walk.next)
-            _simulate(plan, out, rows, len(stage), workers, tell)
+            simulate(rows, len(stage))
         loads, n_unresolved = _loads(plan, settings, out, stage, walk.next)
         unresolved.append(n_unresolved)
         walk.take(loads)
@@ -233,7 +266,33 @@ def run(plan: Study, out: Path, workers: int | None = None, tell: Callable[[str]
             tell(f"level {number}: {level.joints} joints, {level.share:.3g} of them above the next threshold")
         told = len(walk.levels)
     joints = first - plan.first_sample
-    return RareEvent(settings, walk.levels, walk.reached, walk.estimate(), joints, sum(unresolved), unresolved[0])
+    wide = walk.estimate(prediction.half(CONFIDENCE))
+    moved = numerical.factors(out, settings.limit, walk.last + plan.first_sample)
+    head = settings, walk.levels, walk.reached, walk.estimate(), joints
+    return RareEvent(*head, sum(unresolved), unresolved[0], walk.ancestors, wide, moved)
+
+
+def repeated(
+    plan: Study,
+    out: Path,
+    repeats: int,
+    workers: int | None = None,
+    tell: Callable[[str], None] = note,
+    progress: Reporter | None = None,
+) -> list[RareEvent]:
+    """Run or resume the simulation with several seeds, the study's and the following ones.
+
+    Each has its file: `out`, then ``STEM_2.h5`` and so on beside it. Other parameters and errors raised are those of
+    `run`.
+    """
+    found = []
+    with kept_workers():
+        for k in range(repeats):
+            own = replace(plan, sampling=plan.sampling.model_copy(update={"seed": plan.sampling.seed + k}))
+            path = out.with_name(f"{out.stem}_{k + 1}{out.suffix}") if k else out
+            tell(f"seed {own.sampling.seed}: {path}")
+            found.append(run(own, path, workers, tell, progress))
+    return found
 
 
 def _noise(plan: Study, level: int, first: int, count: int) -> FloatArray:
@@ -265,12 +324,20 @@ def _sized(plan: Study, rows: int) -> Study:
     return replace(plan, sampling=plan.sampling.model_copy(update={"n": rows - plan.first_sample}))
 
 
-def _simulate(plan: Study, out: Path, rows: int, count: int, workers: int | None, tell: Callable[[str], None]) -> None:
+def _simulate(
+    plan: Study,
+    out: Path,
+    rows: int,
+    count: int,
+    workers: int | None,
+    tell: Callable[[str], None],
+    progress: Reporter | None,
+) -> None:
     """Simulate the pending rows of the file, about `count` of them."""
     execution = Execution(workers=workers)
     if workers is None and count < MIN_PARALLEL:
-        execution = Execution("serial", 1, block=count)
-    campaign.run(_sized(plan, rows), out, execution=execution, tell=tell, check=False)
+        execution = Execution(workers=1, block=count)
+    campaign.run(_sized(plan, rows), out, execution=execution, tell=tell, check=False, progress=progress)
 
 
 def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
@@ -294,7 +361,7 @@ def _loads(plan: Study, settings: Subset, out: Path, stage: range, joints: Candi
     if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():
         found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
         raise StoreError(str(Fault(str(out), found, "run the study again into another file (--out)")))
-    loads = LOADS[settings.load].of(results).copy()
+    loads = settings.limit.of(results).copy()
     valid = split(loads, results["status"])[0]
     loads[~valid] = math.inf if settings.unresolved == "above" else -math.inf
     return loads, int(np.count_nonzero(~valid))

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,25 +14,32 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.analysis import reweight
+from tolstat.analysis import prediction, reweight
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.reweight import Weights
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.analysis.reweight import Ratios
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
+from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
+from tolstat.store.several_loads import together
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.axes import columns_of
-from tolstat.study.change import changed
+from tolstat.study.change import changed, rewritten
+from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Distribution, score
 
 SHARES = (0.5, 0.9, 0.99)
 """Quantiles of a study without limits."""
 MAX_OUTSIDE = 1e-4
 """Maximum probability of the new distribution outside the range of the old one; no estimate covers that part."""
-WITHHELD = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
-"""Columns that are NaN where too few joints support them."""
+GIVEN = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
+WITHHELD = (*GIVEN, "total_lower", "total_upper", "next_lower", "next_upper")
+"""Columns that are NaN where the joints do not support them."""
+DRAWS = 1 << 15
+"""Number of sets of errors drawn for the mean square of the ratio of correlated errors, which has no closed form."""
 _ENDS = np.array([1e-12, 1 - 1e-12])
 
 
@@ -38,36 +49,62 @@ class Reweighted(NamedTuple):
 
     Attributes
     ----------
-    weights : Weights
-        Weights of the joints that have been simulated.
+    path : Path
+        The result file.
+    settings : tuple of str
+        The changes, as given.
+    ratios : Ratios
+        Density ratios of the joints that have been simulated.
     changed : list of str
         Errors whose distribution changes.
     table : DataFrame
-        One row per limit: ``load``, ``unit``, ``level``, ``before`` (share of the joints as drawn), ``estimate``,
-        ``lower``, ``upper``, ``bound_lower`` and ``bound_upper`` (joints without a valid load counted below and above),
-        ``ess``. For a study without limits, quantiles: ``share`` instead of ``level``, loads as estimates, no bounds.
-        Estimates, intervals and bounds are NaN where the weights, or ``ess`` joints, do not support them (`usable`).
+        One row per limit, and `ALL_LIMITS` for all of them together: ``load``, ``unit``, ``level``, ``before`` (share
+        of the joints as drawn), ``estimate``, ``lower``, ``upper``, ``bound_lower`` and ``bound_upper`` (joints without
+        a valid load counted below and above), ``total_lower`` and ``total_upper`` (also with the numerical error; NaN
+        where that is not known, see `store.error_budget.near`), ``next_lower`` and ``next_upper`` (prediction interval
+        for the joints above the limit in the next delivery), ``ess``, ``above`` and ``below`` (effective joints on each
+        side of the limit), ``k``, ``usable``. For a study without limits, quantiles: ``share`` instead of ``level``,
+        loads as estimates, no bounds and no sides. Estimates, intervals and bounds are NaN where ``usable`` is false.
+    text : str
+        The study with the changed tolerances and the same seed, TOML: run it where the table is not usable.
     """
 
-    weights: Weights
+    path: Path
+    settings: tuple[str, ...]
+    ratios: Ratios
     changed: list[str]
     table: pd.DataFrame
+    text: str
 
     @property
     def verdict(self) -> str:
         """Sentence on whether the table is reliable."""
-        w = self.weights
-        figures = f"{len(w.values)} joints count as {w.ess:.0f}; Pareto k {w.k:.2f}, {w.allowed:.2f} allowed"
-        if not w.usable:
-            return f"needs new runs, no estimates: {figures}, {reweight.LEAST_ESS} joints needed"
-        missing = int(self.table["estimate"].isna().sum())
-        some = (
-            f"; {missing} of {len(self.table)} rows need new runs: they count as fewer than {reweight.LEAST_ESS} joints"
-        )
+        n, ratios = len(self.ratios.values), self.ratios
+        figures = f"{n} joints count as {ratios.effective:.0f}"
+        if ratios.effective < ratios.needed:
+            return f"needs new runs, no estimates: {figures}, {ratios.needed:.0f} needed"
+        if not ratios.usable:
+            found, allowed = math.exp(ratios.log_unbounded), reweight.LARGEST_SPREAD
+            wide = f"mean square {found:.3g} of the density ratio of wider or shifted tolerances, {allowed:g} allowed"
+            return f"needs new runs, no estimates: {wide}"
+        missing = int((~self.table["usable"]).sum())
+        least = f"fewer than {reweight.LEAST_BESIDE:g} effective joints on one side, or the tail of their weights"
+        some = f"; {missing} of {len(self.table)} rows need new runs: {least}"
         return figures + (some if missing else "")
 
+    @property
+    def usable(self) -> bool:
+        """Whether every row of the table is usable."""
+        return bool(self.table["usable"].all())
 
-def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) -> Reweighted:
+    @property
+    def remedy(self) -> str:
+        """Commands that simulate what is not usable: fresh joints of the changed tolerances, from the same seed."""
+        changes = " ".join(f"--set {json.dumps(setting, ensure_ascii=False)}" for setting in self.settings)
+        return f"tolstat reweight {self.path} {changes} --out changed.toml && tolstat run changed.toml"
+
+
+def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95, delivery: int = DELIVERY) -> Reweighted:
     """Estimate a campaign's statistics for other tolerances.
 
     Parameters
@@ -78,6 +115,8 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
         See `study.change.changed`.
     confidence : float
         Confidence level of the intervals.
+    delivery : int
+        Number of joints of the next delivery.
 
     Returns
     -------
@@ -97,7 +136,7 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
     >>> with tolstat.open(path) as store:
     ...     found = tolstat.reweighted(store.view(), ["pin1.offset_t.plus_minus=0.09 mm"])
     >>> row = found.table.iloc[0]
-    >>> found.weights.usable, row["load"], bool(row["estimate"] < row["before"])
+    >>> found.usable, row["load"], bool(row["estimate"] < row["before"])
     (True, 'cross1.F', True)
     """
     view.check_drawn()
@@ -109,26 +148,41 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95) ->
     if faults:
         raise InputError(faults)
     done = np.flatnonzero(view.status != Status.PENDING)
-    try:
-        weights = reweight.smooth(_log_ratios(view, new, names)[done])
-    except ValueError as error:
-        raise StoreError(str(Fault(str(view.path), str(error), "run a study with these tolerances"))) from error
-    loads = [view.load(name).only(done) for name in view.limits or view.shown_loads]
+    ratios = _ratios(view, new, names, done)
+    if not ratios.values.any():
+        found = "the new tolerances make none of the joints"
+        raise StoreError(str(Fault(str(view.path), found, "run a study with these tolerances")))
+    loads = view.loads(list(view.limits) or list(view.shown_loads))
     if lacking := [load.name for load in loads if not load.is_valid.any()]:
         found = f"holds no joint with a valid load: {', '.join(lacking)}"
         raise StoreError(str(Fault(str(view.path), found, f"see why: tolstat status {view.path}")))
     if view.limits:
-        rows = [_share_above(load, weights, view.limits[load.name], confidence) for load in loads]
+        rows = [_share_above(view, load, done, ratios, confidence, delivery) for load in (*loads, together(view))]
     else:
-        rows = [_quantile(load, weights, share, confidence) for load in loads for share in SHARES]
-    return Reweighted(weights, names, pd.DataFrame([_supported(row, weights) for row in rows]))
+        rows = [_quantile(load.only(done), ratios, share, confidence) for load in loads for share in SHARES]
+    table = pd.DataFrame([row if row["usable"] else row | dict.fromkeys(WITHHELD & row.keys(), np.nan) for row in rows])
+    return Reweighted(view.path, tuple(settings), ratios, names, table, rewritten(view.study, settings))
 
 
-def _supported(row: dict[str, Any], weights: Weights) -> dict[str, Any]:
-    """Row of the table, without its estimate where too few joints support it."""
-    if weights.usable and row["ess"] >= reweight.LEAST_ESS:
-        return row
-    return row | {key: np.nan for key in WITHHELD if key in row}
+def _ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str], done: NDArray[np.intp]) -> Ratios:
+    """Density ratios of the joints `done`, with their exact mean square."""
+    study, values = view.study, np.exp(_log_ratios(view, new, names)[done])
+    correlated = [name for name in names if name in study.copula.names]
+    exact = density_ratio.exact((new[name], study.tolerances[name]) for name in names if name not in correlated)
+    square, open_square, largest = exact
+    if correlated:
+        own = _mean_square_of_correlated(study, new, correlated)
+        square, open_square, largest = square + own, open_square + own, np.inf
+    if view.weights is not None:  # the tolerances have at least the share 1 / heaviest of the mixture drawn from
+        square, largest = square + np.log(view.store.heaviest), largest + np.log(view.store.heaviest)
+    return Ratios(values, float(square), float(open_square), float(np.exp(largest)))
+
+
+def _mean_square_of_correlated(study: Study, new: Mapping[str, Distribution], names: Sequence[str]) -> float:
+    """Logarithm of the mean ratio over errors drawn from the new tolerances: its mean square over the old ones."""
+    scores = np.random.default_rng(2024).standard_normal((DRAWS, len(sampling.streams(study))))
+    errors = sampling.from_scores(replace(study, tolerances=dict(new)), scores)
+    return float(np.log(np.mean(np.exp(_block_log_ratios(study, new, names, errors)))))
 
 
 def _check_range(name: str, old: Distribution, new: Distribution) -> list[Fault]:
@@ -178,26 +232,37 @@ def _block_log_ratios(
     return logs
 
 
-def _share_above(load: SampleLoad, weights: Weights, level: float, confidence: float) -> dict[str, Any]:
-    """Row of the table for a limit; `weights` are those of the joints of `load`."""
-    valid = load.is_valid
-    found = reweight.share_above(load.values[valid], _restricted(weights, valid), level, confidence, load.iid)
-    above = weights.values[valid & (load.values > level)].sum()
-    head = {"load": load.name, "unit": load.unit, "level": level, "before": load.above(level, confidence).estimate}
-    bounds = {"bound_lower": above, "bound_upper": above + weights.values[~valid].sum()}
-    return {**head, **found._asdict(), **bounds}
+def _share_above(
+    view: View, load: SampleLoad, done: NDArray[np.intp], ratios: Ratios, confidence: float, delivery: int
+) -> dict[str, Any]:
+    """Row of the table for a limit; `ratios` are those of the joints `done`."""
+    assert load.limit is not None
+    level, known = load.limit, error_budget.near(view, load)
+
+    def share(load: SampleLoad, confidence: float) -> reweight.Share:
+        own = load.only(done)
+        sample = reweight.sort_out(own.values, own.status, ratios)
+        return reweight.share_above(sample, ratios, level, confidence, own.iid)
+
+    def widest(confidence: float) -> tuple[float, float]:
+        """Ends of the interval; with the numerical error where that is known."""
+        ends = [share(one, confidence) for one in (load, *(known or ()))]
+        return min(one.lower for one in ends), max(one.upper for one in ends)
+
+    found = share(load, confidence)
+    before = load.only(done).above(level, confidence).estimate
+    numbers = found._asdict()
+    row = {"load": load.name, "unit": load.unit, "level": level, "before": before}
+    row |= {key: numbers[key] for key in GIVEN}
+    row |= dict(zip(("total_lower", "total_upper"), widest(confidence) if known else (np.nan, np.nan), strict=True))
+    following = prediction.of_share(*widest(prediction.half(confidence)), delivery, confidence)
+    row |= dict(zip(("next_lower", "next_upper"), following, strict=True))
+    return row | {"ess": found.ess} | found.support._asdict()
 
 
-def _quantile(load: SampleLoad, weights: Weights, share: float, confidence: float) -> dict[str, Any]:
-    """Row of the table for a quantile; `weights` are those of the joints of `load`."""
-    part = _restricted(weights, load.is_valid)
-    estimate, lower, upper = reweight.quantile(load.values[load.is_valid], part, share, confidence, load.iid)
+def _quantile(load: SampleLoad, ratios: Ratios, share: float, confidence: float) -> dict[str, Any]:
+    """Row of the table for a quantile; `ratios` are those of the joints of `load`."""
+    sample = reweight.sort_out(load.values, load.status, ratios)
+    found = reweight.quantile(sample, ratios, share, confidence, load.iid)
     before = load.quantile(share, confidence).estimate
-    head = {"load": load.name, "unit": load.unit, "share": share, "before": before}
-    return {**head, "estimate": estimate, "lower": lower, "upper": upper, "ess": part.ess}
-
-
-def _restricted(weights: Weights, joints: NDArray[np.bool_]) -> Weights:
-    """Weights of some of the joints, with the sum 1."""
-    values = weights.values[joints] / weights.values[joints].sum()
-    return weights._replace(values=values, ess=float(1.0 / (values**2).sum()))
+    return {"load": load.name, "unit": load.unit, "share": share, "before": before, **found._asdict()}

@@ -37,4 +37,14 @@ def columns(table: pd.DataFrame) -> tuple[Column, ...]:
         shown=lambda frame: bool((frame["bound_upper"] > frame["bound_lower"]).any()),
         rank=2,
     )
-    return (*shown, unresolved) if limits else shown
+    total = Column(
+        "with numerical error",
+        lambda row: text.span(row["total_lower"], row["total_upper"]),
+        shown=lambda frame: bool(frame["total_lower"].notna().any()),
+        rank=1,
+    )
+    more = (
+        Column("ppm", lambda row: text.ppm(row["estimate"]), rank=2),
+        Column("above in delivery", text.delivery, rank=3),
+    )
+    return (*shown, total, unresolved, *more) if limits else shown

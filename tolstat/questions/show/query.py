@@ -11,6 +11,9 @@ from tolstat.joint import Joint, Operation, nominal_errors, perturb
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, FRAME_I, PIN
 
+NO_OPERATION = Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0)
+"""Operating point of drawings of pins and holes, which do not depend on it."""
+
 
 def dimensions(joint: Joint, alpha: float) -> Dimensions:
     """Dimensions of a joint and the pose of its ideal parts at the input angle 0.
@@ -59,7 +62,7 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
     errors : ndarray, shape (1,), dtype ERROR
         Its errors.
     """
-    par = perturb(joint, errors)[0]
+    par = perturb(joint, NO_OPERATION, errors)[0]
     found = []
     for i, arm in enumerate(ARM_OF_PIN):
         names = PINS[i], HOLES[arm]
@@ -82,7 +85,7 @@ def positive(joint: Joint) -> dict[str, Pair]:
     sizes = {"offset": 0.26 * unit, "tilt": np.radians(15.0), "diameter": 0.4 * unit}
     found = {}
     for kind in KINDS:
-        errors = nominal_errors(1, Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0))
+        errors = nominal_errors(1)
         for name in (PINS[0], HOLES[ARM_OF_PIN[0]]):
             errors[f"{name}.{kind}"] = sizes[kind.partition("_")[0]]
         found[kind] = pairs(joint, errors)[0]

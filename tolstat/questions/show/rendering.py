@@ -65,7 +65,7 @@ def draw_row(joint: Joint, errors: NDArray[np.void], title: str = "") -> Figure:
     title : str
         Headline.
     """
-    d = query.dimensions(joint, float(errors["operation.alpha"][0]))
+    d = query.dimensions(joint, 0.0)
     panel = sheets.one(query.pairs(joint, errors), d, "Seen along z and along t of each pin", "row")
     return sheets.figure([panel], title or "Errors of one joint")
 
@@ -83,8 +83,10 @@ def lengths(joint: Joint, alpha: float) -> pd.DataFrame:
         ("contact.z", d.z, "length of the contact"),
         ("pin.d", joint.pin.d, "diameter of a pin's beam"),
         ("pin.l", joint.pin.l, "length of a pin's beam"),
+        ("arm.width", joint.arm.width or 0.0, "side of an arm's section along t"),
+        ("arm.depth", joint.arm.depth or 0.0, "side of an arm's section along e"),
     ]
-    found = [(name, 1e3 * x, "mm", said) for name, x, said in rows]
+    found = [(name, 1e3 * x, "mm", said) for name, x, said in rows if x or not name.startswith("arm.")]
     found.append(("operation.alpha", float(np.degrees(alpha)), "deg", "misalignment of the shafts"))
     return pd.DataFrame(found, columns=["name", "value", "unit", "meaning"])
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import split
 from tolstat.common.tables import SIMULATED
 from tolstat.display import text
 from tolstat.display.asked import Asked
@@ -16,6 +16,7 @@ from tolstat.display.joint_drawing import sheets
 from tolstat.questions.show import query
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
+from tolstat.store.worst import point_of
 
 LEGEND = (
     "The joint from its own dimensions. Marked: the bushings and pins of the leading loads. Loads of cross1–4 act on "
@@ -39,21 +40,26 @@ def worst(view: View, load: str, asked: Asked) -> Panel | None:
         Takes a note if there is no drawing.
     """
     with asked.noting("the joint is not drawn"):
-        place = load.rpartition(".")[0]
-        front, side, _ = _joint(view, [place] if place else [])
+        place = split(load)[0].rpartition(".")[0]
+        front, side, _ = _joint(view, [place] if place else [], load)
         title = "The joint"
         if place:
             own = view.load(load)
             exceeded = own.limit is not None and own.above(own.limit).count
             title = f"{place}: {'most often above its limit' if exceeded else 'nearest to its limit'}"
             title = title if own.limit is not None else f"{place}: the largest loads"
+            title += f", at {point_of(view, load)}" if len(view.points) > 1 else ""
         return replace(side if place.startswith("fork") else front, key="joint-worst", title=title)
     return None
 
 
-def _joint(view: View, marked: Collection[str]) -> tuple[Panel, Panel, Panel]:
-    alpha = float(view.store.identity["operation.alpha"])
-    return sheets.joint(query.dimensions(joint_of(view.store, 0), alpha), marked)
+def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel, Panel]:
+    """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
+    point = point_of(view, load) if load else view.points[0]
+    front, side, pin = sheets.joint(
+        query.dimensions(joint_of(view.store, 0), view.at(point).store.operation.alpha), marked
+    )
+    return front, replace(side, title=f"{side.title}, at {point}") if point else side, pin
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
@@ -68,7 +74,13 @@ def sections(view: View, asked: Asked) -> list[Section]:
         marked = sorted({name.rpartition(".")[0] for name in view.leading} - {""})
         joint = joint_of(view.store, 0)
         kinds = sheets.errors(query.positive(joint), query.dimensions(joint, 0.0))
-        found.append(Section("joint", "The joint", [Panels([*_joint(view, marked), kinds]), Text(LEGEND, small=True)]))
+        found.append(
+            Section(
+                "joint",
+                "The joint",
+                [Panels([*_joint(view, marked, next(iter(view.leading), "")), kinds]), Text(LEGEND, small=True)],
+            )
+        )
     return found
 
 
@@ -76,13 +88,14 @@ def _worst(view: View) -> list[Panel]:
     """One drawing for each joint that has the largest of a leading load."""
     loads: dict[int, list[str]] = {}
     for name in view.leading:
-        values = np.where(np.isin(view.status, SIMULATED), LOADS[name].of(view.results), np.nan)
+        load = view.load(name)
+        values = np.where(np.isin(load.status, SIMULATED), load.values, np.nan)
         sample = int(np.nanargmax(values))
-        loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), LOADS[name].unit)}")
+        loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), load.unit)}")
     panels = []
     for sample, said in loads.items():
         joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
         errors = view.errors(np.array([sample]))
-        d = query.dimensions(joint, float(errors["operation.alpha"][0]))
+        d = query.dimensions(joint, 0.0)
         panels.append(sheets.one(query.pairs(joint, errors), d, f"Row {row}: {', '.join(said)}", f"drawn-{row}"))
     return panels

@@ -14,7 +14,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_toml
 from tolstat.joint import Joint
 from tolstat.store import Reader
-from tolstat.store.recorded import joint_of
+from tolstat.store.recorded import joint_of, operation_of
 
 ALPHA = float(np.radians(15.0))
 """Misalignment that the joint of a joint file is drawn at, rad."""
@@ -72,7 +72,8 @@ def read(source: str | Path, row: int | None = None, alpha: float | None = None)
         return _titled(joints.load(source, {}, str(source)), path.stem, alpha)
     _refuse(alpha)
     case = study.load(path) if "sampling" in data else study.load_case(path)
-    return Shown(case.joint, case.operation.alpha, path.stem)
+    first = case.points[0].name if isinstance(case, study.Study) else ""
+    return Shown(case.joint, case.operation.alpha, f"{path.stem}, at {first}" if first else path.stem)
 
 
 def _named(name: str, alpha: float | None) -> Shown:
@@ -94,12 +95,14 @@ def _refuse(alpha: float | None) -> None:
 
 
 def _of_file(store: Reader, row: int | None) -> Shown:
-    """Joint of a result file, of its first slot or of a row."""
+    """Joint of a result file, of its first slot or of a row; of several operating points at the first."""
+    at = store.each()[0]
+    where = f", at {at.point}" if at.point else ""
     if row is None:
-        return Shown(joint_of(store, 0), float(store.identity["operation.alpha"]), store.study_name)
+        return Shown(joint_of(store, 0), at.operation.alpha, f"{store.study_name}{where}")
     if row not in store.rows:
         found = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"
         raise InputError([Fault(str(store.path), found, f"give one of these rows, for example --row {store.rows[0]}")])
     slot = store.slot(row)
     errors = store.errors(slice(slot, slot + 1))
-    return Shown(joint_of(store, slot), float(errors["operation.alpha"][0]), f"{store.study_name}, row {row}", errors)
+    return Shown(joint_of(store, slot), operation_of(at, slot).alpha, f"{store.study_name}, row {row}", errors)

@@ -8,7 +8,7 @@
   const [form, load, number, slider, unit, said] = ["", "load", "x", "slider", "unit", "said"].map(part);
   const figures = [...document.querySelectorAll("figure[data-reads]")].map((figure) => ({
     svg: figure.querySelector("svg"),
-    reads: figure.dataset.reads.split(" "),
+    reads: figure.dataset.reads.split(","),
     frame: figure.dataset.frame.split(" ").map(Number),
   }));
 

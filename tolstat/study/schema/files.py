@@ -6,27 +6,28 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from tolstat.common import json_schema, strict
+from tolstat.common import json_schema, loads, strict
 from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import CHANNELS
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
+from tolstat.joint.model import DEFAULT_JOINT
+from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.fatigue import LineEntry, Settings
 from tolstat.study.listed import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
+from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
 from tolstat.study.selection import TOLERANCED, UNITS
-from tolstat.study.stress_point import PointEntry
+from tolstat.study.stress_point import StressPointEntry
 from tolstat.study.swept import KEYS
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
 
-DEFAULT_JOINT = "cirelli2021"
-"""Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
 ERRORS = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
 """Unit of each error that can be given a value."""
 
@@ -44,12 +45,15 @@ class Section(NamedTuple):
         Whether every study needs it.
     in_case : bool
         Whether a case file has it, too.
+    listed : callable, optional
+        Returns the JSON schema of each table where a study may have several, ``[[operation]]``, in place of one.
     """
 
     schema: Callable[[], Schema]
     repeated: bool = False
     required: bool = False
     in_case: bool = False
+    listed: Callable[[], Schema] | None = None
 
 
 @cache
@@ -120,7 +124,10 @@ def limits() -> Schema:
     """JSON schema of the limits of loads."""
     text = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
     made: dict[str, Schema] = {name: {"x-table": _of_unit("limit", unit)} for name, unit in UNIT_OF_LOAD.items()}
-    return table(made) | {"description": text}
+    found = table(made)
+    end = f"(?:{loads.AT}[A-Za-z].*)?$"
+    at_points = {f"{pattern.removesuffix('$')}{end}": own for pattern, own in found["patternProperties"].items()}
+    return found | {"patternProperties": at_points, "description": text}
 
 
 def _positive(unit: str) -> Schema:
@@ -129,13 +136,14 @@ def _positive(unit: str) -> Schema:
 
 
 def numbers(low: float, high: float) -> Schema:
-    """JSON schema of numbers by name or pattern of errors that scatter."""
-    return table({name: {"type": "number", "minimum": low, "maximum": high} for name in TOLERANCED})
+    """JSON schema of numbers by name or pattern of the quantities that are drawn: errors, and vectors of zones."""
+    drawn = [own for name in TOLERANCED for own in (vectors_of(name) if is_zone(name) else (name,))]
+    return table({name: {"type": "number", "minimum": low, "maximum": high} for name in drawn})
 
 
 SECTIONS: dict[str, Section] = {
     "joint": Section(lambda: overrides() | {"required": ["base"]}, required=True, in_case=True),
-    "operation": Section(lambda: of_model(Operation), required=True, in_case=True),
+    "operation": Section(lambda: of_model(Operation), required=True, in_case=True, listed=lambda: of_model(PointEntry)),
     "solver": Section(lambda: of_model(Solver), in_case=True),
     "errors": Section(errors, in_case=True),
     "tolerances": Section(tolerances),
@@ -167,7 +175,7 @@ def tables() -> dict[str, Schema]:
         "shift": numbers(-MAX_SHIFT, MAX_SHIFT),
         "quantity": {"type": ["string", "number"]},
         fits.KEY: of_model(fits.FitEntry),
-        "points": {"type": "object", "additionalProperties": of_model(PointEntry)},
+        "points": {"type": "object", "additionalProperties": of_model(StressPointEntry)},
         "lines": table({name: {"x-table": _of_unit(LineEntry.__name__, unit)} for name, unit in CHANNELS.items()}),
     }
     for name, unit in TOLERANCED.items():
@@ -193,15 +201,18 @@ def study() -> Schema:
 
 def case() -> Schema:
     """JSON schema of a case file."""
-    return _file("Case of tolstat: one joint", {name: s for name, s in SECTIONS.items() if s.in_case})
+    own = {name: section._replace(listed=None) for name, section in SECTIONS.items() if section.in_case}
+    return _file("Case of tolstat: one joint", own)
 
 
 def _file(title: str, sections: dict[str, Section]) -> Schema:
     properties = {}
     for name, section in sections.items():
         made = section.schema()
-        listed = {"type": "array", "items": made, "description": made.get("description", "")}
-        properties[name] = listed if section.repeated else made
+        said = {"description": made.get("description", "")}
+        properties[name] = {"type": "array", "items": made} | said if section.repeated else made
+        if section.listed is not None:
+            properties[name] = {"anyOf": [made, {"type": "array", "items": section.listed(), "minItems": 1}]} | said
     return {
         "title": title,
         "type": "object",

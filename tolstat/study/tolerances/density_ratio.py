@@ -1,8 +1,10 @@
-"""Mean square of the ratio of two densities: how many joints remain effective after reweighting."""
+"""Mean square and largest value of the ratio of two densities: how many joints remain effective after reweighting."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +15,36 @@ MIDPOINTS = 1000
 """Number of midpoints in probability, for distributions on a band."""
 TAIL_NODES, END = 1001, 1e-10
 """Number of nodes in each half of an unbounded distribution, and probability of its outermost node."""
+GROWTH = 0.01
+"""Growth of the logarithm of a ratio over the outermost decade of probability from which on it has no bound."""
+
+
+class Exact(NamedTuple):
+    """What the density ratio of independent errors is over all joints that could be drawn, in logarithms.
+
+    Attributes
+    ----------
+    mean_square : float
+        Mean square of the ratio.
+    unbounded : float
+        Mean square of the ratio of those errors alone whose ratio has no bound; 0 without any.
+    largest : float
+        Largest ratio; infinite without a bound.
+    """
+
+    mean_square: float = 0.0
+    unbounded: float = 0.0
+    largest: float = 0.0
+
+
+def exact(pairs: Iterable[tuple[Distribution, Distribution]]) -> Exact:
+    """Sum up the errors of a joint, each with its new and its old distribution."""
+    found = Exact()
+    for new, old in pairs:
+        square, largest = log_mean_square(new, old), log_largest(new, old)
+        open_square = 0.0 if math.isfinite(largest) else square
+        found = Exact(found.mean_square + square, found.unbounded + open_square, found.largest + largest)
+    return found
 
 
 def unbounded(found: Distribution) -> bool:
@@ -43,6 +75,33 @@ def log_mean_square(new: Distribution, old: Distribution) -> float:
     if isinstance(new, Rayleigh) and isinstance(old, Rayleigh) and new.upper is None and old.upper is None:
         return 2.0 * _of_normals(new.sigma / old.sigma)  # both coordinates are normal
     return _over_tails(new, old) if unbounded(new) else _over_band(new, old)
+
+
+def log_largest(new: Distribution, old: Distribution) -> float:
+    """Logarithm of the largest density ratio `new` / `old`; infinite where the ratio has no bound.
+
+    In closed form as `log_mean_square`, otherwise the largest at steps of the probability of `new`: at the same steps
+    from both ends, and it has no bound if it still grows as a power of the probability at an end.
+    """
+    if isinstance(new, Normal) and isinstance(old, Normal):
+        return _largest_of_normals(new.sigma / old.sigma, (new.mean - old.mean) / old.sigma)
+    if isinstance(new, Rayleigh) and isinstance(old, Rayleigh) and new.upper is None and old.upper is None:
+        return 2.0 * _largest_of_normals(new.sigma / old.sigma)
+    u, largest = np.geomspace(END, 0.5, TAIL_NODES), -math.inf
+    decade = int(np.searchsorted(u, 10.0 * END))
+    for x in (new.ppf(u), new.ppf(1.0 - u)):
+        logs = new.logpdf(x) - old.logpdf(x)
+        if np.isposinf(logs).any() or logs[0] > logs[decade] + GROWTH:
+            return math.inf
+        largest = max(largest, float(np.nanmax(logs)))
+    return largest
+
+
+def _largest_of_normals(ratio: float, shift: float = 0.0) -> float:
+    """``log_largest`` of normal distributions; parameters as in `_of_normals`."""
+    if ratio < 1.0:
+        return 0.5 * shift**2 / (1.0 - ratio**2) - math.log(ratio)
+    return 0.0 if ratio == 1.0 and shift == 0.0 else math.inf
 
 
 def _of_normals(ratio: float, shift: float = 0.0) -> float:

@@ -1,7 +1,7 @@
 """Common base of the entries of ``[tolerances]``: the error that an entry is for, and its band.
 
 A band is ``plus_minus`` about the nominal value, ``lower`` and ``upper``, or ``iso2768`` and ``nominal``.
-Limits and means are deviations for geometry, the values themselves for ``operation.*`` and ``material.*``.
+Limits and means are deviations from nominal; of ``material.*`` the values themselves.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
 from tolstat.common import strict, units
@@ -111,6 +112,9 @@ def _read_half_width(value: object, info: ValidationInfo) -> float:
     return units.to_si(value, site.unit, PLUS_MINUS)
 
 
+_NEARLY_ALL = np.array([1e-3, 1.0 - 1e-3])
+"""Probabilities between which an error of the operating point must be zero."""
+
 Positive = Annotated[Value, AfterValidator(units.positive)]
 HalfWidth = Annotated[
     float, BeforeValidator(_read_half_width), AfterValidator(units.positive), WithJsonSchema({"x-unit": "error"})
@@ -156,7 +160,14 @@ class SingleEntry(ToleranceEntry):
 
     def quantities(self, site: Site) -> dict[str, Distribution]:
         """See `ToleranceEntry.quantities`."""
-        return {site.name: self.build(site)}
+        found = self.build(site)
+        if site.name.startswith("operation."):
+            low, high = found.ppf(_NEARLY_ALL)
+            if not low <= 0.0 <= high:
+                values = " to ".join(units.shown(float(end), site.unit) for end in (low, high))
+                remedy = "give deviations from [operation], and change a value there that is another on average"
+                raise refuse(f"deviations of {values} leave out the operating point itself", remedy)
+        return {site.name: found}
 
     def meaning(self, site: Site) -> list[Meaning]:
         """See `ToleranceEntry.meaning`."""
@@ -266,4 +277,6 @@ class Banded(HalfBand):
         """See `SingleEntry.number`."""
         if self.lower is None or self.upper is None:
             return super().number(site)
-        return f"limits {units.shown(self.lower, site.unit)} to {units.shown(self.upper, site.unit)}"
+        ends = [units.shown(end, site.unit) for end in (self.lower, self.upper)]
+        numbers = [end.partition(" ")[0] for end in ends]
+        return f"{numbers[0]} to {ends[1]}" if numbers[0] != ends[0] else " to ".join(ends)

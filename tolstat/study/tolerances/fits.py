@@ -17,6 +17,7 @@ from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import Strict
 from tolstat.common.tables import HOLES, PINS
+from tolstat.display.text import percent
 from tolstat.study import selection
 from tolstat.study.selection import Entry
 from tolstat.study.tolerances import iso286, kinds
@@ -32,8 +33,8 @@ PAIRS = len(PINS)
 EXAMPLE = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
 _KEYS_OF = {"cpk": "normal", "truncate": "normal", "a": "beta", "b": "beta"}
 """Keys of one distribution, which others do not have."""
-NEGLIGIBLE = 1e-12
-"""Probability of a misfit that is not told."""
+NEGLIGIBLE = 1e-8
+"""Probability of a misfit of one pair that is not told."""
 _POINTS = 4000
 """Number of midpoints in probability of each diameter."""
 
@@ -127,7 +128,7 @@ class Fit(NamedTuple):
             f"radial clearance {zones.least / 2:g} to {zones.largest / 2:g} um",
         ]
         if self.misfit > NEGLIGIBLE:
-            lines.append(f"fit: {_percent(self.misfit_joints)} of the joints do not go together")
+            lines.append(f"fit: {percent(self.misfit_joints)} of the joints do not go together")
         return lines
 
     @property
@@ -179,17 +180,13 @@ def _refusal(entry: FitEntry, zones: iso286.Zones, share: float, where: str) -> 
     article = "an" if zones.kind == "interference" else "a"
     found = (
         f"{entry.code} is {article} {zones.kind} fit, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
-        f"{_percent(_any_pair(share))} of the joints do not go together ({_percent(share)} of the pairs)"
+        f"{percent(_any_pair(share))} of the joints do not go together ({percent(share)} of the pairs)"
     )
     return Fault(where, found, "give a clearance fit, such as H7/g6, H7/f7 or H8/e8")
 
 
 def _signed(value: float) -> str:
     return f"{value:+g}" if value else "0"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
 
 
 def _any_pair(share: float) -> float:

@@ -1,13 +1,23 @@
-"""What the entries of ``[tolerances]`` mean, as a table."""
+"""What the entries of ``[tolerances]`` and ``[[correlation]]`` mean, as tables."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from tolstat.common.tables import HOLES, PINS
+from tolstat.study.tolerances.correlation import Copula
+from tolstat.study.tolerances.distributions import Array, Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.moments import mean, standard_deviation
+
+NODES = 64
+"""Number of Gauss–Hermite nodes of each of two normal scores."""
 
 
 def table(entries: Sequence[Toleranced]) -> pd.DataFrame:
@@ -36,6 +46,96 @@ def table(entries: Sequence[Toleranced]) -> pd.DataFrame:
     cells = [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()]
     made = pd.DataFrame(cells, columns=columns)
     return made[["entry", "number", "errors", "unit", "sigma", "outside"]]
+
+
+def exact(entries: Sequence[Toleranced], fixed: Iterable[str]) -> list[str]:
+    """Offsets and tilts of pins and holes that no entry and no fixed error sets, as patterns.
+
+    Parameters
+    ----------
+    entries : sequence of Toleranced
+        Entries of a study; without any nothing is said.
+    fixed : iterable of str
+        Names of the errors that every joint has.
+
+    Returns
+    -------
+    list of str
+        ``["pin*.offset_*", "hole[12].tilt_z"]``, those of the pins first.
+    """
+    named = set(fixed) | {
+        name for entry in entries for site, model in entry.models for m in model.meaning(site) for name in m.errors
+    }
+    found: dict[tuple[str, str, str], str] = {}
+    for kind, axes in (("offset", "etz"), ("tilt", "tz")) if entries else ():
+        for features in (PINS, HOLES):
+            for axis in axes:
+                missing = [name for name in features if f"{name}.{kind}_{axis}" not in named]
+                if missing:
+                    body = features[0].rstrip("1234")
+                    key = (body, _choice([name[-1] for name in missing], 4), kind)
+                    found[key] = found.get(key, "") + axis
+    patterns = [
+        f"{body}{which}.{kind}_{_choice(list(parts), 3 if kind == 'offset' else 2)}"
+        for (body, which, kind), parts in found.items()
+    ]
+    return sorted(patterns, key=lambda pattern: not pattern.startswith("pin"))
+
+
+def _choice(parts: Sequence[str], of: int) -> str:
+    """Characters of a name as a pattern: ``*`` for all `of` them, ``[12]`` for several, the one itself."""
+    if len(parts) == of:
+        return "*"
+    return f"[{''.join(parts)}]" if len(parts) > 1 else parts[0]
+
+
+def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.DataFrame:
+    """Make one row for each pair of kinds of errors that are correlated alike.
+
+    Parameters
+    ----------
+    copula : Copula
+        Correlation of the normal scores.
+    tolerances : mapping of str to Distribution
+        Distribution of each error.
+
+    Returns
+    -------
+    DataFrame
+        ``errors``, the first pair; ``pairs``, number of pairs; ``rho`` of their normal scores, as the study gives it;
+        ``pearson``, linear correlation of the errors themselves; ``spearman``, rank correlation.
+    """
+    rows: dict[tuple[float, float], list[str]] = {}
+    for (i, one), (j, other) in combinations(enumerate(copula.names), 2):
+        if rho := float(copula.matrix[i, j]):
+            linear = pearson(tolerances[one], tolerances[other], rho)
+            rows.setdefault((rho, float(f"{linear:.4g}")), []).append(f"{one}, {other}")
+    cells = [
+        (pairs[0], len(pairs), rho, linear, 6.0 / math.pi * math.asin(0.5 * rho))
+        for (rho, linear), pairs in rows.items()
+    ]
+    return pd.DataFrame(cells, columns=["errors", "pairs", "rho", "pearson", "spearman"])
+
+
+def pearson(one: Distribution, other: Distribution, rho: float) -> float:
+    """Linear correlation of two errors whose normal scores have the correlation `rho`: smaller unless both are normal.
+
+    Gauss–Hermite quadrature over both scores.
+    """
+    from scipy.special import ndtr
+
+    if isinstance(one, Normal) and isinstance(other, Normal):
+        return rho
+    z, weight = np.polynomial.hermite_e.hermegauss(NODES)
+    weight = weight / weight.sum()
+
+    def values(found: Distribution, scores: Array) -> Array:
+        return found.ppf(np.clip(ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - mean(found)
+
+    second = rho * z[:, None] + math.sqrt(1.0 - rho**2) * z
+    y = values(other, second.ravel()).reshape(second.shape)
+    covariance = float((weight * values(one, z)) @ y @ weight)
+    return covariance / (standard_deviation(one) * standard_deviation(other))
 
 
 def _pattern(keys: Sequence[str]) -> str:

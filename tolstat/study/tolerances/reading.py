@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tolstat.common.errors import Fault, gather
-from tolstat.joint import Joint, Operation
+from tolstat.joint import Joint
 from tolstat.study.axes import ORIENTATIONS, Axis
 from tolstat.study.bonus import REJECT, Bonus
 from tolstat.study.selection import TOLERANCED, Entry
@@ -26,14 +26,11 @@ class Nominal(NamedTuple):
     ----------
     joint : Joint, optional
         None if it could not be read.
-    operation : Operation, optional
-        None if it could not be read.
     folder : Path
         Folder of the study file.
     """
 
     joint: Joint | None
-    operation: Operation | None
     folder: Path
 
 
@@ -96,13 +93,12 @@ def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: st
         with gather(faults):
             for name in names:
                 site = site_of(name, nominal)
-                if site is not None:
-                    direction = next((directions[own] for own in _partners(name) if own in directions), None)
-                    site = site._replace(shared=name in shared, direction=direction if _is_position([name]) else None)
-                    site = site._replace(diameter=diameters.get(name) if _is_position([name]) else None)
-                    models.append((site, entry(one.value, site, place, one.path)))
-                    diameters |= _diameter(*models[-1])
-                    directions |= {name: models[-1][1]} if name.endswith(ORIENTATIONS) else {}
+                direction = next((directions[own] for own in _partners(name) if own in directions), None)
+                site = site._replace(shared=name in shared, direction=direction if _is_position([name]) else None)
+                site = site._replace(diameter=diameters.get(name) if _is_position([name]) else None)
+                models.append((site, entry(one.value, site, place, one.path)))
+                diameters |= _diameter(*models[-1])
+                directions |= {name: models[-1][1]} if name.endswith(ORIENTATIONS) else {}
         if models and len(models) == len(names):
             found[number] = Toleranced(one.pattern, one.value, tuple(models))
     entries = tuple(found[number] for number in sorted(found))
@@ -113,19 +109,14 @@ def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: st
     return Tolerances(entries, axes)
 
 
-def site_of(name: str, nominal: Nominal) -> Site | None:
-    """What an entry for an error or zone is for; None where its nominal value is not known."""
-    center = nominal_value(name, nominal.operation)
-    if center is None:
-        return None
+def site_of(name: str, nominal: Nominal) -> Site:
+    """What an entry for an error or zone is for."""
     reach = math.nan if nominal.joint is None else nominal.joint.cross.R
-    return Site(name, TOLERANCED[name], center, nominal.folder, reach)
+    return Site(name, TOLERANCED[name], nominal_value(name), nominal.folder, reach)
 
 
-def nominal_value(name: str, operation: Operation | None) -> float | None:
-    """Value of an error in the nominal joint (SI); None for an operating point that could not be read."""
-    if name.startswith("operation."):
-        return None if operation is None else float(getattr(operation, name.removeprefix("operation.")))
+def nominal_value(name: str) -> float:
+    """Value of an error in the nominal joint (SI)."""
     return 1.0 if name == "material.E_factor" else 0.0
 
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
-from tolstat.common import json_schema, units
+from tolstat.common import json_schema, notation, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import dotted, refuse
 from tolstat.study import axes
@@ -47,13 +48,26 @@ MARKS = ("Ⓜ", "(M)")
 """Sign of the maximum material requirement behind the size of a zone."""
 
 
-def _read(value: object) -> Zone:
+def _read(value: object, info: ValidationInfo) -> Zone:
+    written = notation.read(value) if isinstance(value, str) else None
+    if written is not None and written.mark == notation.PLUS_MINUS:
+        raise _band(written, (info.context or {})["site"].name)
     mark = next((mark for mark in MARKS if isinstance(value, str) and value.rstrip().endswith(mark)), None)
     if mark is not None:
         value = str(value).rstrip().removesuffix(mark)
     round_ = units.is_diameter(value)
     size = units.diameter(value) if round_ else units.to_si(value, "m")
     return Zone(units.positive(size), round_, mark is not None)
+
+
+def _band(written: notation.Written, name: str) -> PydanticCustomError:
+    """Fault of a half width in place of a zone."""
+    size = f"{written.number:g} {written.unit}"
+    of, sign, errors = "width", "", "tilt_t and tilt_z"
+    if not name.endswith(ORIENTATIONS):
+        of, sign, errors = "diameter", notation.DIAMETER, "offset_t and offset_z"
+    remedy = f'write the {of} of the zone: "{sign}{size}", or give {errors} with plus_minus in place of a zone'
+    return refuse(f"{{input}} is a band, and a zone has a {of}", remedy)
 
 
 class ZoneEntry(ToleranceEntry):
@@ -63,10 +77,18 @@ class ZoneEntry(ToleranceEntry):
         Zone,
         BeforeValidator(_read),
         WithJsonSchema(json_schema.quantity("m", "⌀0.1 mm")),
-        Field(description="size of the zone; ⌀ or dia before the number say that it is a diameter"),
+        Field(
+            description="size of the zone; ⌀ or dia before the number say that it is a diameter",
+            examples=["⌀0.1 mm"],
+        ),
     ]
     over: Annotated[
-        PositiveLength, Field(description="length of the pin or hole that the drawing tolerances", examples=["22 mm"])
+        PositiveLength,
+        Field(
+            description="length over which the zone holds: of a pin or hole; of the common axis of a pair from face to "
+            "face, with the joint's centre in the middle, such as 2 (R + z/2) (coaxiality: of each pin or hole)",
+            examples=["22 mm"],
+        ),
     ]
     distribution: Annotated[
         Literal["normal", "uniform"],
@@ -307,6 +329,38 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
     if faults:
         raise InputError(list(dict.fromkeys(faults)))
     return found
+
+
+def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[str, str, str]]:
+    """Common axes that are toleranced over less than the distance of their two features.
+
+    Parameters
+    ----------
+    entries : sequence of Toleranced
+        All entries of a study.
+    length : float
+        Length of each pin and hole, m.
+
+    Yields
+    ------
+    tuple of str
+        Key, what is wrong with it, and the remedy.
+    """
+    for entry in entries:
+        for site, model in entry.models:
+            if not isinstance(model, PositionEntry | OrientationEntry) or site.name.partition(".")[0] not in PAIRS:
+                continue
+            apart = 2.0 * site.reach
+            if model.over < apart * (1.0 - 1e-9):
+                found = (
+                    f"{units.shown(model.over, 'm')} is shorter than the {units.shown(apart, 'm')} between the bearings"
+                )
+                remedy = (
+                    "for a common axis over is the length from face to face with the joint's centre in the middle, "
+                    f"here 2 (R + z/2) = {units.shown(apart + length, 'm')}"
+                )
+                yield f"tolerances.{entry.pattern}.over", found, remedy
+                break
 
 
 def _contradictions(direction: Any, position: PositionEntry, where: str) -> list[Fault]:

@@ -1,0 +1,98 @@
+"""Combinations of errors of pins and holes: known ones are found, and motions of the cross use no clearance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tolstat
+from tests.support import synthetic
+from tests.support.views import OPERATION
+from tolstat import sampling, study
+from tolstat.common.errors import StoreError
+from tolstat.common.tables import ERROR, PINS, Simulation
+from tolstat.display.asked import Asked
+from tolstat.joint import HOLE_OF_PIN, load, perturb
+from tolstat.questions.causes import pairs_section
+from tolstat.questions.causes.pairs import MISSED, combinations
+from tolstat.store import Reader, ResultStore
+
+TEXT = (
+    synthetic.HEAD
+    + """[tolerances]
+"pin*.offset_z" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }
+"hole*.offset_z" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }
+"pin*.tilt_t" = { plus_minus = "0.2 deg", distribution = "normal", cpk = 1.0 }
+
+[sampling]
+n = 600
+seed = 5
+
+[limits]
+"cross1.F" = "900 N"
+"""
+)
+
+
+@pytest.fixture
+def path(tmp_path):
+    """Campaign whose load grows with how far the axes miss each other."""
+    source = tmp_path / "made.toml"
+    source.write_text(TEXT, encoding="utf-8")
+    plan = study.load(source)
+    errors = sampling.draw(plan)
+    results = synthetic.results(plan.rows)
+    use = combinations(errors, perturb(plan.joint, plan.operation, errors))[MISSED]
+    results["F_max"][:, 0] = 640.0 + 800.0 * use + np.random.default_rng(1).normal(0.0, 5.0, plan.rows)
+    with ResultStore.create(tmp_path / "made.h5", plan, errors) as store:
+        store.write(np.arange(plan.rows), Simulation(results, None))
+    return tmp_path / "made.h5"
+
+
+def test_the_cause_is_found_on_one_half_and_shown_on_the_other(path):
+    with Reader.open(path) as store:
+        found = tolstat.pairs_of(store.view(), "cross1.F")
+    assert found.name == MISSED
+    assert found.correlation > 0.95 > 0.5 > found.single
+    assert len(found.use) == len(found.values) == 300
+    assert next(iter(found.others)) == MISSED
+
+
+def test_motions_of_the_cross_use_no_clearance():
+    """A cross that moves along z and turns about its axes: pins 1 and 2 move apart along z, as do 3 and 4."""
+    errors = np.zeros(3, ERROR)
+    errors["material.E_factor"] = 1.0
+    shifts = {"pin1": (1.0, 1.0, 0.0), "pin2": (1.0, -1.0, 0.0), "pin3": (1.0, 0.0, 1.0), "pin4": (1.0, 0.0, -1.0)}
+    for pin, own in shifts.items():
+        errors[f"{pin}.offset_z"] = 1e-5 * np.array(own)
+    joint = load("cirelli2021", {}, "test")
+    np.testing.assert_allclose(combinations(errors, perturb(joint, OPERATION, errors))[MISSED], 0.0, atol=1e-12)
+    errors["pin1.offset_z"] += 4e-5
+    np.testing.assert_allclose(combinations(errors, perturb(joint, OPERATION, errors))[MISSED], 4e-5 / 4e-4, rtol=1e-9)
+
+
+def test_equal_tilts_of_pin_and_hole_use_no_clearance():
+    errors = np.zeros(2, ERROR)
+    errors["material.E_factor"] = 1.0
+    for pin in PINS:
+        errors[f"{pin}.tilt_t"] = errors[f"{HOLE_OF_PIN[pin]}.tilt_t"] = 1e-3
+    errors["pin2.tilt_t"][1] = -1e-3
+    joint = load("cirelli2021", {}, "test")
+    found = combinations(errors, perturb(joint, OPERATION, errors))
+    reach = np.abs(joint.contact.springs().s).max()
+    np.testing.assert_allclose(found["tilt of pin2 against hole3 about t"], [0.0, 2e-3 * reach / 1e-4], rtol=1e-9)
+    assert found["largest tilt of a pin against its hole about t"][0] == 0.0
+
+
+def test_the_page_shows_the_scatter_with_the_limit(path):
+    with Reader.open(path) as store:
+        (section,) = pairs_section.sections(store.view(), Asked(path))
+    assert [block.kind for block in section.blocks] == ["text", "panels", "table", "text"]
+    assert MISSED in section.blocks[0].text
+    assert "of the others" in section.blocks[0].text
+
+
+def test_too_few_joints_are_refused(tmp_path):
+    file = synthetic.store(tmp_path)
+    with Reader.open(file) as store, pytest.raises(StoreError, match="60 joints"):
+        tolstat.pairs_of(store.view(), "cross1.F")

@@ -1,0 +1,529 @@
+"""Lines of the drawing with other widths: what is drawn, what the file keeps, what is told."""
+
+from __future__ import annotations
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from typer.testing import CliRunner
+
+import tolstat
+from tests.support import synthetic
+from tolstat import sampling, study
+from tolstat.campaign import what_if as sets
+from tolstat.campaign.extend import extend, merge
+from tolstat.cli import app
+from tolstat.common.errors import InputError, StoreError
+from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.display import text
+from tolstat.display.asked import Asked
+from tolstat.joint import perturb
+from tolstat.questions.what_if import query, rendering
+from tolstat.questions.what_if import run as runner
+from tolstat.questions.what_if.section import sections
+from tolstat.report.headline import headline
+from tolstat.solver import stationary
+from tolstat.solver.simulation import simulate_rows
+from tolstat.store import Reader, ResultStore, what_if
+from tolstat.study import widths
+from tolstat.study.widths import COARSER, EXACT, FINER, HALF, Line
+
+TEXT = (
+    synthetic.HEAD
+    + """[tolerances]
+"pin*.tilt_t" = { iso2768 = "f", nominal = "36.4 mm", distribution = "normal", cpk = 1.0 }
+"pin*.offset_z" = { iso2768 = "f", nominal = "72.8 mm", distribution = "normal", cpk = 1.0 }
+"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }
+
+[sampling]
+n = 400
+seed = 3
+
+[limits]
+"cross1.F" = "700 N"
+"""
+)
+N = 400
+
+
+def loaded(folder, text=TEXT):
+    source = folder / "made.toml"
+    source.write_text(text, encoding="utf-8")
+    return study.load(source)
+
+
+def stand_in(params, options, histories="none", n_harmonics=0):
+    """Loads at 100 N m from one tilt and one offset: 640 N, 40 N a sigma of the tilt, 15 N a sigma of the offset."""
+    results = np.zeros(len(params), RESULT)
+    tilt = -params["pin_axis"][:, 0, 2] / 0.0029  # about t of pin 1: its axis leaves along z
+    offset = params["pin_point"][:, 1, 2] / 5e-5
+    factor = params["torque"] / 100.0
+    results["F_max"][:] = (factor * (640.0 + 40.0 * np.abs(tilt) + 15.0 * np.abs(offset)))[:, None]
+    results["status"], results["settled"] = Status.OK, 1
+    stationary.fill_intervals(results)
+    return Simulation(results, {})
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """The stand-in takes the place of the solver, in this process."""
+    monkeypatch.setattr(sets, "simulate_rows", stand_in)
+    monkeypatch.setattr(runner, "warm_up", lambda: None)
+    monkeypatch.setattr(runner, "FIRST", 512)
+    monkeypatch.setattr(runner, "MOST", 1024)
+
+
+def made(folder, text=TEXT):
+    """Campaign of the stand-in."""
+    plan = loaded(folder, text)
+    errors = sampling.draw(plan)
+    file = folder / "made.h5"
+    with ResultStore.create(file, plan, errors) as store:
+        store.write(np.arange(plan.rows), stand_in(perturb(plan.joint, plan.operation, errors), None))
+    return file
+
+
+@pytest.fixture
+def path(tmp_path):
+    return made(tmp_path)
+
+
+def line(plan, label):
+    return next(own for own in widths.lines(plan) if own.label == label)
+
+
+def test_other_lines_keep_their_errors_to_the_last_bit(tmp_path):
+    plan = loaded(tmp_path)
+    base = sampling.draw(plan)
+    for step in widths.STEPS:
+        change = sets.narrowed(plan, line(plan, "pin*.tilt_t"), step)
+        errors = change.draw(range(N))
+        for name in errors.dtype.names:
+            same = errors[name].tobytes() == base[name][plan.first_sample :].tobytes()
+            assert same == (not name.endswith("tilt_t") or name.startswith("hole"))
+
+
+@pytest.mark.parametrize(("step", "factor"), [(HALF, 0.5), (EXACT, 0.0), (FINER, 0.63), (COARSER, 1.6)])
+def test_a_band_is_narrowed_about_its_middle(tmp_path, step, factor):
+    plan = loaded(tmp_path)
+    base = sampling.draw(plan)["hole2.diameter"][plan.first_sample :]
+    errors = sets.narrowed(plan, line(plan, "hole*.diameter"), step).draw(range(N))
+    np.testing.assert_allclose(errors["hole2.diameter"], 15e-6 + factor * (base - 15e-6), rtol=0, atol=1e-18)
+
+
+def test_iso_classes_are_followed_where_there_are_any(tmp_path):
+    plan = loaded(tmp_path)
+    # ±0.15 mm becomes ±0.3 mm; the angle has the same width in class m, and no class is finer than f
+    assert widths.words(plan, line(plan, "pin*.offset_z"), COARSER) == "class m"
+    assert next(iter(widths.changed(plan, line(plan, "pin*.offset_z"), COARSER).values())).factor == pytest.approx(2.0)
+    assert widths.words(plan, line(plan, "pin*.offset_z"), FINER) == "× 0.63"
+    assert widths.words(plan, line(plan, "pin*.tilt_t"), COARSER) == "× 1.6"
+
+
+def test_a_finer_fit_keeps_the_limit_at_the_basic_size(tmp_path):
+    fit = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "uniform" }'
+    holes = '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }'
+    plan = loaded(tmp_path, TEXT.replace(holes, fit))
+    hole, pin = line(plan, "hole*.diameter"), line(plan, "pin*.diameter")
+    assert [widths.words(plan, own, FINER) for own in (hole, pin)] == [
+        "H6 (mean clearance −2.75 µm)",  # radial: half of 9.5 - 15 um
+        "f6 (mean clearance −2.75 µm)",
+    ]
+    assert widths.words(plan, pin, COARSER) == "f8 (mean clearance +4 µm)"
+    ends = np.array([0.0, 1.0])
+    middle = 15e-6  # of H7, which the nominal diameter is
+    found = widths.changed(plan, hole, FINER)["hole1.diameter"].ppf(ends) + middle
+    np.testing.assert_allclose(found, [0.0, 19e-6], atol=1e-12)  # ISO 286-1: H6 at 76 mm is 0 to +19 um
+    found = widths.changed(plan, pin, COARSER)["pin1.diameter"].ppf(ends) - 45e-6
+    np.testing.assert_allclose(found, [-76e-6, -30e-6], atol=1e-12)  # f8: -30 to -76 um
+
+
+def test_density_of_a_rescaled_distribution(tmp_path):
+    plan = loaded(tmp_path)
+    own = widths.changed(plan, line(plan, "pin*.tilt_t"), HALF)["pin1.tilt_t"]
+    x = np.linspace(*own.ppf(np.array([1e-9, 1 - 1e-9])), 20001)
+    assert np.trapezoid(np.exp(own.logpdf(x)), x) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_exchanged_joints_have_the_line_of_their_partner(tmp_path):
+    plan = loaded(tmp_path)
+    base = sampling.draw(plan)[plan.first_sample :]
+    errors = sets.exchanged(plan, line(plan, "pin*.tilt_t")).draw(range(3, 9))
+    np.testing.assert_allclose(errors["pin3.tilt_t"], base["pin3.tilt_t"][7:18:2], rtol=1e-12)
+    np.testing.assert_allclose(errors["pin3.offset_z"], base["pin3.offset_z"][6:18:2], rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_an_unchanged_line_gives_the_joints_of_the_campaign(tmp_path):
+    """Loads of the campaign's joints, simulated as joints of a change that changes nothing, are the same bits."""
+    plan = loaded(tmp_path, TEXT.replace("n = 400", "n = 8"))
+    options = plan.solver.options()
+    base = simulate_rows(perturb(plan.joint, plan.operation, sampling.draw(plan)), options).results
+    again = simulate_rows(perturb(plan.joint, plan.operation, sets.as_drawn(plan).draw(range(8))), options).results
+    assert base[plan.first_sample :].tobytes() == again.tobytes()
+
+
+@pytest.mark.usefixtures("quick")
+def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
+    done = runner.simulate(path, budget=60.0, workers=1)
+    assert (done.simulated > 0, done.each >= 400, done.settled) == (True, True, True)
+    with Reader.open(path) as store:
+        found = query.what_if(store.view(), "cross1.F")
+    assert list(dict.fromkeys(found.table["line"])) == ["pin*.tilt_t", "pin*.offset_z", "hole*.diameter"]
+    row = found.table.set_index(["line", "step"]).loc[("pin*.tilt_t", HALF)]
+    other = loaded(tmp_path, TEXT.replace('iso2768 = "f", nominal = "36.4 mm"', 'plus_minus = "0.25 deg"'))
+    n = int(row["n"])
+    joints = sampling.draw(study.load(other.path, n=n))[other.first_sample :]
+    expected = stand_in(perturb(other.joint, other.operation, joints), None).results["F_max"][:, 0] > 700.0
+    assert row["share"] == pytest.approx(expected.mean(), abs=1e-12)
+    assert row["change_upper"] < 0.0
+    assert row["share_lower"] < row["share"] < row["share_upper"]
+    unchanged = found.table[found.table["line"] == "hole*.diameter"]
+    assert (unchanged["change"] == 0.0).all()
+    indices = found.indices.set_index("line")
+    assert indices.loc["pin*.tilt_t", "in_all"] > 0.5 > 0.3 > indices.loc["pin*.offset_z", "in_all"]
+    assert indices.loc["hole*.diameter", "in_all"] == pytest.approx(0.0, abs=1e-12)
+    said = rendering.sentence(found)
+    assert said.startswith("Halve the tilt tolerance of the pins (±0.5 deg) and ")
+    assert said.endswith(" exceed the limit")
+    half, exact = (
+        found.table.set_index(["line", "step"]).loc[("pin*.tilt_t", step), "share"] for step in (HALF, EXACT)
+    )
+    assert rendering.sentence(found, half) == said
+    assert rendering.sentence(found, 0.5 * (half + exact)).startswith("Halving a single line is not enough: halving")
+    assert rendering.sentence(found, -1.0).startswith(
+        "No single line is enough: halving the tilt tolerance of the pins"
+    )
+    assert rendering.sentence(found, -1.0).endswith(f"exact {text.percent(exact)}")
+
+
+@pytest.mark.usefixtures("quick")
+def test_fewer_changed_joints_move_the_share_of_all(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        whole = query.what_if(view, "cross1.F")
+        view.altered = {
+            name: one._replace(loads=one.loads[:100], status=one.status[:100]) if one.about["kind"] == "width" else one
+            for name, one in view.altered.items()
+        }
+        part = query.what_if(view, "cross1.F")
+    assert (part.n, part.share) == (whole.n, whole.share)
+    np.testing.assert_allclose(part.table["share"], (part.share + part.table["change"]).clip(0.0, 1.0))
+    still = part.table[part.table["line"] == "hole*.diameter"]
+    assert (still["share"] == part.share).all()
+    assert (
+        (part.table["share_lower"] <= part.table["share"]) & (part.table["share"] <= part.table["share_upper"])
+    ).all()
+    assert (part.table["share_upper"] - part.table["share_lower"]).mean() > 0.01
+
+
+@pytest.mark.usefixtures("quick")
+def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, tmp_path, monkeypatch):
+    whole, blocks = tmp_path / "whole.h5", []
+    whole.write_bytes(path.read_bytes())
+    runner.simulate(whole, budget=60.0, workers=1)
+
+    def failing(*arguments, **options):
+        blocks.append(1)
+        if len(blocks) == 9:
+            raise KeyboardInterrupt
+        return stand_in(*arguments, **options)
+
+    monkeypatch.setattr(sets, "simulate_rows", failing)
+    with pytest.raises(KeyboardInterrupt):
+        runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        begun = what_if.read(store)
+    assert 0 < sum(len(one.status) for one in begun.values()) < 9 * sets.BLOCK
+    monkeypatch.setattr(sets, "simulate_rows", stand_in)
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store, Reader.open(whole) as other:
+        found, expected = what_if.read(store), what_if.read(other)
+    assert found.keys() == expected.keys()
+    for name, one in found.items():
+        assert (one.first, one.loads.tobytes(), one.status.tobytes()) == (
+            expected[name].first,
+            expected[name].loads.tobytes(),
+            expected[name].status.tobytes(),
+        )
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_damaged_set_is_not_used(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with h5py.File(path, "r+") as file:
+        name = next(iter(file["what_if"]))
+        file[f"what_if/{name}/loads"][3, 0] += 1.0
+    with Reader.open(path) as store:
+        assert name not in what_if.read(store)
+        assert len(what_if.read(store)) > 5
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_longer_campaign_keeps_them(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        before = what_if.read(store)
+    extend(path, N + 50)
+    with Reader.open(path) as store:
+        assert what_if.read(store).keys() == before.keys()
+        assert query.what_if(store.view(), "cross1.F").n == max(N, *(one.end for one in before.values()))
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_budget_ends_it(path):
+    done = runner.simulate(path, budget=1e-6, workers=1)
+    assert (done.simulated, done.settled) == (0, False)
+
+
+@pytest.mark.usefixtures("quick")
+def test_groups_and_features_are_lines_of_their_own(path):
+    runner.simulate(path, groups=["all = pin*.tilt_t, pin*.offset_z"], each="feature", budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        found = query.what_if(store.view(), "cross1.F")
+    lines = list(dict.fromkeys(found.table["line"]))
+    assert lines[0] == "all"
+    assert {"pin1 and hole4", "pin2 and hole3"} < set(lines)
+    assert found.missing == ("pin*.tilt_t", "pin*.offset_z", "hole*.diameter")
+    assert "tolerances of all" in rendering.sentence(found)
+
+
+def test_faults_of_groups_are_listed_together(tmp_path):
+    plan = loaded(tmp_path)
+    with pytest.raises(InputError) as caught:
+        widths.named(plan, ["tilts", "a = pin*.tilt_x", "b = pin1.tilt_t"])
+    assert len(caught.value.faults) == 2
+    assert widths.named(plan, ["b = pin1.tilt_t"]) == [Line("b", ("pin1.tilt_t",))]
+
+
+def test_zones_that_lean_on_others_are_left_out(tmp_path):
+    zones = (
+        '"pin*.position" = { zone = "⌀0.2 mm", over = "22 mm", distribution = "normal" }\n'
+        '"pin*.perpendicularity" = { zone = "⌀0.05 mm", over = "22 mm", distribution = "normal" }\n'
+    )
+    text = TEXT.replace('"pin*.tilt_t"', '"hole*.tilt_t"').replace('"pin*.offset_z"', '"hole*.offset_z"')
+    plan = loaded(tmp_path, text.replace("[tolerances]\n", f"[tolerances]\n{zones}"))
+    assert widths.left_out(plan) == ["pin*.position", "pin*.perpendicularity"]
+    assert not {name for own in widths.errors(plan) for name in own.names} & {"pin1.position", "pin1.perpendicularity"}
+
+
+def test_an_order_is_settled_by_pairs_or_by_differences_that_do_not_matter():
+    rng = np.random.default_rng(4)
+    base = rng.normal(size=4000)
+    near, far = base + 1e-3, base - 0.5
+    assert query.is_settled([near, far], base, 1.0)
+    assert query.is_settled([near, base], base, 1.0)
+    assert not query.is_settled([rng.normal(size=200), rng.normal(size=200)], base, 1.0)
+
+
+@pytest.mark.usefixtures("quick")
+def test_command_and_page(path, monkeypatch):
+    def run(*arguments):
+        return CliRunner().invoke(app, ["causes", str(path), *arguments])
+
+    shown = run("--top", "2")
+    assert "--run" in shown.stderr
+    with Reader.open(path) as store:
+        (section,) = sections(store.view(), Asked(path))
+    assert f"tolstat causes {path.name} --run; then this page again: tolstat report" in section.blocks[0].text
+    monkeypatch.setattr(runner, "available_workers", lambda: 1)
+    shown = run("--run", "--budget", "1 min", "--top", "2", "--workers", "1")
+    assert shown.exit_code == 0, shown.output
+    assert "lines, 400 joints of each change" in shown.stderr
+    assert shown.stdout.startswith("cross1.F > 700 N: ")
+    assert "\n\nscatter of cross1.F over all joints, not of exceeding the limit; by error:\nerror " in shown.stdout
+    assert max(map(len, shown.stdout.splitlines())) <= 80
+    told = json.loads(run("--json").stdout)["what_if"]
+    assert told["load"] == "cross1.F"
+    assert len(told["table"]) == 12
+    with Reader.open(path) as store:
+        (section,) = sections(store.view(), Asked(path, accepted=0.01))
+    assert [block.kind for block in section.blocks] == ["text", "panels", "table", "table", "text"]
+    assert "Halving a single line is not enough: halving the tilt tolerance of the pins" in section.blocks[0].text
+    assert run("--each", "error").exit_code == 2
+
+
+def test_of_all_limits_the_largest_ratio_counts():
+    loads = np.array([[600.0, 900.0], [750.0, 100.0], [np.nan, 1000.0]])
+    one = what_if.Altered({}, 0, ("cross1.F", "cross2.F"), loads, np.full(3, Status.OK, np.uint8))
+    measure = query.Measure(((("cross1.F",), 700.0), (("cross2.F",), 1000.0)))
+    assert measure.held(one)
+    np.testing.assert_allclose(measure.of(one), [0.9, 750 / 700, np.nan])
+    assert not query.Measure(((("cross3.F",), 700.0),)).held(one)
+
+
+@pytest.mark.usefixtures("quick")
+def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_path, monkeypatch):
+    path = made(tmp_path, TEXT.replace('"cross1.F" = "700 N"', '"cross1.F" = "800 N"\n"cross2.F" = "700 N"'))
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        both, second = (query.what_if(view, by) for by in ("all limits", "cross2.F"))  # the first is never reached
+        np.testing.assert_array_equal(both.table["share"], second.table["share"])
+        assert (both.share, both.level) == (second.share, 1.0)
+        found = headline(view, 0.1)
+        (section,) = sections(view, Asked(path, accepted=0.1))
+        view.altered = {name: one for name, one in view.altered.items() if one.about.get("step") != EXACT}
+        told = rendering.absent(query.what_if(view, "all limits")._replace(left_out=("pin*.position",)))
+    assert "Most often 700 N on cross2.F: 22.2 %. Halve the tilt tolerance of the pins" in found.words
+    assert found.words.endswith(" exceed at least one limit")
+    assert section.blocks[0].text.startswith("At least one limit exceeded in 22.2 % of the joints as drawn. Halve the ")
+    assert told == [rendering.absent(both._replace(left_out=("pin*.position",)))[0]]
+    assert told[0].startswith("left out: pin*.position; the width of their zone depends on other errors")
+    shown = [
+        CliRunner().invoke(app, ["causes", str(path), "--top", "2", *more]) for more in ([], ["--by", "all limits"])
+    ]
+    assert shown[0].stdout == shown[1].stdout
+    assert shown[0].stdout.startswith("at least one limit exceeded: 22.2 % ")
+
+
+@pytest.mark.usefixtures("quick")
+def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        found = query.what_if(store.view(), "cross1.F")
+    table = rendering.rows(found)
+    ax = Figure().subplots()
+    rendering.tornado_panel(found, np.nan).draw(ax)
+    half = table.loc[table["half"] > 0.01].iloc[0]
+    drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
+    assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)
+
+
+TWO = TEXT.replace("[operation]", '[[operation]]\nname = "cruise"').replace(
+    "[tolerances]",
+    """
+[[operation]]
+name = "start"
+alpha = "15 deg"
+speed = "100 rpm"
+torque = "105 N*m"
+
+[tolerances]""",
+)
+OWN = TWO.replace('"cross1.F" = "700 N"', '"cross1.F at start" = "700 N"')
+
+
+def written(folder, text):
+    """Campaign of two points; at the second, loads are larger in proportion to the torque."""
+    plan = loaded(folder, text)
+    errors, file = sampling.draw(plan), folder / "two.h5"
+    with ResultStore.create(file, plan, errors) as store:
+        for point in plan.points:
+            found = stand_in(perturb(plan.joint, point.operation, errors), None)
+            if point.name == "cruise":
+                found.results["status"][7] = Status.NEWTON_FAILED
+            store.at(point.name).write(np.arange(plan.rows), found)
+    return file
+
+
+@pytest.mark.usefixtures("quick")
+def test_changed_joints_are_simulated_at_all_points(tmp_path):
+    path = written(tmp_path, TWO)
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        one = next(own for own in view.altered.values() if own.about["kind"] == "width")
+        assert {"cross1.F at cruise", "cross1.F at start"} < set(one.names)
+        cruise, start = (one.valid([f"cross1.F at {point}"]) for point in ("cruise", "start"))
+        np.testing.assert_allclose(start, 1.05 * cruise)
+        np.testing.assert_array_equal(one.valid(query.names_at_points(view, "cross1.F")), start)
+        worst, at_start, at_cruise = (query.what_if(view, f"cross1.F{at}") for at in ("", " at start", " at cruise"))
+        assert worst.load == "cross1.F"
+        assert (worst.table["share"] == at_start.table["share"]).all()
+        drawn = np.mean(view.load("cross1.F at cruise").valid > 700)
+        assert query.what_if(view.at("cruise"), "cross1.F").share == pytest.approx(drawn)
+        assert at_cruise.level == 700  # a limit of all points holds at each
+        # row 7 (joint 6) has no load at cruise, and so none at the worst of the points
+        assert np.isnan(query.as_drawn(view, "cross1.F", view.altered)[6])
+        assert np.isfinite(query.as_drawn(view, "cross1.F at start", view.altered)[6])
+
+
+@pytest.mark.usefixtures("quick")
+def test_points_without_a_limit_are_simulated_when_they_are_asked_for(tmp_path):
+    path = written(tmp_path, OWN)
+    done = runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        view = store.view()
+        assert all(name.endswith(" at start") for one in view.altered.values() for name in one.names)
+        assert query.what_if(view, "cross1.F at start") is not None
+        assert query.what_if(view, "cross1.F at cruise") is None
+        assert query.what_if(view, "cross1.F") is None
+        before = query.what_if(view, "cross1.F at start")
+    more = runner.simulate(path, by="cross1.F at cruise", budget=60.0, workers=1)
+    assert more.simulated >= done.simulated
+    assert runner.simulate(path, budget=60.0, workers=1).simulated == 0  # what it has since then stays
+    with Reader.open(path) as store:
+        after = query.what_if(store.view(), "cross1.F at start")
+        assert query.what_if(store.view(), "cross1.F") is not None
+    np.testing.assert_array_equal(before.table["share"], after.table["share"])
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_joint_that_fails_at_one_point_has_no_worst_load(tmp_path, monkeypatch):
+    def failing(params, options, **given):
+        found = stand_in(params, options)
+        found.results["status"][(params["torque"] > 102) & (np.arange(len(params)) == 5)] = Status.NOT_SETTLED
+        return found
+
+    path = written(tmp_path, TWO)
+    monkeypatch.setattr(sets, "simulate_rows", failing)
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        for one in what_if.read(store).values():
+            assert one.status[5] == Status.NOT_SETTLED
+            assert np.isfinite(one.valid(["cross1.F at cruise"])[5])
+            assert np.isnan(one.valid(["cross1.F at cruise", "cross1.F at start"])[5])
+
+
+@pytest.mark.usefixtures("quick")
+def test_command_and_page_name_the_point(tmp_path, monkeypatch):
+    path = written(tmp_path, OWN)
+    monkeypatch.setattr(runner, "available_workers", lambda: 1)
+    shown = CliRunner().invoke(app, ["causes", str(path), "--run", "--budget", "1 min", "--top", "2"])
+    assert shown.exit_code == 0, shown.output
+    assert "joints to simulate at start, " in shown.stderr
+    assert shown.stdout.startswith("cross1.F at start > 700 N: ")
+    assert max(map(len, shown.stdout.splitlines())) <= 80
+    with Reader.open(path) as store:
+        found = headline(store.view(), 0.01)
+        (section,) = sections(store.view(), Asked(path, accepted=0.01))
+    assert "700 N on cross1.F at start" in found.sentence
+    assert "No single line is enough: halving the tilt tolerance of the pins" in found.sentence
+    assert section.blocks[0].text.startswith("cross1.F at start > 700 N")
+
+
+@pytest.mark.usefixtures("quick")
+def test_merged_files_keep_what_they_agree_on(path, tmp_path):
+    other, out = tmp_path / "other.h5", [tmp_path / f"out{k}.h5" for k in range(3)]
+    other.write_bytes(path.read_bytes())
+    runner.simulate(path, budget=60.0, workers=1)
+    with Reader.open(path) as store:
+        held = what_if.read(store)
+    assert merge([path, other], out[0]).dropped == 0
+    name, one = next(iter(held.items()))
+    with ResultStore.open_to_write(other) as store:  # the same joints, fewer of them
+        what_if.write(store, {name: one._replace(loads=one.loads[:50], status=one.status[:50])})
+    assert merge([other, path], out[1]).dropped == 0
+    with ResultStore.open_to_write(other) as store:
+        what_if.write(store, {name: one._replace(loads=1.01 * one.loads)})
+    for target, expected in zip(out[:2], (held, held), strict=True):
+        with Reader.open(target) as store:
+            assert what_if.read(store).keys() == expected.keys()
+            np.testing.assert_array_equal(what_if.read(store)[name].loads, one.loads)
+    shown = CliRunner().invoke(app, ["merge", str(path), str(other), "--out", str(out[2])])
+    assert "left out: joints of 1 changes of what_if" in shown.stderr
+    with Reader.open(out[2]) as store:
+        assert what_if.read(store).keys() == held.keys() - {name}
+
+
+def test_files_that_are_no_sample_are_refused(tmp_path):
+    file = synthetic.store(tmp_path, synthetic.SWEEP)
+    with pytest.raises(StoreError, match="not drawn from tolerances"):
+        runner.simulate(file)
+    with Reader.open(file) as store, pytest.raises(StoreError, match="not drawn from tolerances"):
+        tolstat.what_if(store.view(), "cross1.F")

@@ -1,0 +1,82 @@
+"""One budget of Newton iterations for a joint, over lanes, repetition alone and refinement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.conftest import Params
+from tolstat.common.tables import FAILED, MAX_ITERATIONS, MOST_ITERATIONS, Options, Status, iterations_allowed
+from tolstat.solver import simulation
+from tolstat.solver.simulation import simulate_rows
+
+FAST = Options(steps_per_rev=60, max_revs=4, max_refinements=0)
+
+
+def allow(monkeypatch: pytest.MonkeyPatch, iterations: int) -> None:
+    monkeypatch.setattr(simulation, "iterations_allowed", lambda *_: iterations)
+
+
+def test_a_budget_suffices_for_uniform_steps_twice_and_a_refinement() -> None:
+    assert iterations_allowed(180, 20) == MOST_ITERATIONS + 2 * MAX_ITERATIONS * 180 * 20
+    assert iterations_allowed(10**6, 10**6) == np.iinfo(np.int32).max
+
+
+def test_a_joint_ends_where_its_budget_does(params: Params, monkeypatch: pytest.MonkeyPatch) -> None:
+    table = np.concatenate([params(alpha=alpha) for alpha in (0.05, 0.2)])
+    whole = simulate_rows(table, FAST).results
+    few, many = whole["newton_iterations"].astype(int)
+    assert few < many
+    allow(monkeypatch, many)
+    first, second = simulate_rows(table, FAST).results
+    assert first.tobytes() == whole[0].tobytes()
+    assert second["status"] == Status.NEWTON_FAILED
+    assert second["newton_iterations"] == many
+    assert 0 < second["failed_step"] <= 60 * FAST.max_revs
+    assert np.isnan(second["F_max"]).all()
+    allow(monkeypatch, many + 1)
+    assert simulate_rows(table, FAST).results.tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize("iterations", [1, 40])
+def test_a_budget_may_end_in_the_search_for_equilibrium(
+    params: Params, monkeypatch: pytest.MonkeyPatch, iterations: int
+) -> None:
+    allow(monkeypatch, iterations)
+    found = simulate_rows(np.concatenate([params(alpha=0.2), params(pin1__clearance=-1.0)]), FAST).results
+    assert found["status"].tolist() == [Status.NEWTON_FAILED, Status.OUTSIDE_MODEL]
+    assert found["newton_iterations"].tolist() == [iterations, 0]
+
+
+@pytest.mark.slow
+def test_the_repetition_alone_continues_the_budget(params: Params, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 85 deg lanes give a joint up after some 40 iterations a step, and so does the repetition alone."""
+    table = params(alpha=np.radians(85))
+    each = int(simulate_rows(table, FAST).results["newton_iterations"][0])
+    assert each > MAX_ITERATIONS * 60 * FAST.max_revs
+    allow(monkeypatch, each + each // 2)
+    spent: list[int] = []
+    together = simulation._together
+
+    def counted(params, options, left, *others):
+        yield from together(params, options, left, *others)
+        spent.append(each + each // 2 - int(left[0]))
+
+    monkeypatch.setattr(simulation, "_together", counted)
+    row = simulate_rows(table, FAST).results[0]
+    assert row["status"] == Status.NEWTON_FAILED
+    assert each + each // 2 <= spent[0] <= each + each // 2 + FAST.newton_max_iter
+
+
+@pytest.mark.slow
+def test_a_refinement_takes_what_is_left(params: Params, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A joint that rattles; without the finer steps it has the results of the uniform ones."""
+    options = Options(max_revs=4)
+    table = params(alpha=np.radians(15), speed=3000 * np.pi / 30, torque=20.0)
+    plain = simulate_rows(table, options._replace(max_refinements=0)).results[0]
+    whole = simulate_rows(table, options).results[0]
+    work = int(whole["newton_iterations"] + whole["steps"] / 5)
+    assert work > 3 * plain["newton_iterations"]
+    allow(monkeypatch, int(plain["newton_iterations"]) + work // 4)
+    row = simulate_rows(table, options).results[0]
+    assert row["status"] in (Status.NOT_RESOLVED, *FAILED)

@@ -1,0 +1,238 @@
+"""Experiments on joints of equal weight: shares, quantiles, band, capability, yield, damage, lives, replicates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from tolstat.analysis import (
+    capability,
+    cycles,
+    damage,
+    exceedance,
+    prediction,
+    quantile,
+    replicates,
+    sequential,
+    strength,
+)
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.benchmarks.coverage.laws import Law, fresh_share, laws
+from tolstat.benchmarks.coverage.trial import Asked, Experiment, Found
+from tolstat.common.tables import Status
+from tolstat.questions.capability.query import NOT_NORMAL
+
+SHARES, QUANTILES = (0.5, 0.05, 0.002), (0.5, 0.9, 0.99)
+SKEW = "a test of few joints does not see that the load is not normal"
+Rng = np.random.Generator
+
+
+def experiments() -> Iterator[Experiment]:
+    """All of this file."""
+    known = laws()
+    for name in ("normal", "lognormal", "uniform", "rounded"):
+        for n in (60, 1024):
+            yield _independent(known[name], n)
+    for n in (100, 1024):
+        yield _unresolved(known["lognormal"], n)
+    for name in ("normal", "slightly skew", "lognormal", "uniform"):
+        for n in (100, 4000):
+            yield _capability(known[name], n)
+    for exponent in (3.0, 5.0, 10.0):
+        for n in (60, 1024):
+            yield _equivalent(exponent, n)
+    for n in (60, 1024):
+        for part in _PARTS:
+            yield _of_revolution(part, n)
+            yield _failed(part, n)
+    for method in ("Sobol'", "Latin hypercube"):
+        for dimensions in (3, 10):
+            for share in (0.5, 0.05, 0.005):
+                yield _replicated(method, dimensions, share)
+    for share in SHARES:
+        yield _until(share)
+        for n in (100, 1024):
+            yield _delivered(share, n)
+
+
+def ok(n: int) -> FloatArray:
+    """Status of n valid joints."""
+    return np.full(n, int(Status.OK))
+
+
+def _independent(law: Law, n: int) -> Experiment:
+    levels = [float(law.ppf(1.0 - share)) + 0.01 for share in SHARES]
+    asked = [Asked("share", f"{law.name}, {share:g}", n) for share in SHARES]
+    asked += [Asked("quantile", f"{law.name}, {100 * share:g} %", n) for share in QUANTILES]
+    asked.append(Asked("band", law.name, n))
+    truths = [float(law.sf(level)) for level in levels]
+
+    def once(rng: Rng) -> list[Found]:
+        sample = exceedance.sort_out(law.draw(rng, n), ok(n))
+        rows = exceedance.curve_of(sample, levels)
+        found = [Found(row["lower"], row["upper"], truth) for row, truth in zip(rows, truths, strict=True)]
+        for share in QUANTILES:
+            own = quantile.of_sample(sample, share)
+            found.append(Found(own.lower, own.upper, float(law.ppf(share))))
+        return [*found, _band(law, sample)]
+
+    return Experiment(tuple(asked), once)
+
+
+def _band(law: Law, sample: exceedance.Sample) -> Found:
+    """Interval of the largest difference of the truth from the estimate, on each side: it contains zero or not."""
+    half = exceedance.simultaneous(sample.n)
+    at, number = np.unique(sample.valid, return_counts=True)
+    above = sample.n - np.cumsum(number)
+    truth, just_before = law.sf(at), law.sf(np.nextafter(at, -np.inf))
+    over = float((above / sample.n - truth).max(initial=0.0))
+    under = float((just_before - (above + number) / sample.n).max(initial=0.0))
+    # the band is above the truth where the estimate less the half width is
+    return Found(over - half, half - under, 0.0)
+
+
+def _unresolved(law: Law, n: int) -> Experiment:
+    """One in a hundred joints has no valid load, of those above the limit one in two."""
+    level = float(law.ppf(0.95))
+
+    def once(rng: Rng) -> list[Found]:
+        loads = law.draw(rng, n)
+        lost = rng.random(n) < np.where(loads > level, 0.5, 0.01)
+        row = exceedance.exceedance(loads, np.where(lost, int(Status.NEWTON_FAILED), ok(n)), level)
+        return [Found(row.outer_lower, row.outer_upper, 0.05)]
+
+    return Experiment((Asked("share, joints without a load", f"{law.name}, 0.05, half of those above lost", n),), once)
+
+
+def _capability(law: Law, n: int) -> Experiment:
+    limit = float(law.ppf(0.999))
+    points = law.ppf((np.arange(100_000) + 0.5) / 100_000)
+    by_moments = (limit - points.mean()) / (3.0 * points.std())
+    middle, high = (float(law.ppf(share)) for share in (0.5, capability.REFERENCE))
+    by_quantiles = (limit - middle) / (high - middle)
+    asked = (
+        Asked("Cpk, normal", f"{law.name}, limit at 99.9 %", n, known=SKEW if law.name == "slightly skew" else ""),
+        Asked("Cpk from quantiles", f"{law.name}, limit at 99.9 %", n),
+        Asked("yield and ppm", f"{law.name}, limit at 99.9 %", n),
+    )
+
+    def once(rng: Rng) -> list[Found]:
+        own = capability.capability(law.draw(rng, n), ok(n), limit)
+        normal = Found(own.cpk_normal_lower, own.cpk_normal_upper, by_moments, not own.normal_p < NOT_NORMAL)
+        _, lower, upper = own.ppm
+        return [normal, Found(own.cpk_lower, own.cpk_upper, by_quantiles), Found(lower, upper, 1e3)]
+
+    return Experiment(asked, once)
+
+
+def _equivalent(exponent: float, n: int) -> Experiment:
+    """Two cycles a revolution, whose ranges are lognormal with one factor in common."""
+    known = laws()["lognormal"]
+
+    def once(rng: Rng) -> list[Found]:
+        ranges = known.draw(rng, n)[:, None, None] * np.array([1.0, 0.5])
+        counted = cycles.Cycles.of_revolution(("cross1.F",), ranges, ranges, np.full((n, 1), 2.0))
+        loads = damage.equivalent_load(counted, exponent)[:, 0]
+        found = []
+        for share in (0.5, 0.9):
+            own, truth = quantile.quantile(loads, ok(n), share), float(known.ppf(share))
+            found.append(Found(own.lower, own.upper, truth * (1.0 + 0.5**exponent) ** (1.0 / exponent)))
+        return found
+
+    cases = (f"lognormal ranges, exponent {exponent:g}, {share}" for share in ("50 %", "90 %"))
+    return Experiment(tuple(Asked("equivalent load", case, n) for case in cases), once)
+
+
+class _Part(NamedTuple):
+    """A law of numbers between 0 and 1."""
+
+    name: str
+    draw: Callable[[Rng, int], FloatArray]
+    mean: float
+
+
+_PARTS = (
+    _Part("beta (1, 20)", lambda rng, n: rng.beta(1.0, 20.0, n), 1.0 / 21.0),
+    _Part("beta (2, 2)", lambda rng, n: rng.beta(2.0, 2.0, n), 0.5),
+    _Part("zero but in 1 of 10", lambda rng, n: np.where(rng.random(n) < 0.1, rng.random(n), 0.0), 0.05),
+    _Part(
+        "zero but in 1 of 200", lambda rng, n: np.where(rng.random(n) < 0.005, 1.0 - 0.5 * rng.random(n), 0.0), 0.00375
+    ),
+)
+
+
+def _of_revolution(part: _Part, n: int) -> Experiment:
+    """Mean time above a level, as `questions.time_above` has it."""
+
+    def once(rng: Rng) -> list[Found]:
+        time = part.draw(rng, n)
+        lower, upper = exceedance.clopper_pearson(time.sum(), time.size)
+        return [Found(float(lower), float(upper), part.mean)]
+
+    return Experiment((Asked("mean time above", part.name, n),), once)
+
+
+def _failed(part: _Part, n: int) -> Experiment:
+    """Share of the parts that fail, from probabilities of failure by joint."""
+
+    def once(rng: Rng) -> list[Found]:
+        own = strength.failures(part.draw(rng, n), 0, 0)
+        return [Found(own.lower, own.upper, part.mean)]
+
+    return Experiment((Asked("share of failed parts", part.name, n, fresh_share(n, part.mean)),), once)
+
+
+def _replicated(method: str, dimensions: int, share: float, n: int = 1024, parts: int = 8) -> Experiment:
+    """Sum of normal errors, drawn in eight randomisations of a design."""
+    law = laws()["normal"]
+    level = float(law.ppf(1.0 - share))
+    name = f"{method}, sum of {dimensions} errors, {share:g}"
+    asked = (
+        Asked("share, replicates", name, n, fresh_share(n, share)),
+        Asked("quantile, replicates", name, n, law.fresh_quantile(n, 1.0 - share)),
+    )
+
+    def once(rng: Rng) -> list[Found]:
+        from scipy.special import ndtri
+        from scipy.stats import qmc
+
+        engine = qmc.Sobol if method == "Sobol'" else qmc.LatinHypercube
+        points = [engine(dimensions, rng=rng).random(n // parts) for _ in range(parts)]
+        samples = [exceedance.sort_out(ndtri(x).sum(axis=1) / np.sqrt(dimensions), ok(len(x))) for x in points]
+        whole = exceedance.sort_out(np.concatenate([own.valid for own in samples]), ok(n))
+        row = replicates.curve_of(whole, samples, [level])[0]
+        own = replicates.quantile_of(whole, samples, 1.0 - share)
+        return [Found(row["lower"], row["upper"], share), Found(own.lower, own.upper, level)]
+
+    return Experiment(asked, once)
+
+
+def _delivered(share: float, n: int) -> Experiment:
+    """Joints above a limit in the next delivery, a random number itself."""
+    number = prediction.DELIVERY
+    case = f"any law, {share:g}, {number} joints delivered"
+
+    def once(rng: Rng) -> list[Found]:
+        above, truth = int(rng.binomial(n, share)), float(rng.binomial(number, share))
+        lower, upper = exceedance.clopper_pearson(above, n, prediction.half(0.95))
+        ends = prediction.of_counts(above, above, n, number), prediction.of_share(float(lower), float(upper), number)
+        return [Found(*own, truth) for own in ends]
+
+    return Experiment((Asked("next delivery", case, n), Asked("next delivery, from a share", case, n)), once)
+
+
+def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
+    """A campaign that looks at its interval until it is narrow."""
+    scheme = sequential.scheme(width, sequential.looks(width, most))
+
+    def once(rng: Rng) -> list[Found]:
+        above, joints, number = 0, 0, 0
+        for number, look in enumerate(scheme.looks):
+            above, joints = above + int(rng.binomial(look - joints, share)), look
+            if scheme.narrow(number, above):
+                break
+        return [Found(*scheme.interval(number, above), share)]
+
+    return Experiment((Asked("share at a stop", f"any law, {share:g}, narrower than {width:g}", most),), once)

@@ -1,0 +1,243 @@
+"""Experiments on joints of unequal weight: other tolerances, allocation, importance sampling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from tolstat.analysis import allocation, reweight, weighted
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.reweight import Ratios
+from tolstat.benchmarks.coverage.laws import Law, fresh_share
+from tolstat.benchmarks.coverage.shares import ok
+from tolstat.benchmarks.coverage.trial import Asked, Experiment, Found
+from tolstat.study.tolerances import density_ratio
+from tolstat.study.tolerances.distributions import Normal
+
+ERRORS = 10
+OTHERS = 0.8
+"""Share of the joints of importance sampling that do not come from the tolerances."""
+UNSEEN = "a second way to the limit, which the proposal does not reach"
+GROUPS, EACH = 2, 4
+"""Groups of errors whose tolerances are allocated, and errors in each."""
+Rng = np.random.Generator
+
+
+class Load(NamedTuple):
+    """A load of independent normal errors of one deviation, with its distribution."""
+
+    name: str
+    of: Callable[[FloatArray], FloatArray]
+    law: Callable[[float], Law]
+
+
+def loads() -> list[Load]:
+    """Sum, sum of squares, and largest of the errors; laws by the factor on their deviation."""
+    from scipy.stats import chi2, norm
+
+    root = math.sqrt(ERRORS)
+
+    def largest(f: float) -> Law:
+        return Law("largest", lambda p: f * norm.ppf(p ** (1 / ERRORS)), lambda x: 1.0 - norm.cdf(x / f) ** ERRORS)
+
+    def total(f: float) -> Law:
+        return Law("sum", lambda p: f * root * norm.ppf(p), lambda x: norm.sf(x / f / root))
+
+    def squares(f: float) -> Law:
+        return Law("squares", lambda p: f**2 * chi2.ppf(p, ERRORS), lambda x: chi2.sf(x / f**2, ERRORS))
+
+    return [
+        Load("sum", lambda x: x.sum(axis=1), total),
+        Load("squares", lambda x: (x**2).sum(axis=1), squares),
+        Load("largest", lambda x: x.max(axis=1), largest),
+    ]
+
+
+def experiments() -> Iterator[Experiment]:
+    """All of this file."""
+    for load in loads():
+        for factor, n in ((0.8, 256), (0.8, 1024), (1.1, 1024), (1.1, 4096), (1.15, 4096), (1.3, 4096)):
+            yield _reweighted(load, factor, n)
+    for name in _ALLOCATED:
+        for n in (2048, 4096):
+            yield _allocated(name, n)
+    yield from _important()
+
+
+def ratios_of(x: FloatArray, factor: float) -> Ratios:
+    """Density ratios of standard normal errors, (n, d), for deviations `factor` times as large."""
+    d = x.shape[1]
+    exact = density_ratio.exact([(Normal(0.0, factor), Normal(0.0, 1.0))] * d)
+    logs = 0.5 * (1.0 - factor**-2) * (x**2).sum(axis=1) - d * math.log(factor)
+    return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+
+
+def _reweighted(load: Load, factor: float, n: int) -> Experiment:
+    law, shares = load.law(factor), (0.5, 0.05, 0.005)
+    levels = [float(law.ppf(1.0 - share)) for share in shares]
+    names = [f"{load.name} of {ERRORS} errors, {factor:g} times as wide, {share:g}" for share in shares]
+    asked = [Asked("share, other tolerances", *own, fresh_share(n, share)) for own, share in _with(names, n, shares)]
+    asked += [
+        Asked("quantile, other tolerances", *own, law.fresh_quantile(n, 1.0 - share))
+        for own, share in _with(names, n, shares)
+    ]
+
+    def once(rng: Rng) -> list[Found]:
+        x = rng.standard_normal((n, ERRORS))
+        ratios = ratios_of(x, factor)
+        sample = reweight.sort_out(load.of(x), ok(n), ratios)
+        of_shares = [reweight.share_above(sample, ratios, level) for level in levels]
+        of_loads = [reweight.quantile(sample, ratios, 1.0 - share) for share in shares]
+        return [
+            *(Found(f.lower, f.upper, share, f.support.usable) for f, share in zip(of_shares, shares, strict=True)),
+            *(Found(f.lower, f.upper, level, f.usable) for f, level in zip(of_loads, levels, strict=True)),
+        ]
+
+    return Experiment(tuple(asked), once)
+
+
+def _with(names: list[str], n: int, shares: tuple[float, ...]) -> Iterator[tuple[tuple[str, int], float]]:
+    return (((name, n), share) for name, share in zip(names, shares, strict=True))
+
+
+class _Toy(NamedTuple):
+    """A load of eight errors, and its share above a level by the factors of two groups of them."""
+
+    of: Callable[[FloatArray], FloatArray]
+    share: Callable[[FloatArray, float], float]
+
+
+def _toys() -> dict[str, _Toy]:
+    from scipy.stats import norm
+
+    def of_largest(factors: FloatArray, level: float) -> float:
+        return float(1.0 - np.prod(norm.cdf(level / np.repeat(factors, EACH))))
+
+    def of_size(factors: FloatArray, level: float) -> float:
+        return float(1.0 - np.prod(1.0 - 2.0 * norm.sf(level / np.repeat(factors, EACH))))
+
+    return {
+        "sum": _Toy(
+            lambda x: x.sum(axis=1), lambda f, level: float(norm.sf(level / math.sqrt(float((EACH * f**2).sum()))))
+        ),
+        "largest": _Toy(lambda x: x.max(axis=1), of_largest),
+        "largest modulus": _Toy(lambda x: np.abs(x).max(axis=1), of_size),
+    }
+
+
+_ALLOCATED = ("sum", "largest", "largest modulus")
+
+
+def _allocated(name: str, n: int, target: float = 0.02, drawn: float = 0.04) -> Experiment:
+    """Halve the share above a limit at the least cost; a proposal that is said to hold, and does not, is a miss."""
+    from scipy.optimize import brentq
+
+    toy = _toys()[name]
+    level = float(brentq(lambda x: toy.share(np.ones(GROUPS), x) - drawn, 0.1, 30.0))
+
+    def ratios(x: FloatArray, factors: FloatArray) -> tuple[FloatArray, density_ratio.Exact]:
+        f = np.repeat(factors, EACH)
+        logs = x**2 @ (0.5 * (1.0 - f**-2.0)) - np.log(f).sum()
+        one = [density_ratio.exact([(Normal(0.0, float(own)), Normal(0.0, 1.0))]) for own in factors]
+        return logs, density_ratio.Exact(*(EACH * np.sum(one, axis=0)).tolist())
+
+    def of(x: FloatArray, factors: FloatArray) -> Ratios:
+        logs, exact = ratios(x, factors)
+        return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+
+    def once(rng: Rng) -> list[Found]:
+        x = rng.standard_normal((n, GROUPS * EACH))
+        above = toy.of(x) > level
+        searched, checked = allocation.halves(n, n)
+        problem = allocation.Problem(
+            log_ratios=lambda f: ratios(x[searched], f)[0],
+            log_spread=lambda f: ratios(x[:1], f)[1].mean_square,
+            usable=lambda f: of(x[searched], f).usable,
+            above=above[searched, None],
+            targets=np.array([target]),
+            cost=lambda f: float((1.0 / f).sum()),
+            lower=np.full(GROUPS, 0.5),
+            upper=np.full(GROUPS, 1.2),
+            confidence=0.999,
+        )
+        factors = allocation.search(problem).factors
+        own = of(x[checked], factors)
+        sample = reweight.sort_out(above[checked].astype(float), ok(len(checked)), own)
+        found = reweight.share_above(sample, own, 0.5)
+        holds = found.support.usable and found.upper < target
+        return [Found(-np.inf, target, toy.share(factors, level), holds)]
+
+    return Experiment((Asked("allocation holds", f"{name} of 8 errors, {drawn:g} to {target:g}", n),), once)
+
+
+class _Proposal(NamedTuple):
+    """Importance sampling: joints are drawn from the tolerances and from other distributions of the errors.
+
+    `draw` gives the errors that do not come from the tolerances; `ratio` their density over that of the tolerances.
+    """
+
+    name: str
+    dimensions: int
+    n: int
+    draw: Callable[[Rng, int, int], FloatArray]
+    ratio: Callable[[FloatArray], FloatArray]
+    load: Callable[[FloatArray], FloatArray]
+    level: float
+    share: float
+    known: str = ""
+
+
+def _important() -> Iterator[Experiment]:
+    from scipy.stats import norm
+
+    def along(beta: float, d: int) -> tuple[Callable[[Rng, int, int], FloatArray], Callable[[FloatArray], FloatArray]]:
+        step = beta / math.sqrt(d)
+        return (
+            lambda rng, m, d: rng.standard_normal((m, d)) + step,
+            lambda x: np.exp(step * x.sum(axis=1) - 0.5 * beta**2),
+        )
+
+    def widened(s: float) -> tuple[Callable[[Rng, int, int], FloatArray], Callable[[FloatArray], FloatArray]]:
+        return (
+            lambda rng, m, d: s * rng.standard_normal((m, d)),
+            lambda x: np.exp(0.5 * (1.0 - s**-2) * (x**2).sum(axis=1)) / s ** x.shape[1],
+        )
+
+    def total(x: FloatArray) -> FloatArray:
+        return np.asarray(x.sum(axis=1) / math.sqrt(x.shape[1]))
+
+    def modulus(x: FloatArray) -> FloatArray:
+        return np.abs(total(x))
+
+    for beta in (2.0, 3.0, 4.75):
+        for n in (500, 2000):
+            share = float(norm.sf(beta))
+            yield _of_proposal(_Proposal("sum, moved to the limit", 10, n, *along(beta, 10), total, beta, share))
+    for s, beta, d in ((1.3, 3.0, 20), (1.6, 3.0, 5), (1.6, 4.0, 5)):
+        share = float(norm.sf(beta))
+        yield _of_proposal(_Proposal(f"sum, {s:g} times as wide", d, 4000, *widened(s), total, beta, share))
+    both = float(2.0 * norm.sf(3.0))
+    yield _of_proposal(_Proposal("both sides, 1.6 times as wide", 5, 4000, *widened(1.6), modulus, 3.0, both))
+    for beta in (3.0, 4.0):
+        both, moved = float(2.0 * norm.sf(beta)), along(beta, 10)
+        yield _of_proposal(_Proposal("both sides, moved to one", 10, 2000, *moved, modulus, beta, both, UNSEEN))
+
+
+def _of_proposal(own: _Proposal) -> Experiment:
+    def once(rng: Rng) -> list[Found]:
+        m = round(OTHERS * own.n)
+        x = np.concatenate([own.draw(rng, m, own.dimensions), rng.standard_normal((own.n - m, own.dimensions))])
+        kept = 1.0 - OTHERS
+        weights = 1.0 / (kept + OTHERS * own.ratio(x))
+        loads = own.load(x)
+        found = weighted.weighted_exceedance(loads, ok(own.n), weights, own.level, heaviest=1.0 / kept)
+        trust = weighted.trust(loads, ok(own.n), weights, own.level, 1.0 / kept)
+        return [Found(found.lower, found.upper, own.share, trust.usable)]
+
+    case = f"{own.name}, {own.share:.1e}"
+    return Experiment(
+        (Asked("share, importance sampling", case, own.n, fresh_share(own.n, own.share), own.known),), once
+    )

@@ -1,0 +1,257 @@
+"""Simulate joints of a campaign's seed with other tolerances, and keep their loads in the result file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import sampling
+from tolstat.campaign.blocks import JOINT_TIMEOUT_S, Block, simulate_finite
+from tolstat.campaign.executors import Lost, Work, map_in_processes, map_serially
+from tolstat.common.loads import LOADS
+from tolstat.common.tables import VALID, Options, Status
+from tolstat.joint import perturb
+from tolstat.solver.simulation import simulate_rows, warm_up
+from tolstat.store import Counts, ResultStore, what_if, worst
+from tolstat.store.recorded import settings
+from tolstat.store.what_if import Altered
+from tolstat.study import axes, widths
+from tolstat.study.points import at
+from tolstat.study.widths import Line
+
+if TYPE_CHECKING:
+    from tolstat.study import Study
+
+WIDTH, EXCHANGE, AS_DRAWN = "width", "exchange", "as drawn"
+"""Kinds of sets: a line with another width; a line's errors from another joint; no change."""
+BLOCK = 128
+"""Number of joints that a worker takes at a time: enough to keep the lanes busy, and 0.2 s on the main job."""
+SAVE_S = 60.0
+"""Time after which finished joints are written to the file, s: a kill loses those since."""
+
+
+class Change(NamedTuple):
+    """A change of the tolerances, and how its joints are drawn.
+
+    Attributes
+    ----------
+    about : dict
+        See `Altered.about`.
+    draw : callable
+        Range of consecutive joints -> their errors, table ERROR; numbers are those of `Altered.first`.
+    """
+
+    about: Mapping[str, Any]
+    draw: Callable[[range], NDArray[np.void]]
+
+
+class Wanted(NamedTuple):
+    """A change, and the joints that are wanted of it."""
+
+    change: Change
+    numbers: range
+
+
+def narrowed(study: Study, line: Line, step: str) -> Change:
+    """A line with the width of a step (`widths.STEPS`); joint i is sample i of the campaign but for this line."""
+    other = widths.changed(study, line, step)
+    about = {
+        "kind": WIDTH,
+        "label": line.label,
+        "step": step,
+        "words": widths.words(study, line, step),
+        "seed": study.sampling.seed,
+        "tolerances": {name: own.describe() for name, own in other.items()},
+    }
+    return Change(about, partial(_draw, widths.applied(study, other)))
+
+
+def exchanged(study: Study, line: Line) -> Change:
+    """Joint i is sample 2i of the campaign with the line's errors of sample 2i + 1."""
+    about = {"kind": EXCHANGE, "label": line.label, "seed": study.sampling.seed, "names": list(line.names)}
+    return Change(about, partial(_exchange, widths.applied(study, {}), line))
+
+
+def as_drawn(study: Study) -> Change:
+    """Further samples of the campaign, or samples at random of one that is not: nothing is changed."""
+    about = {"kind": AS_DRAWN, "label": "no line", "seed": study.sampling.seed}
+    return Change(about, partial(_draw, widths.applied(study, {})))
+
+
+class Asked(NamedTuple):
+    """What is kept of each joint.
+
+    Attributes
+    ----------
+    loads : sequence of str
+        Loads.
+    points : sequence of str
+        Operating points of the study that the joints are simulated at.
+    """
+
+    loads: Sequence[str]
+    points: Sequence[str]
+
+    def names(self, study: Study) -> tuple[str, ...]:
+        """Names of the loads at each of the points, as `Altered.names`."""
+        every = [point.name for point in study.points]
+        return tuple(at(load, [point], every) for point in self.points for load in self.loads)
+
+
+def missing(held: Mapping[str, Altered], wanted: Wanted, names: Sequence[str]) -> range:
+    """Joints of a change that the file lacks; all of them if those held begin later, or lack one of the loads."""
+    own = held.get(what_if.key(wanted.change.about))
+    if own is None or own.first > wanted.numbers.start or not own.holds(names):
+        return wanted.numbers
+    return range(max(own.end, wanted.numbers.start), max(own.end, wanted.numbers.stop))
+
+
+def options_of(study: Study, store: ResultStore) -> Options:
+    """Solver options of the campaign's joints."""
+    return settings(study.solver, store.fidelity)
+
+
+def seconds_per_joint(study: Study, options: Options, joints: int, points: Sequence[str]) -> float:
+    """Time of a joint at all these points in one process, s, from the first samples; kernels must be ready."""
+    errors = as_drawn(study).draw(range(joints))
+    params = [perturb(study.joint, study.at(point).operation, errors) for point in points]
+    begin = time.perf_counter()
+    for own in params:
+        simulate_rows(own, options)
+    return (time.perf_counter() - begin) / joints
+
+
+def simulate(
+    study: Study,
+    store: ResultStore,
+    wanted: Sequence[Wanted],
+    asked: Asked,
+    workers: int,
+    stop: Callable[[], bool],
+    progress: Callable[[Counts], None],
+) -> dict[str, Altered]:
+    """Simulate what the file lacks and write it, also if interrupted.
+
+    Parameters
+    ----------
+    study : Study
+        The study of the campaign.
+    store : ResultStore
+        Its file.
+    wanted : sequence of Wanted
+        Changes and joints, in the order in which they are simulated.
+    asked : Asked
+        Loads that are kept, and operating points.
+    workers : int
+        Number of processes; does not affect results.
+    stop : callable
+        Called often; once it returns True no further block is begun.
+    progress : callable
+        Called with the counts of the joints, each at every point.
+
+    Returns
+    -------
+    dict of str to Altered
+        All sets that the file holds.
+    """
+    held = what_if.read(store)
+    names = asked.names(study)
+    todo = [(one.change, numbers) for one in wanted if (numbers := missing(held, one, names))]
+    table = _Table(todo, asked, names)
+    work: Work[Block, NDArray[np.void] | Lost] = Work(_solve, Block.split, Block.size, warm_up, JOINT_TIMEOUT_S)
+    blocks = _blocks(study, options_of(study, store), todo, asked.points)
+    done: Generator[tuple[Block, NDArray[np.void] | Lost], None, None]
+    parallel = workers > 1 and table.status.size > BLOCK
+    done = map_in_processes(work, blocks, workers, stop) if parallel else map_serially(work, blocks, stop)
+    counts, saved = Counts(table.status.size, 0, 0, 0), time.monotonic()
+    progress(counts)
+    try:
+        with closing(done):
+            for block, result in done:
+                counts = counts.after(table.put(block, result))
+                progress(counts)
+                if time.monotonic() - saved > SAVE_S:
+                    what_if.write(store, table.sets(held))
+                    saved = time.monotonic()
+    finally:
+        new = table.sets(held)
+        if new:
+            what_if.write(store, new)
+    return held | new
+
+
+class _Table:
+    """Loads, (n, points, k), and status, (n, points), of all joints to do, one set after the other."""
+
+    def __init__(self, todo: Sequence[tuple[Change, range]], asked: Asked, names: tuple[str, ...]) -> None:
+        self.todo, self.asked, self.names = todo, asked, names
+        n = sum(len(numbers) for _, numbers in todo)
+        self.loads = np.full((n, len(asked.points), len(asked.loads)), np.nan)
+        self.status = np.full((n, len(asked.points)), Status.PENDING, np.uint8)
+
+    def put(self, block: Block, result: NDArray[np.void] | Lost) -> NDArray[np.uint8]:
+        own = block.slots, self.asked.points.index(block.point)
+        if isinstance(result, Lost):
+            self.status[own] = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
+        else:
+            loads = np.column_stack([LOADS[name].of(result) for name in self.asked.loads])
+            self.loads[own] = np.where(np.isin(result["status"], VALID)[:, None], loads, np.nan)
+            self.status[own] = result["status"]
+        return np.asarray(self.status[own])
+
+    def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
+        """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
+        found, begin = {}, 0
+        for change, numbers in self.todo:
+            here = slice(begin, begin + len(numbers))
+            begin = here.stop
+            waiting = np.flatnonzero((self.status[here] == Status.PENDING).any(axis=1))
+            own = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
+            if own.stop > own.start:
+                name, states = what_if.key(change.about), list(self.status[own].T)
+                status = np.choose(worst.deciding(states), states)
+                loads = self.loads[own].reshape(-1, len(self.names))
+                found[name] = _joined(held.get(name), Altered(change.about, numbers.start, self.names, loads, status))
+        return found
+
+
+def _joined(old: Altered | None, new: Altered) -> Altered:
+    if old is None or old.end != new.first or old.names != new.names:
+        return new
+    loads, status = np.concatenate([old.loads, new.loads]), np.concatenate([old.status, new.status])
+    return old._replace(loads=loads, status=status)
+
+
+def _blocks(
+    study: Study, options: Options, todo: Sequence[tuple[Change, range]], points: Sequence[str]
+) -> Iterator[Block]:
+    operations, begin = {point: study.at(point).operation for point in points}, 0
+    for change, numbers in todo:
+        for first in range(0, len(numbers), BLOCK):
+            own = numbers[first : first + BLOCK]
+            slots, errors = np.arange(begin + first, begin + first + len(own)), change.draw(own)
+            for point, operation in operations.items():
+                yield Block(point, slots, perturb(study.joint, operation, errors), options)
+        begin += len(numbers)
+
+
+def _solve(block: Block) -> NDArray[np.void]:
+    return simulate_finite(simulate_rows, "none", 0, {}, block).results
+
+
+def _draw(study: Study, numbers: range) -> NDArray[np.void]:
+    first = study.first_sample
+    return sampling.draw(study, range(numbers.start + first, numbers.stop + first))
+
+
+def _exchange(study: Study, line: Line, numbers: range) -> NDArray[np.void]:
+    scores = sampling.scores(study, range(2 * numbers.start, 2 * numbers.stop))
+    own = {stream for name in line.names for stream in axes.streams_of(name)}
+    moved = np.array([stream in own for stream in sampling.streams(study)])
+    return sampling.from_scores(study, np.where(moved, scores[1::2], scores[::2]))

@@ -1,0 +1,1 @@
+"""Which line of the drawing to change."""

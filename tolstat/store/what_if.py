@@ -1,0 +1,167 @@
+"""The group ``what_if`` of a result file: joints of the campaign's seed with other tolerances, and their loads."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.shown import shown
+from tolstat.store import meanings
+from tolstat.store.new_file import GROUPS
+from tolstat.store.result_file import put_attributes, text
+
+if TYPE_CHECKING:
+    from tolstat.store.reader import Reader
+    from tolstat.store.result_store import ResultStore
+
+GROUP = "what_if"
+DATASETS = {
+    "sample": ("i8", "1", "number of the sample; of an exchange, of the pair of samples 2 i and 2 i + 1"),
+    "load": (h5py.string_dtype(), "1", "name of the load, of several operating points with that of the point"),
+    "loads": ("f8", "N, N*m", "largest loads over the revolution; NaN without a valid one"),
+    "status": ("u1", "1", "outcome of the simulation; of several operating points that of the point that decides"),
+}
+"""Type, unit and description of each dataset of a set; the first two are the scales of the others."""
+
+
+@shown
+class Altered(NamedTuple):
+    """Loads of consecutive joints with one change of the tolerances.
+
+    Attributes
+    ----------
+    about : dict
+        The change, as JSON values: ``kind`` (``width``, ``exchange`` or ``as drawn``), ``label``, ``seed``, and what
+        determines the errors.
+    first : int
+        Sample of the first joint; of an exchange, the number of the first pair.
+    names : tuple of str
+        The loads, (k,); of a campaign at several operating points each with one of them, ``cross1.F at cruise``.
+    loads : ndarray, shape (n, k)
+        SI, NaN for a joint without a valid load at that point.
+    status : ndarray of uint8, shape (n,)
+        `tables.Status` of each joint; of several operating points that of the point that decides, `worst.deciding`.
+    """
+
+    about: Mapping[str, Any]
+    first: int
+    names: tuple[str, ...]
+    loads: NDArray[np.float64]
+    status: NDArray[np.uint8]
+
+    @property
+    def end(self) -> int:
+        """Number after that of the last joint."""
+        return self.first + len(self.status)
+
+    def holds(self, names: Sequence[str]) -> bool:
+        """Whether all these loads are among `names`."""
+        return set(names) <= set(self.names)
+
+    def valid(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Largest of some loads of each joint, NaN where one of them is not valid, (n,)."""
+        return np.asarray(np.max(self.loads[:, [self.names.index(name) for name in names]], axis=1))
+
+
+def key(about: Mapping[str, Any]) -> str:
+    """Digest of a change: the name of its set in the file."""
+    return hashlib.sha256(json.dumps(about, sort_keys=True, allow_nan=False).encode()).hexdigest()[:16]
+
+
+def read(store: Reader) -> dict[str, Altered]:
+    """Read all sets, by the digest of their change; sets whose checksum is wrong are left out, and so run again."""
+    file = store._file
+    found: dict[str, Altered] = {}
+    for name, group in file[GROUP].items() if GROUP in file else ():
+        attrs = group.attrs
+        try:
+            one = Altered(
+                json.loads(text(attrs, "change")),
+                int(group["sample"][0]),
+                tuple(group["load"].asstr()[:].tolist()),
+                np.asarray(group["loads"][:], float),
+                np.asarray(group["status"][:], np.uint8),
+            )
+            sound = text(attrs, "check") == _check(one) and key(one.about) == name
+        except (KeyError, ValueError, IndexError, TypeError, AttributeError):  # not what `write` writes
+            sound = False
+        if sound:
+            found[name] = one
+    return found
+
+
+def write(store: ResultStore, sets: Mapping[str, Altered]) -> None:
+    """Write sets to a result file; those it has of the same changes are replaced.
+
+    Raises
+    ------
+    StoreError
+        When there is no room for a second copy of the file.
+    """
+    growth = sum(one.loads.nbytes + one.status.nbytes for one in sets.values())
+    store._replace(lambda file: _write(file, sets), growth)
+
+
+def common(files: Iterable[Mapping[str, Altered]]) -> tuple[dict[str, Altered], int]:
+    """Sets of several files of one campaign: of each change the longest, unless the others differ from its beginning.
+
+    Returns
+    -------
+    sets : dict of str to Altered
+    dropped : int
+        Number of changes whose sets differ.
+    """
+    found: dict[str, Altered] = {}
+    differing = set()
+    for sets in files:
+        for name, one in sets.items():
+            short, long = sorted((one, found.get(name, one)), key=lambda own: own.end)
+            found[name] = long
+            if not _begins(long, short):
+                differing.add(name)
+    return {name: one for name, one in found.items() if name not in differing}, len(differing)
+
+
+def _begins(long: Altered, short: Altered) -> bool:
+    """Whether a set begins with another one, to the last bit."""
+    n = len(short.status)
+    begin = long._replace(loads=long.loads[:n], status=long.status[:n])
+    return _check(begin) == _check(short)
+
+
+def _write(file: h5py.File, sets: Mapping[str, Altered]) -> None:
+    group = file.require_group(GROUP)
+    put_attributes(group, {"description": GROUPS[GROUP]})
+    for name, one in sets.items():
+        if name in group:
+            del group[name]
+        own = group.create_group(name)
+        change, seed = json.dumps(dict(one.about), allow_nan=False), int(one.about["seed"])
+        about = ": ".join(str(one.about[word]) for word in ("kind", "label", "step") if word in one.about)
+        put_attributes(own, {"description": about, "change": change, "seed": seed, "check": _check(one)})
+        columns = {"sample": np.arange(one.first, one.end), "load": np.array(one.names, dtype=object)}
+        for column, values in (columns | {"loads": one.loads, "status": one.status}).items():
+            dtype, unit, description = DATASETS[column]
+            dataset = own.create_dataset(column, data=values, dtype=dtype)
+            put_attributes(dataset, {"units": unit, "description": description})
+            if column in columns:
+                dataset.make_scale(column)
+                continue
+            for k, scale in enumerate(list(columns)[: dataset.ndim]):
+                dataset.dims[k].attach_scale(own[scale])
+        meanings.put(own["status"], meanings.FIXED["status"])
+
+
+def _check(one: Altered) -> str:
+    """SHA-256 of a set: its change, numbers, loads and states."""
+    head = json.dumps([dict(one.about), one.first, one.names], sort_keys=True, allow_nan=False)
+    digest = hashlib.sha256(head.encode())
+    for values in (one.loads.astype("<f8"), one.status):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,157 @@
+"""The same joints at several operating points, taken together: largest loads and the worst status of each joint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, split
+from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
+from tolstat.store.verification import Verification
+
+if TYPE_CHECKING:
+    from tolstat.store.view import View
+
+_SEVERITY = np.zeros(max(Status) + 1, np.uint8)
+for _rank, _states in enumerate(((Status.STATIONARY,), UNSETTLED, FAILED, (Status.PENDING,)), 1):
+    _SEVERITY[[int(state) for state in _states]] = _rank
+
+
+def deciding(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.intp]:
+    """Index of the operating point that decides the status of each joint, (n,).
+
+    A joint is pending if it is so anywhere, else failed, unsettled or stationary; ``OK`` only if it is at all points.
+
+    Parameters
+    ----------
+    status : sequence of (n,) arrays
+        Status of the joints at each operating point.
+    """
+    return np.asarray(np.argmax(_SEVERITY[np.stack(status)], axis=0))
+
+
+def together(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
+    """Largest loads of the joints over some operating points.
+
+    Parameters
+    ----------
+    parts : sequence of (n,) tables
+        Results at each operating point, with `LOAD_FIELDS` at least.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Fields `LOAD_FIELDS`. A load is NaN if it is at one of the points. Ends of intervals are 1, and NaN for
+        stationary joints: loads of one kind may have theirs from different points, see `load_of`.
+    """
+    found = np.empty(len(parts[0]), [(name, RESULT[name]) for name in LOAD_FIELDS])
+    status = [part["status"] for part in parts]
+    found["status"] = np.choose(deciding(status), status)
+    for kind in KINDS:
+        found[f"{kind}_max"] = np.maximum.reduce([part[f"{kind}_max"] for part in parts])
+        for end in ("lower", "upper"):
+            found[f"{kind}_{end}"] = np.where(found["status"] == Status.STATIONARY, np.nan, 1.0)
+    return found
+
+
+def load_of(
+    parts: Sequence[NDArray[np.void]], load: Load
+) -> tuple[FloatArray, NDArray[np.uint8], tuple[FloatArray, FloatArray]]:
+    """One load of the joints over some operating points.
+
+    Parameters
+    ----------
+    parts : sequence of (n,) tables
+        Results at each operating point, with `LOAD_FIELDS` at least.
+    load : Load
+        The load.
+
+    Returns
+    -------
+    values : ndarray, shape (n,)
+        Largest value, SI.
+    status : ndarray, shape (n,)
+        See `deciding`.
+    ends : tuple of ndarray, shape (n,)
+        Interval of the value: the largest of the lower ends, and of the upper ones.
+    """
+    status = [part["status"] for part in parts]
+    values = np.maximum.reduce([load.of(part) for part in parts])
+    lower, upper = (np.maximum.reduce(ends) for ends in zip(*(load.ends(part) for part in parts), strict=True))
+    return values, np.choose(deciding(status), status), (lower, upper)
+
+
+def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
+    """Load of a limit, whose names may have operating points, over these: values, (n,), and the status of each joint.
+
+    Parameters
+    ----------
+    parts : mapping of str to (n,) tables
+        Results by operating point, with `LOAD_FIELDS` at least.
+    limit : Limit
+        The limit; its level is compared with the values.
+    """
+    found, states = [], []
+    for name, level in zip(limit.loads, limit.levels, strict=True):
+        where = split(name)[1]
+        chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
+        values, status, _ = load_of(chosen, LOADS[split(name)[0]])
+        found.append(values if limit.has_one_level else values / level)
+        states.append(status)
+    return np.maximum.reduce(found), np.choose(deciding(states), states)
+
+
+def point_of(view: View, name: str) -> str:
+    """Operating point at which a load matters most: where most joints exceed its limit, else where it is largest.
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+    name : str
+        A load, ``cross1.F`` or ``cross1.F at cruise+start``.
+
+    Returns
+    -------
+    str
+        Name of the point; empty if the file has one without a name.
+    """
+    at, plain = view.narrowed(name)
+    limit = view.load(name).limit
+
+    def rank(part: View) -> tuple[float, float]:
+        load = part.load(plain)
+        share = 0.0 if limit is None else float(np.nan_to_num(load.above(limit).estimate))
+        return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) if load.valid.size else 0.0
+
+    return max(at.parts, key=rank).points[0]
+
+
+def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
+    """Largest loads of the nominal joint, RESULT (1,), from its rows; (0,) unless it is valid at all points."""
+    if not all(len(part) for part in parts):
+        return np.empty(0, RESULT)
+    found, loads = without_results(1, Status.OK), together(parts)
+    for name in LOAD_FIELDS:
+        found[name] = loads[name]
+    return found
+
+
+def checks(parts: Sequence[Verification | None]) -> Verification | None:
+    """Verifications of several operating points as one, joints one after the other; None if one of them has none."""
+    own = [part for part in parts if part is not None]
+    if len(own) < len(parts):
+        return None
+    names = [name for name in own[0].checks if all(name in part.checks for part in own)]
+    return Verification(
+        own[0].seed,
+        np.concatenate([part.rows for part in own]),
+        np.concatenate([part.base for part in own]),
+        {
+            name: own[0].checks[name]._replace(results=np.concatenate([part.checks[name].results for part in own]))
+            for name in names
+        },
+    )

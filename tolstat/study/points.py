@@ -1,0 +1,197 @@
+"""Operating points of a study: one in ``[operation]``, or several in ``[[operation]]``, each with a name."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import AfterValidator, Field
+
+from tolstat.common import loads, strict, units
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.strict import did_you_mean, refuse
+from tolstat.joint import Operation
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+
+class Point(NamedTuple):
+    """An operating point of a campaign.
+
+    Attributes
+    ----------
+    name : str
+        Its name; empty for that of ``[operation]``, which has none.
+    operation : Operation
+        Misalignment, speed and torque.
+    share : float
+        Share of the service time; NaN where none is given.
+    """
+
+    name: str
+    operation: Operation
+    share: float = math.nan
+
+    @property
+    def in_words(self) -> str:
+        """``"10 deg, 500 rpm, 100 N m"``, and the share of the time if it is given of several points."""
+        own = self.operation
+        said = f"{math.degrees(own.alpha):.4g} deg, {own.speed * 30 / math.pi:.4g} rpm, {own.torque:.4g} N m"
+        return f"{said}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else said
+
+    def values(self) -> dict[str, Any]:
+        """JSON values: ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``share`` or null."""
+        return self.operation.model_dump() | {"share": None if math.isnan(self.share) else self.share}
+
+
+def check_name(name: str) -> str:
+    """Refuse what cannot be the name of a point, as a `PydanticCustomError`."""
+    if not _NAME.fullmatch(name):
+        raise refuse("{name} is not a name", "use letters, digits, - and _, a letter first", "name")
+    return name
+
+
+class PointEntry(Operation):
+    """One of several operating points that all joints are simulated at."""
+
+    name: Annotated[
+        str,
+        AfterValidator(check_name),
+        Field(description="name of the operating point, of several ones", examples=["cruise"]),
+    ]
+    share: Annotated[
+        units.Number | None,
+        Field(
+            gt=0,
+            le=1,
+            description="share of the service time, for fatigue over all points; given for all of them or for none",
+            examples=["60 %"],
+        ),
+    ] = None
+
+
+def read(section: Any, place: str) -> tuple[Point, ...]:
+    """Read ``[operation]`` or ``[[operation]]``.
+
+    Raises
+    ------
+    InputError
+        With every fault.
+    """
+    if not isinstance(section, list):
+        return (Point("", strict.validate(Operation, section, place, prefix=("operation",)), 1.0),)
+    faults: list[Fault] = []
+    found: list[Point] = []
+    for number, item in enumerate(section):
+        try:
+            entry = strict.validate(PointEntry, item, place, prefix=("operation", number))
+        except InputError as error:
+            faults += error.faults
+            continue
+        if entry.name in [point.name for point in found]:
+            where = f"{place}: operation[{number}].name"
+            faults.append(Fault(where, f"a point {entry.name!r} exists already", "give each point its own name"))
+        operation = Operation.model_construct(**entry.model_dump(include=set(Operation.model_fields)))
+        found.append(Point(entry.name, operation, math.nan if entry.share is None else entry.share))
+    if not section:
+        faults.append(Fault(f"{place}: operation", "has no operating point", "add one: [operation]"))
+    elif not faults:
+        faults += _faults_of_shares(found, place)
+    if faults:
+        raise InputError(faults)
+    return tuple(found)
+
+
+def _faults_of_shares(points: Sequence[Point], place: str) -> list[Fault]:
+    lacking = [number for number, point in enumerate(points) if math.isnan(point.share)]
+    if lacking and len(lacking) < len(points):
+        remedy = "give all operating points their share of the time, or none"
+        return [Fault(f"{place}: operation[{number}].share", "missing key", remedy) for number in lacking]
+    total = sum(point.share for point in points)
+    if not lacking and abs(total - 1.0) > 1e-6:
+        return [Fault(f"{place}: operation", f"shares of the time sum to {total:.6g}", "give shares whose sum is 1")]
+    return []
+
+
+def names_of(selection: str, names: Sequence[str], place: str) -> tuple[str, ...]:
+    """Points that a selection such as ``"cruise+start"`` names, in the order of `names`.
+
+    Parameters
+    ----------
+    selection : str
+        Names of points, with ``+`` between them; empty for all.
+    names : sequence of str
+        All points.
+    place : str
+        Place shown in faults.
+
+    Raises
+    ------
+    InputError
+        When a point does not exist.
+    """
+    wanted = [name.strip() for name in selection.split("+")] if selection else list(names)
+    unknown = [name for name in wanted if name not in names]
+    if unknown and not any(names):
+        found, remedy = f"no operating point {unknown[0]!r}: there is one, without a name", "leave the point out"
+        raise InputError([Fault(place, found, remedy)])
+    if unknown:
+        raise InputError([Fault(place, f"no operating point {n!r}", did_you_mean(n, list(names))) for n in unknown])
+    return tuple(name for name in names if name in wanted)
+
+
+def only_one(name: str, names: Sequence[str], place: str) -> None:
+    """Refuse what is not the name of one point.
+
+    Raises
+    ------
+    InputError
+        When there is no such point, or `name` selects several.
+    """
+    if name not in names:
+        names_of(name, names, place)
+        found = f"{name!r} is no single operating point" if name else "has several operating points"
+        raise InputError([Fault(place, found, f"give one of them: --point {names[0]}")])
+
+
+def joined(chosen: Iterable[str], names: Sequence[str]) -> str:
+    """Selection that names some points: empty for all of them."""
+    own = list(chosen)
+    return "" if len(own) == len(names) else "+".join(own)
+
+
+def limits_at(limits: Mapping[str, float], chosen: Sequence[str], names: Sequence[str]) -> dict[str, float]:
+    """Limits that hold where only some of the operating points are looked at.
+
+    Parameters
+    ----------
+    limits : mapping
+        Limit by load, ``cross1.F`` at all points, ``cross1.F at cruise``.
+    chosen : sequence of str
+        The points that are looked at.
+    names : sequence of str
+        All points.
+
+    Returns
+    -------
+    dict
+        A limit that covers all the chosen points has the plain name of its load, the smallest if there are several;
+        one that covers some of them keeps its name; others are left out.
+    """
+    found: dict[str, float] = {}
+    for key, value in limits.items():
+        load, selection = loads.split(key)
+        where = set(names_of(selection, names, "limits"))
+        if where >= set(chosen):
+            found[load] = min(value, found.get(load, value))
+        elif where < set(chosen):
+            found[key] = value
+    return found
+
+
+def at(load: str, chosen: Iterable[str], names: Sequence[str]) -> str:
+    """Name of a load at some points: ``"cross1.F at cruise"``; that of the load where all points are chosen."""
+    selection = joined(chosen, names)
+    return f"{load}{loads.AT}{selection}" if selection else load

@@ -37,7 +37,7 @@ def test_misses_are_counted_by_side_and_refusals_apart():
 
 
 def test_a_side_that_misses_too_often_is_found_and_chance_is_not():
-    judged = [run.measure(200, among=(coin(*sides),)) for sides in ((0.2, 0.0), (0.0, 0.1), (0.025, 0.025))]
+    judged = [run.measure(200, among=(coin(*sides),)) for sides in ((0.2, 0.0), (0.0, 0.15), (0.025, 0.025))]
     assert [len(found.failed) for found in judged] == [1, 1, 0]
 
 
@@ -73,7 +73,7 @@ def test_every_interval_covers_in_one_experiment():
 def test_the_command_prints_tables_and_writes_them_into_a_document(tmp_path):
     file = tmp_path / "page.md"
     file.write_text("# Page\n\n<!-- coverage -->\n<!-- end of coverage -->\n", encoding="utf-8")
-    call = ("bench", "coverage", "--only", "on purpose", "--seeds", "60", "--workers", "1")
+    call = ("bench", "coverage", "--only", "on purpose", "--seeds", "200", "--workers", "1")
     done = CliRunner().invoke(app, [*call, "--into", str(file), "--cases"])
     assert done.exit_code == 0, done.stderr
     assert "found in every case" in done.stdout

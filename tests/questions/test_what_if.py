@@ -388,7 +388,7 @@ def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
         found = query.what_if(store.view(), "cross1.F")
     table = rendering.rows(found)
     ax = Figure().subplots()
-    rendering.tornado_panel(found, np.nan).draw(ax)
+    rendering.tornado_panel(found, 0.01).draw(ax)
     half = table.loc[table["half"] > 0.01].iloc[0]
     drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
     assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)

@@ -20,6 +20,7 @@ from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Section
+from tolstat.questions.accuracy import rendering
 from tolstat.questions.exceedance import query
 from tolstat.questions.joints import query as joints
 from tolstat.report import headline as verdict
@@ -186,7 +187,7 @@ def test_names_and_comments_are_escaped_and_unseen_characters_shown(tmp_path, mo
     page.write_page(path, tmp_path / "page.html", replay=0)
     made = (tmp_path / "page.html").read_text(encoding="utf-8")
     Reading(made)
-    assert "<h1><bdi>a&#34;b&#39;&lt;script&gt;c&amp;[U+202D]</bdi></h1>" in made
+    assert "<h1><bdi>a&#34;b&#39;&lt;script&gt;c&amp;[U+202D]</bdi>" in made
     assert "Question: [U+202E]why&lt;/p&gt;&lt;script&gt;1&lt;/script&gt;<" in made
     assert not {"\u202d", "\u202e"} & set(made)
 
@@ -202,6 +203,18 @@ def test_only_the_script_of_the_page_may_run(html):
 def test_digits_are_grouped_in_whole_numbers_only():
     assert writer.grouped("73310 of 999999 ppm") == "73\u202f310 of 999\u202f999 ppm"
     assert writer.grouped("1234 0.12345 a12345 12345e3") == "1234 0.12345 a12345 12345e3"
+
+
+def test_a_number_stays_with_its_unit_and_an_interval_on_one_line():
+    assert writer.bound("60 N m in 3 % (1 .. 4 %), 5 joints") == (
+        "60\u00a0N\u00a0m in 3\u00a0% (1\u00a0..\u00a04\u00a0%), 5 joints"
+    )
+    assert writer.bound("0.1 mm 5 min of 5 minutes N") == "0.1\u00a0mm 5\u00a0min of 5 minutes N"
+
+
+def test_a_small_numerical_error_is_not_given_in_digits():
+    assert rendering.in_percent(9.5e-7) == "< 0.001 %"
+    assert rendering.in_percent(1.08e-3) == "0.108 %"
 
 
 def test_same_file_same_bytes(path, tmp_path):

@@ -83,7 +83,7 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None, point: s
     from tolstat.common.files import check_target
     from tolstat.report import page
     from tolstat.store import Reader, revolutions
-    from tolstat.store.view import DRAWN
+    from tolstat.store.methods import DRAWN
 
     faults: list[Fault] = []
     with gather(faults):

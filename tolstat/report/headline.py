@@ -221,7 +221,7 @@ def _worst(view: View, records: list[dict[Any, Any]]) -> dict[Any, Any]:
 
 def _yield(view: View, records: list[dict[Any, Any]]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
-    notes = () if view.has_intervals else (without_interval(view.method),)
+    notes: tuple[str, ...] = () if view.has_intervals else (without_interval(view.method),)
     if view.weighted:
         row, worst = _decisive(view, records), _worst(view, records)
         if np.isnan(row["estimate"]):

@@ -22,7 +22,8 @@ from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.exceedance.rendering import AT_POINTS, LIMIT_DASH, LIMITS, above, at_points
 from tolstat.questions.show import section as show
 from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, verdict
-from tolstat.store.view import METHODS, View
+from tolstat.store.methods import METHODS
+from tolstat.store.view import View
 
 
 def section(view: View, asked: Asked) -> Section:

@@ -155,11 +155,9 @@ class Reader(CheckedTables):
         self.campaign_rows = checks.integer(file, "campaign_rows", self.n)
         if self.rows.stop > self.campaign_rows:
             raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
-        if (
-            self.sampling["method"] in ONE_EACH
-            and self.sampling["n"] + self.sampling["nominal_first"] != self.campaign_rows
-        ):
-            raise ValueError(f"sampling.n is {self.sampling['n']} in a campaign of {self.campaign_rows} rows")
+        n = self.sampling["n"]
+        if self.sampling["method"] in ONE_EACH and n + int(self.sampling["nominal_first"]) != self.campaign_rows:
+            raise ValueError(f"sampling.n is {n} in a campaign of {self.campaign_rows} rows")
         checks.check_histories(file, self.history_specs, self.n)
         self.point = next(iter(self.points)) if len(self.points) == 1 else None
         self._campaign = campaign_digest(file)

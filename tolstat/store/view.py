@@ -23,6 +23,7 @@ from tolstat.common.tables import ERROR, Status
 from tolstat.store import first_pass, verification, what_if, worst
 from tolstat.store.counts import Counts
 from tolstat.store.first_pass import FirstPass
+from tolstat.store.methods import DRAWN, METHODS
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
 from tolstat.store.sample_load import SampleLoad, frozen
@@ -34,17 +35,6 @@ from tolstat.study.points import limits_at, names_of
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
     from tolstat.study import Study
-
-METHODS = {
-    "random": "random sampling",
-    "sobol": "Sobol' points",
-    "lhs": "Latin hypercube",
-    "sweep": "sweep",
-    "importance": "importance sampling",
-    "pick_freeze": "pick-freeze design",
-}
-DRAWN = ("random", "sobol", "lhs")
-"""Sampling methods that draw every joint from the tolerances, all with the same weight."""
 
 
 class View:
@@ -214,8 +204,7 @@ class View:
         if name not in self._loads:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
             if name == ALL_LIMITS and self.limits:
-                self._loads[name] = together(self)
-                return self._loads[name]
+                return self._loads.setdefault(name, together(self))
             view, plain = self.narrowed(name)
             if view is not self:
                 own = view.load(plain)
@@ -257,10 +246,7 @@ class View:
 
     @cached_property
     def leading(self) -> tuple[str, ...]:
-        """Leading load of each kind (force, torque, ...).
-
-        See `several_loads.leading`.
-        """
+        """Leading load of each kind (force, torque, ...); see `several_loads.leading`."""
         return leading(self)
 
     @property

@@ -18,9 +18,10 @@ from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.store.counts import Counts
+from tolstat.store.methods import DRAWN
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.several_loads import together
-from tolstat.store.view import DRAWN, View
+from tolstat.store.view import View
 
 SHARES = (0.5, 0.9, 0.99)
 """Quantiles that are compared."""

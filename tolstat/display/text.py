@@ -36,11 +36,22 @@ def visible(words: str) -> str:
     return _UNSEEN.sub(lambda found: f"[U+{ord(found[0]):04X}]", words)
 
 
+def cell(value: Any) -> Any:
+    """Value of a cell as spreadsheets may read it: an apostrophe before text that they would take for a formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+
+
+def cells(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a frame with `cell` applied to its columns of text."""
+    words = [name for name in table if table[name].dtype.kind not in "biuf"]
+    return table.assign(**{str(name): table[name].map(cell) for name in words}) if words else table
+
+
 def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
     """Write a frame as ``STEM_what.csv``; return its path."""
     path = stem.with_name(f"{stem.name}_{what}.csv")
     with atomic_write(path) as temporary:
-        table.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+        cells(table).to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
     return path
 
 

@@ -189,8 +189,25 @@ def test_nothing_but_the_own_layout_is_read_anywhere_in_a_file(path: Path, chang
         Reader.open(path)
 
 
+POINT = {"alpha": 0.1, "speed": 1.0, "torque": 1.0, "share": None}
 CONTENTS = {
-    "limits": [{"cross1.F": "a lot"}, {"cross1.F": -1.0}, {"cross9.F": 1.0}, [], 3, {"cross1.F": float("inf")}],
+    "limits": [
+        {"cross1.F": "a lot"},
+        {"cross1.F": -1.0},
+        {"cross9.F": 1.0},
+        {"cross1.F at cruise": 1.0},
+        [],
+        3,
+        {"cross1.F": float("inf")},
+    ],
+    "points": [
+        *({}, [], 3, {"cruise": 3}, {"": {"alpha": 0.1, "speed": 1.0, "torque": 1.0}}),
+        *({name: POINT} for name in ("cruise", "../x")),
+        *(
+            {"": POINT | wrong}
+            for wrong in ({"alpha": 2.0}, {"speed": 0.0}, {"torque": "x"}, {"share": 2.0}, {"x": 1.0})
+        ),
+    ],
     "options": [{}, {"steps_per_rev": 10**9}, {"method": "rk4"}, {"fidelity": 1}, {"newton_tol": "x"}, {"warp": 9}],
     "sampling": [{}, {"seed": -1}, {"seed": 1.5}, {"n": 10**9}, {"method": "magic"}, {"nominal_first": 1}],
     "fidelity": [{"fidelity": "dynamic"}, {"steps_per_rev": 10**9}, [1]],

@@ -28,7 +28,7 @@ class CheckedTables(Numbering):
     case_names: tuple[str, ...]
     variants: tuple[Variant, ...]
     _left_out: NDArray[np.bool_]
-    """File slots whose results were found damaged while they were read, (n,)."""
+    """File slots whose results were found damaged while they were read, at any operating point, (n,)."""
     points: Mapping[str, Point]
     point: str | None
 

@@ -6,22 +6,27 @@ Its layout comes first (`layout`), then the checksum of its attributes, their co
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
 from tolstat.common import selected_results
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS
+from tolstat.common.loads import split
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec
 from tolstat.joint import Operation
 from tolstat.store import integrity, layout, metadata
 from tolstat.store.result_file import FILETYPE, check_column, descriptions, place_of, store_error, text
-from tolstat.study.points import Point, check_name
+from tolstat.study.points import Point
 
 DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
 """Exceptions that reading a damaged file raises, in h5py or in code that relies on the file's attributes."""
+ONE_EACH = ("random", "sobol", "lhs", "importance", "subset")
+"""Sampling methods whose number of joints is ``sampling.n``."""
 MAX_SAMPLES = 50_000_000
 """Largest number of values in a history of one joint: more than the finest solution of all loads has."""
 
@@ -102,15 +107,37 @@ def points(file: h5py.File) -> dict[str, Point]:
     """
     found = {}
     for name, values in metadata.read(file, "points").items():
-        if name:
-            check_name(name)  # also a folder of histories has this name
         share = values.pop("share")
-        if values.keys() != Operation.model_fields.keys() or not all(isinstance(v, float) for v in values.values()):
-            raise ValueError(f"operating point {name!r} has the values {values}")
-        found[name] = Point(name, Operation.model_construct(**values), math.nan if share is None else float(share))
-    if not found or (len(found) > 1 and "" in found):
-        raise ValueError("attribute points has no operating point, or one without a name among others")
+        own = {key: float(value) for key, value in values.items()}
+        found[name] = Point(name, Operation.model_construct(None, **own), math.nan if share is None else float(share))
     return found
+
+
+def limits(file: h5py.File, points: Mapping[str, Point]) -> dict[str, float]:
+    """Read the attribute ``limits``: the limit of each load, SI.
+
+    Raises
+    ------
+    KeyError, ValueError
+        When it does not describe limits of loads at the operating points of the file.
+    """
+    held: dict[str, float] = metadata.read(file, "limits")
+    for selection in filter(None, (split(name)[1] for name in held)):
+        if not {name.strip() for name in selection.split("+")} <= points.keys():
+            raise ValueError("attribute limits names an operating point that the file does not have")
+    return held
+
+
+def check_number(sampling: Mapping[str, Any], rows: int) -> None:
+    """Check that a sampling method whose number of joints is ``sampling.n`` has them in a campaign of `rows`.
+
+    Raises
+    ------
+    ValueError
+        When it has not.
+    """
+    if sampling["method"] in ONE_EACH and sampling["n"] + sampling["nominal_first"] != rows:
+        raise ValueError(f"sampling.n is {sampling['n']} in a campaign of {rows} rows")
 
 
 def check_tables(file: h5py.File) -> int:
@@ -132,9 +159,10 @@ def check_tables(file: h5py.File) -> int:
     if n < 1:
         raise ValueError(f"{status.name} has the shape {status.shape}")
     histories = tuple(check_column(name) for name in metadata.read(file, "histories"))
+    results = selected_results.columns(metadata.read(file, "identity"))
     groups = {
         "errors": ERROR_COLUMNS,
-        **{f"{place}/results": selected_results.columns(metadata.read(file, "identity")) for place in at_points},
+        **{f"{place}/results": results for place in at_points},
         **{f"{place}/ledger": (*LEDGER_COLUMNS, *histories) for place in at_points},
         **{name: columns for name, (columns, _) in descriptions(file).items()},
     }
@@ -163,7 +191,7 @@ def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> N
 def _dataset(file: h5py.File, path: str) -> h5py.Dataset:
     dataset = file.get(path)
     if not isinstance(dataset, h5py.Dataset):
-        raise ValueError(f"{path.replace('//', '/')} is missing")
+        raise ValueError(f"/{path.strip('/')} is missing, or not a dataset")
     return dataset
 
 

@@ -27,9 +27,9 @@ MAX_LEVELS = 6
 OF_SCALES = (b"DIMENSION_LIST", b"REFERENCE_LIST")
 """Attributes in which HDF5 itself keeps references, for dimension scales; nothing follows them."""
 HISTORIES = "histories"
-"""Name of the groups whose datasets are compressed."""
-NAMED = "/what_if/"
-"""Group outside the histories whose datasets may be names, of loads."""
+"""Name of the groups whose datasets are compressed; there are texts among them, the names along an axis."""
+WHAT_IF = "what_if"
+"""Group whose sets have the names of their loads as texts."""
 
 
 def check(file: h5py.File, compressed: str = HISTORIES) -> None:
@@ -50,7 +50,9 @@ def check(file: h5py.File, compressed: str = HISTORIES) -> None:
     size = file.id.get_filesize()
     for path, held in objects(file):
         if isinstance(held, h5d.DatasetID):
-            _check_dataset(path, held, size, path.split("/")[-2] == compressed)
+            inside = path.split("/")[-2] == compressed
+            named = inside or (path.split("/")[1], path.split("/")[-1]) == (WHAT_IF, "load")
+            _check_dataset(path, held, size, inside, named)
         for name, attribute in attributes(held):
             if attribute.get_type().get_class() not in (h5t.STRING, h5t.INTEGER, h5t.FLOAT):
                 raise ValueError(f"attribute {name} of {path} is neither text nor number")
@@ -108,7 +110,7 @@ def value(attribute: h5a.AttrID) -> str:
     return plain if isinstance(plain, str) else repr(plain)
 
 
-def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool) -> None:
+def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool, texts: bool) -> None:
     made = held.get_create_plist()
     layout = made.get_layout()
     if made.get_external_count() or layout == h5d.VIRTUAL:
@@ -125,7 +127,7 @@ def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool) 
     if layout != h5d.CONTIGUOUS or filters:
         raise ValueError(f"{path} is not stored contiguously")
     kind = held.get_type().get_class()
-    if kind not in (h5t.INTEGER, h5t.FLOAT) and not (kind == h5t.STRING and (compressed or path.startswith(NAMED))):
+    if kind not in (h5t.INTEGER, h5t.FLOAT) and not (texts and kind == h5t.STRING):
         raise ValueError(f"{path} does not hold numbers")
     offset, stored = held.get_offset(), held.get_storage_size()
     if offset is None or stored < nbytes or offset + stored > size:

@@ -7,18 +7,22 @@ memory is taken or files are opened because of it.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
 import h5py
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError, create_model
 
+from tolstat.common import units
 from tolstat.common.loads import LOADS, split
 from tolstat.common.solver_options import CODES
 from tolstat.common.strict import MAX_DEPTH, Strict, depth, dotted
 from tolstat.common.tables import FINEST_STEPS, Options
 from tolstat.store.result_file import text
 from tolstat.study.model import Sampling, Solver, Subset
+from tolstat.study.points import check_name
+from tolstat.study.widths import STEPS
 
 MAX_TEXT_BYTES = 64_000_000
 """Largest size of a JSON attribute that is read, bytes."""
@@ -32,6 +36,16 @@ def _load(name: str) -> str:
     return name
 
 
+def _point(name: str) -> str:
+    return check_name(name) if name else name  # also a group and a folder of histories have this name
+
+
+def _points(found: dict[str, Any]) -> dict[str, Any]:
+    if len(found) > 1 and "" in found:
+        raise ValueError("has a point without a name among others")
+    return found
+
+
 class _File(Strict):
     """Base of what a file states: no text for a number, nothing infinite."""
 
@@ -42,6 +56,8 @@ Count = Annotated[int, Field(ge=0)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 LoadName = Annotated[str, AfterValidator(_load)]
+PointName = Annotated[str, AfterValidator(_point)]
+Step: Any = Literal[STEPS]
 Steps = Annotated[int, Field(ge=12, le=max(20_000, 2 * FINEST_STEPS))]
 
 
@@ -57,6 +73,15 @@ def _option(name: str) -> Any:
 _OPTIONS: dict[str, Any] = {name: (_option(name), ...) for name in Options._fields}
 SolverOptions: Any = create_model("SolverOptions", __base__=_File, **_OPTIONS)
 """Options of the solver, with the bounds of a study's ``[solver]``."""
+
+
+class PointRecord(_File):
+    """An operating point, with the bounds of a study's ``[operation]``, see `study.points.Point.values`."""
+
+    alpha: Annotated[float, Field(gt=-math.pi / 2, lt=math.pi / 2)]
+    speed: Annotated[float, AfterValidator(units.not_zero)]
+    torque: float
+    share: Annotated[float, Field(gt=0, le=1)] | None
 
 
 class RungRecord(_File):
@@ -109,15 +134,6 @@ class RetryRecord(_File):
     options: SolverOptions
 
 
-class PointRecord(_File):
-    """An operating point, SI, and its share of the time."""
-
-    alpha: float
-    speed: float
-    torque: float
-    share: float | None
-
-
 class VariantRecord(_File):
     """A joint that the study lists."""
 
@@ -133,10 +149,46 @@ class DesignRecord(_File):
     variants: list[VariantRecord]
 
 
+class DistributionRecord(_File):
+    """Distribution of a changed tolerance; only its factor is read."""
+
+    model_config = ConfigDict(extra="allow")
+
+    factor: float
+
+
+class WidthRecord(_File):
+    """Tolerances made wider or narrower, see `campaign.what_if`."""
+
+    kind: Literal["width"]
+    label: str
+    step: Step
+    words: str
+    seed: Count
+    tolerances: Annotated[dict[str, DistributionRecord], Field(min_length=1)]
+
+
+class ExchangeRecord(_File):
+    """Errors of other samples."""
+
+    kind: Literal["exchange"]
+    label: str
+    seed: Count
+    names: list[str]
+
+
+class AsDrawnRecord(_File):
+    """Further samples, nothing changed."""
+
+    kind: Literal["as drawn"]
+    label: str
+    seed: Count
+
+
 Dimensions = dict[str, Annotated[int, Field(strict=True, ge=0)]]
 MODELS: dict[str, TypeAdapter[Any]] = {
     "limits": TypeAdapter(dict[LoadName, Positive]),
-    "points": TypeAdapter(dict[str, PointRecord]),
+    "points": TypeAdapter(Annotated[dict[PointName, PointRecord], Field(min_length=1), AfterValidator(_points)]),
     "joint": TypeAdapter(dict[str, Any]),
     "identity": TypeAdapter(dict[str, Any]),
     "options": TypeAdapter(SolverOptions),
@@ -148,17 +200,18 @@ MODELS: dict[str, TypeAdapter[Any]] = {
     "stop": TypeAdapter(StopRecord),
     "design": TypeAdapter(DesignRecord),
     "histories": TypeAdapter(dict[str, list[Any]]),
+    "change": TypeAdapter(Annotated[WidthRecord | ExchangeRecord | AsDrawnRecord, Field(discriminator="kind")]),
 }
 """Model of each attribute that is JSON; ``sampling`` of a subset simulation has its own."""
 
 
-def read(file: h5py.File, name: str, default: object = None) -> Any:
+def read(file: h5py.Group, name: str, default: object = None) -> Any:
     """Read an attribute that is JSON.
 
     Parameters
     ----------
-    file : h5py.File
-        The file.
+    file : h5py.Group
+        The file, or the group that has the attribute.
     name : str
         Name of the attribute, one of `MODELS`.
     default : object, optional

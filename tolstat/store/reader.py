@@ -43,9 +43,6 @@ if TYPE_CHECKING:
 
     from tolstat.joint import Operation
 
-ONE_EACH = ("random", "sobol", "lhs", "importance", "subset")
-"""Sampling methods whose number of joints is ``sampling.n``."""
-
 
 class Reader(CheckedTables):
     """A result file that is open for reading, also while a campaign writes it; close it, or use a ``with`` block.
@@ -155,9 +152,7 @@ class Reader(CheckedTables):
         self.campaign_rows = checks.integer(file, "campaign_rows", self.n)
         if self.rows.stop > self.campaign_rows:
             raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
-        n = self.sampling["n"]
-        if self.sampling["method"] in ONE_EACH and n + int(self.sampling["nominal_first"]) != self.campaign_rows:
-            raise ValueError(f"sampling.n is {n} in a campaign of {self.campaign_rows} rows")
+        checks.check_number(self.sampling, self.campaign_rows)
         checks.check_histories(file, self.history_specs, self.n)
         self.point = next(iter(self.points)) if len(self.points) == 1 else None
         self._campaign = campaign_digest(file)
@@ -374,8 +369,8 @@ class Reader(CheckedTables):
         attrs = self._file.attrs
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
-        self.limits: dict[str, float] = metadata.read(self._file, "limits")
         self.points = checks.points(self._file)
+        self.limits = checks.limits(self._file, self.points)
         self.joint: dict[str, Any] = metadata.read(self._file, "joint")
 
     def _reopen(self) -> bool:

@@ -71,7 +71,8 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     if n is None:
         return study
     with nullcontext() if path is not None else only_below(store.path.parent):
-        return replace(_at_point(store, load(source, n=n, text=text, joint=joint)), solver=study.solver)
+        larger = load(source, n=n, text=text, joint=joint)
+    return replace(_at_point(store, larger), solver=study.solver)
 
 
 def _at_point(store: Reader, study: Study) -> Study:

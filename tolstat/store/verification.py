@@ -77,7 +77,8 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
         seed = int(held[name].attrs["seed"])
     except DAMAGE_ERRORS as error:
         found = f"is damaged: its verification cannot be used: {error}"
-        raise store_error(store.path, found, f"make it anew: tolstat verify {store.path}") from error
+        again = f"tolstat verify {store.path}" + (" --near LIMIT" if name == NEAR else "")
+        raise store_error(store.path, found, f"make it anew: {again}") from error
     base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in store.slot(rows).tolist()])
     return Verification(seed, rows, base, checks)
 

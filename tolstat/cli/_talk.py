@@ -15,7 +15,7 @@ import typer
 
 from tolstat import __version__
 from tolstat.common.errors import Fault, InputError
-from tolstat.display.text import visible
+from tolstat.display.unseen import visible
 
 if TYPE_CHECKING:
     from tolstat.campaign.progress import Display

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +13,6 @@ from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, unit_text
 if TYPE_CHECKING:
     import pandas as pd
 
-_UNSEEN = re.compile(
-    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff"
-    "\U000e0000-\U000e007f]"
-)
-"""Control characters but those that end lines, marks and overrides of the direction of text, tags, surrogates."""
-
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
     """Rows of a frame for JSON; NaN and infinity, which JSON lacks, become None."""
@@ -29,11 +22,6 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
         return None if isinstance(x, float) and not math.isfinite(x) else x
 
     return [{str(k): plain_number(v) for k, v in row.items()} for row in table.to_dict("records")]
-
-
-def visible(words: str) -> str:
-    """Show characters that cannot be seen or change the direction of text by their code, ``[U+202E]``."""
-    return _UNSEEN.sub(lambda found: f"[U+{ord(found[0]):04X}]", words)
 
 
 def cell(value: Any) -> Any:

@@ -193,6 +193,7 @@ POINT = {"alpha": 0.1, "speed": 1.0, "torque": 1.0, "share": None}
 CONTENTS = {
     "limits": [
         {"cross1.F": "a lot"},
+        {"cross1.F": "700"},
         {"cross1.F": -1.0},
         {"cross9.F": 1.0},
         {"cross1.F at cruise": 1.0},
@@ -208,7 +209,7 @@ CONTENTS = {
             for wrong in ({"alpha": 2.0}, {"speed": 0.0}, {"torque": "x"}, {"share": 2.0}, {"x": 1.0})
         ),
     ],
-    "options": [{}, {"steps_per_rev": 10**9}, {"method": "rk4"}, {"fidelity": 1}, {"newton_tol": "x"}, {"warp": 9}],
+    "options": [{}, {"steps_per_rev": 10**9}, {"method": "rk4"}, {"fidelity": 1}, {"newton_tol": "1e-6"}, {"warp": 9}],
     "sampling": [{}, {"seed": -1}, {"seed": 1.5}, {"n": 10**9}, {"method": "magic"}, {"nominal_first": 1}],
     "fidelity": [{"fidelity": "dynamic"}, {"steps_per_rev": 10**9}, [1]],
     "stop": [{"rule": 3}, {"looks": ["x"]}, [1]],

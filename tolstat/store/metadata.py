@@ -8,11 +8,20 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import h5py
-from pydantic import AfterValidator, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError, create_model
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    JsonValue,
+    TypeAdapter,
+    ValidationError,
+    create_model,
+)
 
 from tolstat.common import units
 from tolstat.common.loads import LOADS, split
@@ -53,7 +62,6 @@ class _File(Strict):
 
 
 Count = Annotated[int, Field(ge=0)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 LoadName = Annotated[str, AfterValidator(_load)]
 PointName = Annotated[str, AfterValidator(_point)]
@@ -61,12 +69,18 @@ Step: Any = Literal[STEPS]
 Steps = Annotated[int, Field(ge=12, le=max(20_000, 2 * FINEST_STEPS))]
 
 
+def _no_text(value: object) -> object:
+    if isinstance(value, str):
+        raise ValueError("is not a number")
+    return value
+
+
 def _option(name: str) -> Any:
     if name in CODES:
         return Literal[tuple(code.name.lower() for code in CODES[name])]
     if name in Solver.model_fields:
         known = Solver.model_fields[name]
-        return Annotated[(known.annotation, *known.metadata)]
+        return Annotated[(known.annotation, *known.metadata, BeforeValidator(_no_text))]
     return Annotated[float, Field(ge=0, lt=1)]  # rtol, atol
 
 
@@ -185,7 +199,7 @@ class AsDrawnRecord(_File):
     seed: Count
 
 
-Dimensions = dict[str, Annotated[int, Field(strict=True, ge=0)]]
+Dimensions = dict[str, Annotated[int, Field(ge=0, le=10_000)]]
 MODELS: dict[str, TypeAdapter[Any]] = {
     "limits": TypeAdapter(dict[LoadName, Positive]),
     "points": TypeAdapter(Annotated[dict[PointName, PointRecord], Field(min_length=1), AfterValidator(_points)]),
@@ -228,21 +242,18 @@ def read(file: h5py.Group, name: str, default: object = None) -> Any:
         return default
     if file.attrs.get_id(name).get_storage_size() > MAX_TEXT_BYTES:
         raise ValueError(f"attribute {name} is too long")
-    value = json.loads(text(file.attrs, name))
+    held = text(file.attrs, name)
+    value = json.loads(held)
     if default is not None and not value and type(value) is type(default):
         return default
     if depth(value) > MAX_DEPTH:
         raise ValueError(f"attribute {name} is nested deeper than {MAX_DEPTH}")
     subset = name == "sampling" and isinstance(value, Mapping) and value.get("method") == "subset"
-    _validate(name, MODELS["subset" if subset else name].validate_python, value)
-    return value
-
-
-def _validate(name: str, validate: Callable[[Any], object], value: object) -> None:
     try:
-        validate(value)
+        MODELS["subset" if subset else name].validate_json(held, strict=True)
     except ValidationError as error:
         # the location alone names the value: values of a file that is not trusted are not quoted
         found = [f"{dotted(one['loc'])} {one['msg']}".strip()[:200] for one in error.errors(include_url=False)]
         more = [f"and {len(found) - MAX_SHOWN} more"] if len(found) > MAX_SHOWN else []
         raise ValueError(f"attribute {name}: {'; '.join(found[:MAX_SHOWN] + more)}") from None
+    return value

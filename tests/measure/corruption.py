@@ -18,7 +18,7 @@ COMMANDS = (
     ("export", "FILE", "--statistics", "-", "--quiet"),
     ("report", "FILE", "--out", "page.html", "--quiet"),
     ("causes", "FILE", "--by", "cross1.F", "--json"),
-    ("verify", "FILE", "--near", "cross1.F > 1500 N", "--joints", "2", "--json", "--workers", "1"),
+    ("verify", "FILE", "--near", "cross1.F > 1500 N", "--joints", "50", "--json", "--workers", "1"),
     ("replay", "FILE", "--row", "1", "--json"),
     ("extend", "FILE", "--n", "230", "--workers", "1", "--no-report"),
     ("merge", "FILE", "--out", "whole.h5"),

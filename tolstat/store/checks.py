@@ -53,8 +53,7 @@ def check_schema(path: Path, file: h5py.File) -> None:
             else "run its study again: tolstat run STUDY --out OTHER.h5"
         )
         raise store_error(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)
-    layout.check(file)
-    if not integrity.is_sealed(file):
+    if not integrity.is_sealed(file, layout.check(file)):
         raise ValueError("its attributes do not match their checksum")
 
 

@@ -93,12 +93,12 @@ def history_checks(history: NDArray[Any], rows: NDArray[np.intp]) -> NDArray[np.
 
 def seal(file: h5py.File) -> None:
     """Write the checksum of all attributes of a file; call this after every change of an attribute."""
-    file.attrs[DIGEST] = np.bytes_(_digest(file))
+    file.attrs[DIGEST] = np.bytes_(_digest(layout.values(file)))
 
 
-def is_sealed(file: h5py.File) -> bool:
-    """Whether the attributes of a file match their checksum."""
-    return _read(file) == _digest(file)
+def is_sealed(file: h5py.File, values: list[tuple[str, str, str]]) -> bool:
+    """Whether the attributes of a file, as `layout.check` returns them, match their checksum."""
+    return _read(file) == _digest(values)
 
 
 def seal_values(group: h5py.Group) -> None:
@@ -116,13 +116,8 @@ def _read(holder: h5py.Group) -> str:
     return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _digest(file: h5py.File) -> str:
-    held = [
-        (path, name, layout.value(attribute))
-        for path, one in layout.objects(file)
-        for name, attribute in layout.attributes(one)
-        if (path, name) != ("/", DIGEST)
-    ]
+def _digest(values: list[tuple[str, str, str]]) -> str:
+    held = [one for one in values if one[:2] != ("/", DIGEST)]
     return hashlib.sha256(json.dumps(held).encode()).hexdigest()
 
 

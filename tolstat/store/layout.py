@@ -7,6 +7,7 @@ functions of HDF5 are called directly: a file has some 200 datasets, and h5py's 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TypeAlias
 
@@ -32,8 +33,8 @@ WHAT_IF = "what_if"
 """Group whose sets have the names of their loads as texts."""
 
 
-def check(file: h5py.File, compressed: str = HISTORIES) -> None:
-    """Check the layout of a whole file.
+def check(file: h5py.File, compressed: str = HISTORIES) -> list[tuple[str, str, str]]:
+    """Check the layout of a whole file, and read its attributes in the same walk.
 
     Parameters
     ----------
@@ -42,20 +43,33 @@ def check(file: h5py.File, compressed: str = HISTORIES) -> None:
     compressed : str
         Name of the groups whose datasets may be compressed; empty for the root.
 
+    Returns
+    -------
+    list of (str, str, str)
+        What `values` returns.
+
     Raises
     ------
     ValueError
         With the first object that is linked from elsewhere, or stored otherwise than this package does.
     """
     size = file.id.get_filesize()
+    found = []
     for path, held in objects(file):
         if isinstance(held, h5d.DatasetID):
             inside = path.split("/")[-2] == compressed
             named = inside or (path.split("/")[1], path.split("/")[-1]) == (WHAT_IF, "load")
             _check_dataset(path, held, size, inside, named)
-        for name, attribute in attributes(held):
+        for name, attribute in _attributes(held):
             if attribute.get_type().get_class() not in (h5t.STRING, h5t.INTEGER, h5t.FLOAT):
                 raise ValueError(f"attribute {name} of {path} is neither text nor number")
+            found.append((path, name, _value(attribute)))
+    return found
+
+
+def values(file: h5py.File) -> list[tuple[str, str, str]]:
+    """Path, name and value as text of each attribute of a file, in an order that does not depend on how it was made."""
+    return [(path, name, _value(attribute)) for path, held in objects(file) for name, attribute in _attributes(held)]
 
 
 def objects(holder: h5py.Group) -> Iterator[tuple[str, ObjectID]]:
@@ -92,15 +106,15 @@ def _inside(
             yield from _inside(held, path, level + 1, seen, count)
 
 
-def attributes(held: ObjectID | h5f.FileID) -> Iterator[tuple[str, h5a.AttrID]]:
+def _attributes(held: ObjectID | h5f.FileID) -> Iterator[tuple[str, h5a.AttrID]]:
     """Yield the attributes of an object by name, sorted, but for those of dimension scales."""
-    found = (h5a.open(held, index=k) for k in range(h5a.get_num_attrs(held)))
-    for attribute in sorted(found, key=lambda one: one.name):
-        if attribute.name not in OF_SCALES:
-            yield attribute.name.decode("utf-8"), attribute
+    for k in range(h5a.get_num_attrs(held)):
+        attribute = h5a.open(held, index=k)  # in the order of names
+        if (name := attribute.name) not in OF_SCALES:
+            yield name.decode("utf-8"), attribute
 
 
-def value(attribute: h5a.AttrID) -> str:
+def _value(attribute: h5a.AttrID) -> str:
     """Value of an attribute as text, independent of how HDF5 stores it: texts of fixed and variable length agree."""
     held = np.empty(attribute.shape, dtype=attribute.dtype)
     attribute.read(held)
@@ -116,11 +130,11 @@ def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool, 
     if made.get_external_count() or layout == h5d.VIRTUAL:
         raise ValueError(f"{path} has its data in another file")
     filters = [made.get_filter(k)[0] for k in range(made.get_nfilters())]
-    nbytes = held.dtype.itemsize * int(np.prod(held.shape, dtype=object))
+    nbytes = held.dtype.itemsize * math.prod(held.shape)
     if compressed and layout == h5d.CHUNKED:
         if filters != FILTERS:
             raise ValueError(f"{path} is not compressed as histories are")
-        chunk = held.dtype.itemsize * int(np.prod(made.get_chunk(), dtype=object))
+        chunk = held.dtype.itemsize * math.prod(made.get_chunk())
         if max(nbytes, chunk) > MAX_COMPRESSION * held.get_storage_size():
             raise ValueError(f"{path} is incomplete")
         return

@@ -76,7 +76,7 @@ def busy(number: int) -> Iterator[None]:
 @pytest.mark.parametrize("workers", [2, 8])
 def test_a_campaign_in_which_no_joint_comes_through_ends(tmp_path: Path, workers: int) -> None:
     study, path = fakes.Study(n=3), tmp_path / "a.h5"
-    stages = fakes.stages(partial(simulate_slowly, seconds=3 * LIMIT_S))
+    stages = fakes.stages(partial(simulate_slowly, seconds=20 * LIMIT_S))
     execution = Execution("processes", workers, 2, joint_timeout=LIMIT_S)
     counts = campaign.run(study, path, stages=stages, execution=execution, tell=lambda _: None)
     assert (counts.done, counts.failed) == (3, 3)

@@ -20,7 +20,7 @@ import numpy as np
 from tests.support import synthetic
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
-from tolstat.common.tables import RESULT, Options, Simulation, Status
+from tolstat.common.tables import RESULT, HistorySpec, Options, Simulation, Status
 from tolstat.store import Counts, Reader
 
 
@@ -32,9 +32,16 @@ def simulate(params: np.ndarray, options: Options, **rest: object) -> Simulation
     return Simulation(results, {})
 
 
-STAGES = campaign.Stages(
-    sampling.draw_blocks, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, lambda: None
-)
+def no_histories(*_: object) -> dict[str, HistorySpec]:
+    """Keep no histories."""
+    return {}
+
+
+def warm_up(_: Options) -> None:
+    """Stub: there is nothing to compile."""
+
+
+STAGES = campaign.Stages(sampling.draw_blocks, sampling.dimensions, joint.perturb, no_histories, simulate, warm_up)
 
 
 def peak_bytes() -> int:

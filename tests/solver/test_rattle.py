@@ -76,7 +76,8 @@ def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order() -> None:
     def run(how: Callable[..., Iterable[object]], these: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         results = np.zeros(len(these), RESULT).view(np.recarray)
         blocks = np.zeros((len(these), options.max_revs), RESULT).view(np.recarray)
-        list(how(these, options, False, results, blocks))
+        left = np.full(len(these), iterations_allowed(options.steps_per_rev, options.max_revs))
+        list(how(these, options, left, False, results, blocks))
         return results.view(np.ndarray), blocks.view(np.ndarray)
 
     together, blocks = run(simulation._together, params)

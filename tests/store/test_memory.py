@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from tests.questions.test_causes import TEXT, made
 from tolstat.cli import app
 from tolstat.common.loads import LOAD_FIELDS
-from tolstat.store import Reader, checked_tables, view
+from tolstat.store import Reader, checked_tables, first_pass, view
 
 BLOCK = 256
 
@@ -21,7 +21,7 @@ def path(tmp_path_factory):
 def read(monkeypatch):
     """Rows of each whole table that is read."""
     rows = []
-    for module in (checked_tables, view):
+    for module in (checked_tables, first_pass, view):
         monkeypatch.setattr(module, "BLOCK", BLOCK)
 
     def recording(method):

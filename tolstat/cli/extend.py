@@ -8,6 +8,7 @@ import typer
 
 from tolstat.cli import run
 from tolstat.cli._app import ResultFile, StudyOption, Wide, Workers
+from tolstat.cli._shortage import check_memory
 from tolstat.cli._talk import progress, say
 
 
@@ -29,6 +30,7 @@ def extend(
 
     Example: tolstat extend iso2768_f.h5 --n 2000
     """
+    check_memory()
     from tolstat.campaign import extend as combine
     from tolstat.campaign.blocks import Execution
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_warnings, tell, width_of
+from tolstat.cli._shortage import check_memory
 from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
 
@@ -102,6 +103,7 @@ def run(
 
     Example: tolstat run studies/iso2768_f.toml --n 512 --out first.h5
     """
+    check_memory()
     from tolstat import study
     from tolstat.campaign.blocks import Execution
     from tolstat.campaign.retry import parse

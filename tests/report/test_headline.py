@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from tests.support import synthetic
 from tests.support.views import view
 from tolstat import report, sampling
+from tolstat.analysis import prediction
 from tolstat.analysis.exceedance import clopper_pearson, needed
 from tolstat.analysis.weighted import Trust
 from tolstat.cli import app
@@ -153,6 +154,16 @@ def test_a_limit_that_is_not_kept_leads_with_its_share(tmp_path):
     )
     assert said["notes"] == ["of 7 limits, each by itself: 1 not kept, 6 open"]
     assert card.verdict == "no"
+
+
+def test_the_page_predicts_the_next_delivery(tmp_path):
+    path = synthetic.store(tmp_path)
+    with Reader.open(path) as store:
+        cards = page.compose(store.view(), Asked(path, 0.05)).sections[0].blocks[0].cards
+    low, high = prediction.of_counts(20, 20, 60, 1000)
+    (found,) = (card for card in cards if card.label.startswith("of the next"))
+    assert found.value == f"{low:.0f} .. {high:.0f}"
+    assert found.label == "of the next 1000 joints exceed at least one limit"
 
 
 def apart(each):

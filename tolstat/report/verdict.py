@@ -113,11 +113,15 @@ def _answer(view: View, found: Headline | None) -> Card:
 
 
 def _cards(view: View, found: Headline | None) -> list[Card]:
-    """Unless the verdict says it, the yield and the limit exceeded most; number of joints, numerical error."""
+    """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
-    if found is not None and found.answer and not view.weighted and view.count(*VALID):
-        together = capabilities.together(capability.limits(view))
-        cards.append(Card(together.value, together.words, "Yield"))
+    if found is not None and not view.weighted and view.count(*VALID):
+        table = capability.limits(view)
+        if found.answer:
+            together = capabilities.together(table)
+            cards.append(Card(together.value, together.words, "Yield"))
+        if predicted := capabilities.delivery(table):
+            cards.append(Card(text.delivery(table.iloc[-1].to_dict()), predicted, "95 % prediction interval"))
     if found is not None and found.load and found.load not in found.words:
         worst = next(row for row in exceedance.limits(view).to_dict("records") if row["load"] == found.load)
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"

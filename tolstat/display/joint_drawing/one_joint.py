@@ -16,9 +16,9 @@ HEADS = (("e", "µm"), ("t", "µm"), ("z", "µm"), ("tilt t", "deg"), ("tilt z",
 WAYS = {"along_z": ALONG_Z, "along_t": ALONG_T}
 HEAD, FOOT, VIEW = 0.12, 0.1, 0.215
 """Shares of the drawing: height of head and foot, width of a view."""
-PLACES = (0.0, 0.224, 0.356, 0.489, 0.672, 0.854, 1.0)
+PLACES = (0.0, 0.24, 0.37, 0.5, 0.675, 0.85, 1.0)
 """Places of names and numbers, relative to the width left for them."""
-SIZE = 7.2
+SIZE = 6.8
 
 
 def enlargement(pairs: Sequence[Pair], pin: float, z: float) -> float:

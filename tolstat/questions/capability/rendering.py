@@ -8,6 +8,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from tolstat.analysis import exceedance
+from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
 from tolstat.display.table import Column, Row
@@ -83,6 +84,12 @@ def together(table: pd.DataFrame) -> Yield:
         return Yield(text.span(low, high), f"of the joints {keep} ({counted}; {covers})", high - low < WIDEST)
     interval = f"{kind} {text.span(low, high)}" if known else "no interval"
     return Yield(text.percent(row["good"]), f"of the joints {keep} ({counted}; {interval})", high - low < WIDEST)
+
+
+def delivery(table: pd.DataFrame) -> str:
+    """What the last row of `query.limits` predicts of the next `DELIVERY` joints; empty without an interval."""
+    limits = "at least one limit" if len(table) > 2 else "the limit"
+    return "" if math.isnan(table["next_lower"].iloc[-1]) else f"of the next {DELIVERY} joints exceed {limits}"
 
 
 def note(table: pd.DataFrame) -> str:

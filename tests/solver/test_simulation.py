@@ -209,6 +209,18 @@ METHODS = pytest.mark.parametrize("method", list(Method))
 TIGHT = {"settle_tol": 1e-7, "newton_tol": 1e-9, "max_revs": 40, "max_refinements": 0}
 
 
+def test_a_smooth_joint_settles_early_in_the_revolution_that_it_would_repeat(params):
+    early, samples = full(params(pin1__tilt_z=0.001, hole2__offset_t=1e-5))
+    late, again = full(
+        params(pin1__tilt_z=0.001, hole2__offset_t=1e-5), settle_tol=1e-14, max_revs=4, max_refinements=0
+    )
+    assert (early["status"], late["status"]) == (Status.OK, Status.NOT_SETTLED)
+    assert early["revolutions"] < 1.2
+    assert early["step_error"] < 0.02
+    for loads, repeated in ((samples["loads"][..., :3], again["loads"][..., :3]), (samples["loads"], again["loads"])):
+        assert np.abs(loads - repeated).max() < 1e-5 * np.abs(repeated).max()
+
+
 @METHODS
 def test_load_histories_of_a_joint_whose_contacts_stay_are_of_order_two(params, method):
     par = params(alpha=np.radians(15), pin1__tilt_z=np.radians(0.5))

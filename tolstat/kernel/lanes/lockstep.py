@@ -319,7 +319,7 @@ def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks
                 next_phase(lane, rows[joint], options, at, own)
             elif advance(lane, options, at, own):
                 if phase == STEP:
-                    status = step(lane, lanes, options, at, own, here, batch.notes[lane], results[joint])
+                    status = step(lane, rows[joint], lanes, options, at, own, here, batch.notes[lane], results[joint])
                 else:
                     status = finish_closeup_part(
                         lane, rows[joint], lanes, options, at, own, batch.fine[lane], results[joint]

@@ -276,6 +276,11 @@ def _together(
         rows, allowed = part.view(np.recarray), left[here]
         if steps is None:
             lockstep(rows, words, allowed, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+            again = np.flatnonzero(out["status"] == Status.PENDING)
+            found, remaining = out[again], allowed[again]
+            for i, revolution in _alone(part[again], options, remaining, keep, found):
+                samples[again[i]] = revolution
+            out[again], allowed[again] = found, remaining
         else:
             explicit(rows, words, steps[here], allowed, options, scratch(options), batch, samples, own, out, tally)
         left[here] = allowed

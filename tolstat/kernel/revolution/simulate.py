@@ -43,6 +43,7 @@ from tolstat.kernel.revolution.trail import closure_trend, note_closure
 from tolstat.kernel.simd.jit import njit
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
+PENDING = int(Status.PENDING)
 NOT_FINITE, OUTSIDE_MODEL, NOT_PERIODIC = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL), int(Status.NOT_PERIODIC)
 PERIODIC, UNKNOWN = int(Motion.PERIODIC), int(Motion.UNKNOWN)
 RAMP = int(Start.RAMP)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -26,6 +27,7 @@ from tolstat.store import Counts, Reader
 
 pytest.importorskip("distributed")
 
+from tolstat.campaign.executors import cluster as cluster_module
 from tolstat.campaign.executors.cluster import check, map_on_cluster
 
 
@@ -116,3 +118,80 @@ def test_stop_finishes_what_is_begun(cluster: Cluster) -> None:
         assert result == block
     assert 10 <= len(seen) < 40
     assert time.monotonic() - begin < 60
+
+
+def certificate(folder: Path, name: str, signed_by: str | None) -> None:
+    """Make a key and a certificate, signed by itself or by another."""
+    subject = ["-subj", f"/CN={name}", "-keyout", f"{name}.key", "-nodes", "-newkey", "rsa:2048"]
+    if signed_by is None:
+        commands = [["req", "-x509", "-days", "2", *subject, "-out", f"{name}.pem"]]
+    else:
+        sign = ["-CA", f"{signed_by}.pem", "-CAkey", f"{signed_by}.key", "-CAcreateserial", "-days", "2"]
+        commands = [
+            ["req", *subject, "-out", f"{name}.csr"],
+            ["x509", "-req", "-in", f"{name}.csr", *sign, "-out", f"{name}.pem"],
+        ]
+    for command in commands:
+        subprocess.run(["openssl", *command], cwd=folder, check=True, capture_output=True)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl for certificates")
+def test_a_cluster_with_certificates_takes_those_only(tmp_path: Path) -> None:
+    """The campaign runs in a process of its own: Dask reads its settings once."""
+    certificate(tmp_path, "own", None)
+    certificate(tmp_path, "node", "own")
+    certificate(tmp_path, "stranger", None)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tls://127.0.0.1:{port}"
+
+    def settings(authority: str, name: str) -> dict[str, str]:
+        held = {"CA_FILE": tmp_path / f"{authority}.pem"}
+        for role in ("SCHEDULER", "WORKER", "CLIENT"):
+            held |= {f"{role}__CERT": tmp_path / f"{name}.pem", f"{role}__KEY": tmp_path / f"{name}.key"}
+        return fakes.environment() | {f"DASK_DISTRIBUTED__COMM__TLS__{key}": str(path) for key, path in held.items()}
+
+    place = {"env": settings("own", "node"), "cwd": tmp_path, "stderr": subprocess.DEVNULL}
+    dask = [sys.executable, "-m", "dask"]
+    options = ["--host", address, "--no-dashboard"]
+    processes = [subprocess.Popen([*dask, "scheduler", *options], **place)]
+    options = ["--nthreads", "1", "--no-dashboard", "--no-nanny"]
+    processes.append(subprocess.Popen([*dask, "worker", address, *options], **place))
+    try:
+        done = {
+            name: subprocess.run(
+                [sys.executable, "-c", OVER_TLS, str(tmp_path / f"{name}.h5"), address],
+                env=settings(authority, name), cwd=tmp_path, capture_output=True, text=True, check=False,
+            )
+            for authority, name in (("own", "node"), ("stranger", "stranger"))
+        }  # fmt: skip
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+    assert done["node"].returncode == 0, done["node"].stderr[-2000:]
+    assert datasets(tmp_path / "node.h5") == reference(tmp_path / "b.h5")
+    assert "does not answer" in done["stranger"].stderr
+    assert "check the certificates" in done["stranger"].stderr
+
+
+OVER_TLS = """
+import sys
+from pathlib import Path
+from tests.support import fakes
+from tolstat.campaign import run as campaign
+from tolstat.campaign.blocks import Execution
+if __name__ == "__main__":
+    execution = Execution("dask", block=10, scheduler=sys.argv[2])
+    campaign.run(fakes.Study(), Path(sys.argv[1]), stages=fakes.stages(), execution=execution)
+"""
+
+
+@pytest.mark.slow
+def test_a_cluster_of_this_machine_listens_on_the_loopback_only() -> None:
+    with cluster_module._client(None, 1) as client:
+        addresses = [client.scheduler.address, *client.scheduler_info()["workers"]]
+    assert addresses
+    assert all(address.startswith(f"tcp://{cluster_module.LOOPBACK}:") for address in addresses)

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from tolstat.display import text
+from tolstat.display.unseen import visible
 
 
 @pytest.mark.parametrize(
@@ -30,5 +31,5 @@ def test_both_ends_of_an_interval_have_one_unit(low, high, shown):
 
 
 def test_characters_that_cannot_be_seen_are_shown_by_their_code():
-    assert text.visible("a\u202eb\x00\x1b[31m\u2066") == "a[U+202E]b[U+0000][U+001B][31m[U+2066]"
-    assert text.visible("Übermaß –\tΔ\nعربي") == "Übermaß –\tΔ\nعربي"
+    assert visible("a\u202eb\x00\x1b[31m\u2066") == "a[U+202E]b[U+0000][U+001B][31m[U+2066]"
+    assert visible("Übermaß –\tΔ\nعربي") == "Übermaß –\tΔ\nعربي"

@@ -150,6 +150,10 @@ def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         held = file["results/cross2.F_max"][:]
         del file["results/cross2.F_max"]
+    with pytest.raises(StoreError, match="its attributes do not match their checksum"):
+        Reader.open(path)
+    with h5py.File(path, "r+") as file:
+        integrity.seal(file)
     with pytest.raises(StoreError, match=r"cross2\.F_max is missing"):
         Reader.open(path)
     with h5py.File(path, "r+") as file:

@@ -7,21 +7,22 @@ import sys
 import textwrap
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
 from tolstat import __version__
 from tolstat.common.errors import Fault, InputError
+from tolstat.display.unseen import visible
 
 if TYPE_CHECKING:
     from tolstat.campaign.progress import Display
 
 WIDTH = 80
 """Maximum length of a line of prose, characters."""
-LOG = logging.getLogger("tolstat.cli")
+LOG = logging.getLogger("tolstat")
 LOG.propagate = False
 
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print warnings and errors only on standard error.")]
@@ -36,8 +37,26 @@ class _Stderr(logging.Handler):
     """Prints messages on the standard error of the moment: above the bar while one is shown."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        text = record.getMessage()
+        text = for_terminal(record.getMessage())
         print(wrapped(text) if record.levelno == logging.INFO else text, file=sys.stderr, flush=True)
+
+
+def for_terminal(text: str) -> str:
+    """Text without characters that move the cursor, change colours or the title: names of a file may hold them."""
+    return visible(text).replace("\r", "[U+000D]")
+
+
+class _Terminal:
+    """Standard output on a terminal: what is written passes `for_terminal`. Into files and pipes goes what is there."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        return self._stream.write(for_terminal(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 def wrapped(text: str) -> str:
@@ -86,7 +105,8 @@ def session(quiet: bool, verbose: bool, log: Path | None) -> Iterator[None]:
         if log is not None:
             LOG.addHandler(_log_file(log))
         LOG.debug("tolstat %s: %s", __version__, " ".join(sys.argv[1:]))
-        yield
+        with redirect_stdout(_Terminal(sys.stdout)) if sys.stdout.isatty() else nullcontext():
+            yield
     finally:
         for handler in LOG.handlers[1:]:
             handler.close()

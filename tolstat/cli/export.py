@@ -168,7 +168,9 @@ def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
 def _write_table(frame: pd.DataFrame, stream: TextIO) -> None:
     import csv
 
+    from tolstat.display.text import cells
+
     heads = csv.writer(stream, lineterminator="\n")
     heads.writerow(["row", *frame.columns])
     heads.writerow(["1", *frame.attrs["units"].values()])
-    frame.to_csv(stream, header=False, lineterminator="\n")
+    cells(frame).to_csv(stream, header=False, lineterminator="\n")

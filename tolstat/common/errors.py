@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+MAX_SHOWN = 4000
+"""Most characters of a place, a finding or a remedy that a message shows."""
+
 
 @dataclass(frozen=True)
 class Fault:
@@ -26,7 +29,13 @@ class Fault:
     remedy: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.found}\n  hint: {self.remedy}"
+        place, found, remedy = map(_shortened, (self.place, self.found, self.remedy))
+        return f"{place}: {found}\n  hint: {remedy}"
+
+
+def _shortened(text: str) -> str:
+    """Beginning of a text that a file has made very long."""
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]} ..."
 
 
 class TolstatError(Exception):

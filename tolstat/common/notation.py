@@ -59,9 +59,16 @@ _SPELLINGS = (
 )
 """Spellings that pint does not know or takes for something else, and what is meant: Nm, U/min, r/min, RPM, min-1."""
 
+MAX_LENGTH = 100
+"""Largest number of characters of a quantity."""
+_ODD_POWER = re.compile(r"(?:\^|\*\*)(?!\s*\(?\s*[-+]?\d{1,2}(?:\.\d{1,3})?\s*\)?(?![\w.(]|\s*(?:\^|\*\*)))")
+"""Power whose exponent is no small number: a unit is computed, and ``m**9**9**9`` would take for ever."""
+
 
 def read(text: str) -> Written | None:
     """Sign, number and unit of a quantity as it stands on a drawing; None if it is none."""
+    if len(text) > MAX_LENGTH or _ODD_POWER.search(text):
+        return None
     mark, rest = "", text
     if (found := _MARK.match(text)) is not None:
         mark, rest = (DIAMETER if found["diameter"] else PLUS_MINUS), text[found.end() :]

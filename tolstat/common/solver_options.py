@@ -21,8 +21,3 @@ def to_names(options: Options) -> dict[str, Any]:
 def from_names(held: Mapping[str, Any]) -> Options:
     """Return the options that `to_names` has written."""
     return Options(**{k: int(CODES[k][v.upper()]) if k in CODES else v for k, v in held.items()})
-
-
-def unknown_names(held: Mapping[str, Any]) -> list[str]:
-    """Methods, starts and fidelities in `held` that this version does not have: ``["method rk4"]``."""
-    return [f"{k} {v}" for k, v in held.items() if k in CODES and str(v).upper() not in CODES[k].__members__]

@@ -17,6 +17,10 @@ from pydantic_core import CoreSchema, PydanticCustomError
 
 from tolstat.common import json_schema, toml_lines, units
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import read_input
+
+MAX_DEPTH = 32
+"""Largest number of tables and lists inside each other in an input file."""
 
 
 class Strict(BaseModel):
@@ -44,8 +48,8 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
         When the file cannot be read or is not TOML.
     """
     try:
-        text = path.read_text(encoding="utf-8") if text is None else text
-        return tomllib.loads(text)
+        text = read_input(path) if text is None else text
+        data = tomllib.loads(text)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
@@ -56,6 +60,21 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         line, said, remedy = toml_lines.of_syntax(error, text or "")
         raise InputError([Fault(f"{path}:{line}", f"is not TOML: {said}", remedy)]) from error
+    except RecursionError:
+        data = None
+    if data is None or depth(data) > MAX_DEPTH:
+        found = f"has tables and lists nested deeper than {MAX_DEPTH}"
+        raise InputError([Fault(str(path), found, "no key needs more than a few: remove brackets")])
+    return data
+
+
+def depth(data: object) -> int:
+    """Number of tables and lists inside each other."""
+    depth, level = 0, [data]
+    while level := [one for one in level if isinstance(one, (dict, list))]:
+        depth += 1
+        level = [one for holder in level for one in (holder.values() if isinstance(holder, dict) else holder)]
+    return depth
 
 
 def with_lines(faults: Sequence[Fault], place: str, text: str) -> list[Fault]:
@@ -96,7 +115,7 @@ def lines_of(path: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        text = path.read_text(encoding="utf-8")
+        text = read_input(path)
         raise InputError(with_lines(error.faults, str(path), text)) from error
 
 

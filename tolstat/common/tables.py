@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tolstat.common.fields import Field, Kind, dtype_of
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 6
+SCHEMA_VERSION = 7
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
 PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
@@ -342,6 +342,7 @@ DESIGN_FIELDS = (
 LEDGER_FIELDS = (
     Field("attempt", "1", "what gave the results: 0 the study's settings, k those of entry k - 1 of `retries`", "i4"),
     Field("errors_check", "1", "checksum of the joint's row, errors and design", "u8"),
+    Field("attempt_check", "1", "checksum of `errors_check` and `attempt`: also pending joints have it", "u8"),
     Field("results_check", "1", "checksum of `errors_check`, `attempt` and the joint's results, status included", "u8"),
 )
 """Origin of each joint's results, and checksums of its rows."""

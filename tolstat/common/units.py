@@ -120,6 +120,8 @@ def to_si(value: object, unit: str, mark: str = "") -> float:
             raise _fault(f"{value!r} is not a finite number", unit)
         return float(value)
     read = notation.read(value)
+    if len(value) > notation.MAX_LENGTH:
+        raise _fault(f"{value[:30]!r}... has {len(value)} characters, which no number with a unit has", unit)
     if read is None:
         point = value.replace(",", ".")
         remedy = f'write a decimal point: "{point}"' if point != value and notation.read(point) else ""

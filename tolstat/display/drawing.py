@@ -18,6 +18,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tolstat.display import schemes, style, text
 from tolstat.display.blocks import Panel
+from tolstat.display.unseen import visible
 
 BOTTOM, RIGHT = 0.5, 0.12
 """Margins below and beside the axes, inches; `Panel.left` and `Panel.top` are the others."""
@@ -96,7 +97,7 @@ def switched(artist: Artist, name: str) -> None:
 
 def _inline(drawn: str, panel: Panel) -> str:
     """Body of an SVG file as an element of the page, whose style sheet has fonts, joins and colours of all pictures."""
-    body = schemes.with_variables(text.visible(drawn[drawn.index("<svg") :]))
+    body = schemes.with_variables(visible(drawn[drawn.index("<svg") :]))
     body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
     body = body.replace("font-family: 'DejaVu Sans'; ", "")
     body = re.sub(r'<path d="[^"]*" style="fill: none"/>', "", body)  # background of figure and axes
@@ -111,7 +112,7 @@ def _inline(drawn: str, panel: Panel) -> str:
     assert box is not None
     spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     head = f'<svg {spaces} {box[0]} role="img" aria-labelledby="{panel.key}-title {panel.key}-desc">'
-    title, description = (escape(text.visible(words)) for words in (panel.title, panel.description))
+    title, description = (escape(visible(words)) for words in (panel.title, panel.description))
     said = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
     return head + said + body[body.index(">") + 1 :].strip()
 

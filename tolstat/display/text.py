@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,12 +12,6 @@ from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, unit_text
 
 if TYPE_CHECKING:
     import pandas as pd
-
-_UNSEEN = re.compile(
-    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff"
-    "\U000e0000-\U000e007f]"
-)
-"""Control characters but those that end lines, marks and overrides of the direction of text, tags, surrogates."""
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -31,16 +24,22 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [{str(k): plain_number(v) for k, v in row.items()} for row in table.to_dict("records")]
 
 
-def visible(words: str) -> str:
-    """Show characters that cannot be seen or change the direction of text by their code, ``[U+202E]``."""
-    return _UNSEEN.sub(lambda found: f"[U+{ord(found[0]):04X}]", words)
+def cell(value: Any) -> Any:
+    """Value of a cell as spreadsheets may read it: an apostrophe before text that they would take for a formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+
+
+def cells(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a frame with `cell` applied to its columns of text."""
+    words = [name for name in table if table[name].dtype.kind not in "biuf"]
+    return table.assign(**{str(name): table[name].map(cell) for name in words}) if words else table
 
 
 def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
     """Write a frame as ``STEM_what.csv``; return its path."""
     path = stem.with_name(f"{stem.name}_{what}.csv")
     with atomic_write(path) as temporary:
-        table.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+        cells(table).to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
     return path
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import load_of
+from tolstat.display.text import cell
 from tolstat.questions.exceedance.query import limits
 from tolstat.store import Reader
 from tolstat.store.frame import described
@@ -90,9 +91,8 @@ def _sheet(book: Any, name: str, heads: Sequence[str], rows: Iterable[Sequence[o
         sheet.column_dimensions[get_column_letter(k)].width = max(10, min(len(head) + 2, 40))
     bold = []
     for head in heads:
-        cell = WriteOnlyCell(sheet, value=head)
-        cell.font = Font(bold=True)
-        bold.append(cell)
+        bold.append(WriteOnlyCell(sheet, value=head))
+        bold[-1].font = Font(bold=True)
     sheet.append(bold)
     for row in rows:
-        sheet.append([None if isinstance(value, float) and not math.isfinite(value) else value for value in row])
+        sheet.append([None if isinstance(value, float) and not math.isfinite(value) else cell(value) for value in row])

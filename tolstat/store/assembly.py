@@ -21,6 +21,7 @@ from tolstat.store.histories import (
     parts_folder,
     rows_per_chunk,
 )
+from tolstat.store.integrity import seal
 from tolstat.store.new_file import fill
 from tolstat.store.reader import Reader
 from tolstat.store.result_file import BLOCK, LINKED, campaign_digest, store_error
@@ -90,6 +91,7 @@ def assemble(
                 _histories_beside(path, file, n, sources)
             else:
                 _histories_inside(file, n, sources)
+            seal(file)
     except FileExistsError as error:
         raise store_error(path, "exists already", "give another file: --out OTHER.h5") from error
     except OSError as error:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results, tables
-from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.tables import Status, Variant
 from tolstat.store import checks, integrity
 from tolstat.store.numbering import Numbering
@@ -27,6 +27,8 @@ class CheckedTables(Numbering):
     columns: tuple[Column, ...]
     case_names: tuple[str, ...]
     variants: tuple[Variant, ...]
+    _left_out: NDArray[np.bool_]
+    """File slots whose results were found damaged while they were read, at any operating point, (n,)."""
     points: Mapping[str, Point]
     point: str | None
 
@@ -146,15 +148,32 @@ class CheckedTables(Numbering):
         if fields is not None:
             return self._in_blocks(self.results, slots, tables.RESULT, fields)
         table = self._results(slots)
-        broken = (table["status"] == Status.PENDING) | ~self._intact(slots, table)
+        pending = table["status"] == Status.PENDING
+        broken = pending | ~self._intact(slots, table)
+        if (broken & ~pending).any():
+            self._left_out[slots] |= broken & ~pending
         for field in tables.RESULT_FIELDS:
             table[field.name][broken] = np.nan if np.dtype(field.dtype).kind == "f" else 0
         self._check_status(table["status"])
         return table
 
     def attempt(self, slots: slice = slice(None)) -> NDArray[np.int32]:
-        """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``."""
-        return np.asarray(self.column("ledger", "attempt", slots))
+        """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``.
+
+        Raises
+        ------
+        StoreError
+            When an attempt is damaged.
+        """
+        attempt, errors, held = (
+            self.column("ledger", name, slots) for name in ("attempt", "errors_check", "attempt_check")
+        )
+        wrong = integrity.attempt_hash(errors, attempt) != held
+        if wrong.any():
+            row = self.row(slots.indices(self.n)[0] + int(np.argmax(wrong)))
+            found = f"is damaged: the attempt of row {row} does not match its checksum"
+            raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
+        return attempt
 
     def column(self, group: str, name: str, slots: Any) -> NDArray[Any]:
         """Read a dataset at a file slot or slice of them.
@@ -199,7 +218,8 @@ class CheckedTables(Numbering):
 
     def _intact(self, slots: slice, results: NDArray[np.void]) -> NDArray[np.bool_]:
         """Whether rows match their checksums, (m,); checksums are read after the values, the order of writing."""
-        attempt, errors, held = (self.column("ledger", c.name, slots) for c in LEDGER_COLUMNS)
+        names = ("attempt", "errors_check", "results_check")
+        attempt, errors, held = (self.column("ledger", name, slots) for name in names)
         return np.asarray(integrity.results_hash(errors, attempt, results, self.columns) == held)
 
     def _check_errors(self, slots: slice, errors: NDArray[np.void]) -> None:

@@ -1,13 +1,12 @@
 """Validation of a result file before its contents are used: damaged and hostile files are rejected here.
 
-No length that a file states is used to allocate memory before the file is known to hold that many bytes. Only hard
-links to contiguous datasets inside the file are followed: neither to other files nor through filters.
+Its layout comes first (`layout`), then the checksum of its attributes, their contents (`metadata`), and its tables.
 """
 
 from __future__ import annotations
 
-import json
 import math
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -17,20 +16,19 @@ import numpy as np
 
 from tolstat.common import selected_results
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS
+from tolstat.common.loads import split
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec
 from tolstat.joint import Operation
-from tolstat.store import integrity
+from tolstat.store import integrity, layout, metadata
 from tolstat.store.result_file import FILETYPE, check_column, descriptions, place_of, store_error, text
-from tolstat.study.points import Point, check_name
+from tolstat.study.points import Point
 
 DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
 """Exceptions that reading a damaged file raises, in h5py or in code that relies on the file's attributes."""
-MAX_COMPRESSION = 1100
-"""Largest compression ratio accepted (deflate cannot exceed 1032): a dataset that claims more is incomplete."""
+ONE_EACH = ("random", "sobol", "lhs", "importance", "subset")
+"""Sampling methods whose number of joints is ``sampling.n``."""
 MAX_SAMPLES = 50_000_000
 """Largest number of values in a history of one joint: more than the finest solution of all loads has."""
-MAX_TEXT_BYTES = 64_000_000
-"""Largest size of a JSON attribute that is read, bytes."""
 
 
 def check_schema(path: Path, file: h5py.File) -> None:
@@ -55,7 +53,7 @@ def check_schema(path: Path, file: h5py.File) -> None:
             else "run its study again: tolstat run STUDY --out OTHER.h5"
         )
         raise store_error(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)
-    if not integrity.is_sealed(file):
+    if not integrity.is_sealed(file, layout.check(file)):
         raise ValueError("its attributes do not match their checksum")
 
 
@@ -77,25 +75,6 @@ def integer(file: h5py.File, name: str, default: int | None = None) -> int:
     return int(value)
 
 
-def mapping(file: h5py.File, name: str) -> dict[str, Any]:
-    """Read an attribute that must be a JSON object.
-
-    Raises
-    ------
-    KeyError
-        When it is missing.
-    ValueError
-        When it is not a JSON object, or longer than `MAX_TEXT_BYTES`.
-    """
-    held = file.attrs.get_id(name)
-    if held.get_storage_size() > MAX_TEXT_BYTES:
-        raise ValueError(f"attribute {name} is too long")
-    value = json.loads(text(file.attrs, name))
-    if not isinstance(value, dict):
-        raise ValueError(f"attribute {name} is not a JSON object")
-    return value
-
-
 def history_specs(file: h5py.File) -> dict[str, HistorySpec]:
     """Read the attribute ``histories``.
 
@@ -105,8 +84,10 @@ def history_specs(file: h5py.File) -> dict[str, HistorySpec]:
         When it does not describe histories that a campaign can keep.
     """
     specs = {}
-    for name, (shape, dtype, unit, description, *axes) in mapping(file, "histories").items():
+    for name, (shape, dtype, unit, description, *axes) in metadata.read(file, "histories").items():
         spec = HistorySpec(tuple(shape), dtype, unit, description, *(tuple(names) for names in axes))
+        if not name.isidentifier():  # a dataset of this name lies in the group of the histories
+            raise ValueError(f"histories has the name {name!r}")
         if not all(isinstance(size, int) and size > 0 for size in spec.shape) or math.prod(spec.shape) > MAX_SAMPLES:
             raise ValueError(f"history {name} has the shape {shape}")
         if spec.dtype not in ("f4", "f8", "u1", "u2"):
@@ -124,20 +105,42 @@ def points(file: h5py.File) -> dict[str, Point]:
         When it does not describe operating points.
     """
     found = {}
-    for name, values in mapping(file, "points").items():
-        if name:
-            check_name(name)  # also a folder of histories has this name
+    for name, values in metadata.read(file, "points").items():
         share = values.pop("share")
-        if values.keys() != Operation.model_fields.keys() or not all(isinstance(v, float) for v in values.values()):
-            raise ValueError(f"operating point {name!r} has the values {values}")
-        found[name] = Point(name, Operation.model_construct(**values), math.nan if share is None else float(share))
-    if not found or (len(found) > 1 and "" in found):
-        raise ValueError("attribute points has no operating point, or one without a name among others")
+        own = {key: float(value) for key, value in values.items()}
+        found[name] = Point(name, Operation.model_construct(None, **own), math.nan if share is None else float(share))
     return found
 
 
+def limits(file: h5py.File, points: Mapping[str, Point]) -> dict[str, float]:
+    """Read the attribute ``limits``: the limit of each load, SI.
+
+    Raises
+    ------
+    KeyError, ValueError
+        When it does not describe limits of loads at the operating points of the file.
+    """
+    held: dict[str, float] = metadata.read(file, "limits")
+    for selection in filter(None, (split(name)[1] for name in held)):
+        if not {name.strip() for name in selection.split("+")} <= points.keys():
+            raise ValueError("attribute limits names an operating point that the file does not have")
+    return held
+
+
+def check_number(sampling: Mapping[str, Any], rows: int) -> None:
+    """Check that a sampling method whose number of joints is ``sampling.n`` has them in a campaign of `rows`.
+
+    Raises
+    ------
+    ValueError
+        When it has not.
+    """
+    if sampling["method"] in ONE_EACH and sampling["n"] + sampling["nominal_first"] != rows:
+        raise ValueError(f"sampling.n is {sampling['n']} in a campaign of {rows} rows")
+
+
 def check_tables(file: h5py.File) -> int:
-    """Check that every kept column is present with the type that its table defines, contiguous and complete.
+    """Check that every kept column is present with the type and length that its table defines.
 
     Returns
     -------
@@ -154,10 +157,11 @@ def check_tables(file: h5py.File) -> int:
     n = int(status.shape[0]) if status.ndim == 1 else 0
     if n < 1:
         raise ValueError(f"{status.name} has the shape {status.shape}")
-    histories = tuple(check_column(name) for name in mapping(file, "histories"))
+    histories = tuple(check_column(name) for name in metadata.read(file, "histories"))
+    results = selected_results.columns(metadata.read(file, "identity"))
     groups = {
         "errors": ERROR_COLUMNS,
-        **{f"{place}/results": selected_results.columns(mapping(file, "identity")) for place in at_points},
+        **{f"{place}/results": results for place in at_points},
         **{f"{place}/ledger": (*LEDGER_COLUMNS, *histories) for place in at_points},
         **{name: columns for name, (columns, _) in descriptions(file).items()},
     }
@@ -181,31 +185,15 @@ def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> N
         dataset = _dataset(file, f"{place}/histories/{name}")
         if dataset.shape != (n, *spec.shape) or dataset.dtype != np.dtype(spec.dtype):
             raise ValueError(f"{dataset.name} has the shape {dataset.shape} and type {dataset.dtype}")
-        if dataset.nbytes > MAX_COMPRESSION * dataset.id.get_storage_size():
-            raise ValueError(f"{dataset.name} is incomplete")
 
 
 def _dataset(file: h5py.File, path: str) -> h5py.Dataset:
-    """Return the dataset at a path; reject soft or external links and data stored in other files."""
-    keys = [key for key in path.split("/") if key]
-    holder: Any = file
-    for key in keys:
-        if not isinstance(holder, h5py.Group) or not isinstance(holder.get(key, getlink=True), h5py.HardLink):
-            raise ValueError(f"/{'/'.join(keys)} is missing, or a link to another place")
-        holder = holder[key]
-    dataset = holder
+    dataset = file.get(path)
     if not isinstance(dataset, h5py.Dataset):
-        raise ValueError(f"/{'/'.join(keys)} is not a dataset")
-    if dataset.is_virtual or dataset.external:
-        raise ValueError(f"{dataset.name} has its data in another file")
+        raise ValueError(f"/{path.strip('/')} is missing, or not a dataset")
     return dataset
 
 
 def _check_column(dataset: h5py.Dataset, n: int, dtype: str) -> None:
     if dataset.dtype != np.dtype(dtype) or dataset.shape != (n,):
         raise ValueError(f"{dataset.name} is {dataset.shape} of {dataset.dtype}, not {(n,)} of {np.dtype(dtype)}")
-    offset, size = dataset.id.get_offset(), dataset.id.get_storage_size()
-    if dataset.chunks is not None or offset is None or size != dataset.nbytes:
-        raise ValueError(f"{dataset.name} is not stored contiguously")
-    if offset + size > dataset.file.id.get_filesize():
-        raise ValueError(f"{dataset.name} reaches beyond the end of the file")

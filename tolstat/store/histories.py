@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.files import atomic_write
 from tolstat.common.tables import HistorySpec
-from tolstat.store import meanings
+from tolstat.store import layout, meanings
 from tolstat.store.axes import attach_scales
 from tolstat.store.result_file import link_rows, put_attributes, store_error
 
@@ -154,6 +154,10 @@ class HistoryParts:
         for k, path in enumerate(index.paths):
             with self._open(path) as file:
                 rows = file["rows"][:]
+                if rows.ndim != 1 or rows.dtype.kind != "i" or not np.isin(rows, np.arange(self.n)).all():
+                    raise ValueError("rows outside the file")
+                if any(file[name].shape != (len(rows), *spec.shape) for name, spec in self.specs.items()):
+                    raise ValueError("histories of another shape")
             index.part[rows] = k
             index.position[rows] = np.arange(len(rows))
         return index
@@ -224,6 +228,7 @@ class HistoryParts:
     def _open(self, path: Path) -> Iterator[h5py.File]:
         try:
             with h5py.File(path, "r", locking=False) as file:
+                layout.check(file, compressed="")
                 if file.attrs.get("campaign") != self.campaign:
                     raise store_error(
                         path,
@@ -231,7 +236,7 @@ class HistoryParts:
                         "delete the folder, or give another file: --out OTHER.h5",
                     )
                 yield file
-        except (OSError, KeyError) as error:
+        except (OSError, KeyError, ValueError, RuntimeError) as error:
             remedy = "delete it, and simulate its joints again: run the same tolstat run command"
             raise store_error(path, "is damaged", remedy) from error
 

@@ -1,8 +1,9 @@
-"""Checksums that detect rows and attributes that changed after they were written.
+"""Checksums that detect rows and attributes that changed after they were written: by accident, not by intent.
 
-Each row has two checksums in the group ``ledger``, one of its errors and one of its results; each history has one
-checksum per row, and all attributes together have one. The row number enters the checksum of the errors, which in turn
-enters the checksum of the results, so that swapped or mixed rows are detected.
+Each row has three checksums in the group ``ledger``, of its errors, of its attempt and of its results; each history has
+one checksum per row, the values of a verification have one, and all attributes of the file together have one. The row
+number enters the checksum of the errors, which in turn enters those of the attempt and of the results, so that swapped
+or mixed rows are detected.
 
 The hash of the rows is updated column by column on whole arrays: state = (state xor word) * odd number, then xor with
 its upper half. Each update is invertible for a given word, so that a change of a single number is always detected; any
@@ -23,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.columns import ERROR_COLUMNS, Column
+from tolstat.store import layout
 
 Hash = NDArray[np.uint64]
 Described = tuple[tuple[Column, ...], NDArray[np.void]]
@@ -70,9 +72,15 @@ def results_hash(
     columns : tuple of Column
         Columns of the results that are kept.
     """
+    state = attempt_hash(errors_check, attempt)
+    _fold(state, columns, results)
+    return state
+
+
+def attempt_hash(errors_check: Hash, attempt: NDArray[np.int32]) -> Hash:
+    """Checksum of the attempt of each row, (m,), from the checksum of its errors: pending rows have it, too."""
     state = errors_check ^ attempt.astype(np.uint64)
     _mix(state)
-    _fold(state, columns, results)
     return state
 
 
@@ -84,25 +92,43 @@ def history_checks(history: NDArray[Any], rows: NDArray[np.intp]) -> NDArray[np.
 
 
 def seal(file: h5py.File) -> None:
-    """Write the checksum of a file's attributes; call this after every change of an attribute."""
-    file.attrs[DIGEST] = np.bytes_(_digest(file))
+    """Write the checksum of all attributes of a file; call this after every change of an attribute."""
+    file.attrs[DIGEST] = np.bytes_(_digest(layout.values(file)))
 
 
-def is_sealed(file: h5py.File) -> bool:
-    """Whether the attributes of a file match their checksum."""
-    return _plain(file.attrs.get(DIGEST)) == _digest(file)
+def is_sealed(file: h5py.File, values: list[tuple[str, str, str]]) -> bool:
+    """Whether the attributes of a file, as `layout.check` returns them, match their checksum."""
+    return _read(file) == _digest(values)
 
 
-def _digest(file: h5py.File) -> str:
-    held = {name: _plain(value) for name, value in file.attrs.items() if name != DIGEST}
-    return hashlib.sha256(json.dumps(held, sort_keys=True).encode()).hexdigest()
+def seal_values(group: h5py.Group) -> None:
+    """Write the checksum of the values of all datasets in a group that is never written to again, as attribute."""
+    group.attrs[DIGEST] = np.bytes_(_digest_of_values(group))
 
 
-def _plain(value: object) -> str:
-    """Value of an attribute as text, independent of how HDF5 stores it."""
-    if isinstance(value, bytes):
-        return value.decode("utf-8")
-    return value if isinstance(value, str) else repr(np.asarray(value).tolist())
+def are_sealed(group: h5py.Group) -> bool:
+    """Whether the values of the datasets in a group match the checksum that `seal_values` has written."""
+    return _read(group) == _digest_of_values(group)
+
+
+def _read(holder: h5py.Group) -> str:
+    value = holder.attrs.get(DIGEST, b"")
+    return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _digest(values: list[tuple[str, str, str]]) -> str:
+    held = [one for one in values if one[:2] != ("/", DIGEST)]
+    return hashlib.sha256(json.dumps(held).encode()).hexdigest()
+
+
+def _digest_of_values(group: h5py.Group) -> str:
+    digest = hashlib.sha256()
+    for path, held in layout.objects(group):
+        if isinstance(held, h5py.h5d.DatasetID):
+            dataset = h5py.Dataset(held)
+            digest.update(f"{path} {dataset.dtype.str} {dataset.shape}".encode())
+            digest.update(np.ascontiguousarray(dataset[...]).tobytes())
+    return digest.hexdigest()
 
 
 def _fold(state: Hash, columns: tuple[Column, ...], table: NDArray[np.void]) -> None:

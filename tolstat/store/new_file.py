@@ -16,7 +16,7 @@ from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Options
 from tolstat.store import meanings
-from tolstat.store.integrity import errors_hash, seal
+from tolstat.store.integrity import attempt_hash, errors_hash, seal
 from tolstat.store.meanings import Meanings
 from tolstat.store.provenance import git_commit, versions
 from tolstat.store.result_file import (
@@ -201,8 +201,10 @@ def _checked(file: h5py.File, rows: range, errors: Iterable[NDArray[np.void]]) -
                 c.of(table)[:] = file[group][c.name][here]
             described.append((columns, table))
         checks = errors_hash(rows.start + first, block, described)
+        attempts = attempt_hash(checks, np.zeros(len(block), np.int32))
         for point in json.loads(text(file.attrs, "points")):
-            file[place_of(point)]["ledger/errors_check"][here] = checks
+            ledger = file[place_of(point)]["ledger"]
+            ledger["errors_check"][here], ledger["attempt_check"][here] = checks, attempts
         yield block
         first = here.stop
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from copy import copy
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
@@ -19,7 +18,7 @@ from tolstat.common.errors import StoreError
 from tolstat.common.loads import limits_in_words
 from tolstat.common.shown import table
 from tolstat.common.tables import Status, Variant
-from tolstat.store import checks, integrity
+from tolstat.store import checks, integrity, left_out, metadata, session
 from tolstat.store.checked_tables import CheckedTables
 from tolstat.store.counts import Counts
 from tolstat.store.frame import to_pandas, to_xarray
@@ -43,13 +42,6 @@ if TYPE_CHECKING:
     import xarray
 
     from tolstat.joint import Operation
-
-
-class Session(NamedTuple):
-    """A run under way: when it started (Unix time, s), and how many joints were done by then."""
-
-    started: float
-    done: int
 
 
 class Reader(CheckedTables):
@@ -141,24 +133,26 @@ class Reader(CheckedTables):
         self._read_study_attributes()
         self.created = text(attrs, "created")
         self.git_commit = text(attrs, "git_commit")
-        self.identity = checks.mapping(file, "identity")
+        self.identity: dict[str, Any] = metadata.read(file, "identity")
         self.columns = selected_results.columns(self.identity)
-        self.options = checks.mapping(file, "options")
-        self.sampling = checks.mapping(file, "sampling")
-        self.fidelity = checks.mapping(file, "fidelity") if "fidelity" in attrs else {}
-        self.versions: dict[str, str] = checks.mapping(file, "versions")
-        self.retries: list[dict[str, Any]] = json.loads(text(attrs, "retries"))
-        self.stop: dict[str, Any] = checks.mapping(file, "stop") if "stop" in attrs else {}
-        design = checks.mapping(file, "design")
+        self.options: dict[str, Any] = metadata.read(file, "options")
+        self.sampling: dict[str, Any] = metadata.read(file, "sampling")
+        self.fidelity: dict[str, Any] = metadata.read(file, "fidelity", {})
+        self.versions: dict[str, str] = metadata.read(file, "versions")
+        self.retries: list[dict[str, Any]] = metadata.read(file, "retries")
+        self.stop: dict[str, Any] = metadata.read(file, "stop", {})
+        design = metadata.read(file, "design")
         self.case_names: tuple[str, ...] = tuple(design["cases"])
         self.variants = tuple(Variant(**variant) for variant in design["variants"])
         self.history_specs = checks.history_specs(file)
         self.n = checks.check_tables(file)
+        self._left_out = np.zeros(self.n, bool)
         first = checks.integer(file, "first_row", 0)
         self.rows = range(first, first + self.n)
         self.campaign_rows = checks.integer(file, "campaign_rows", self.n)
         if self.rows.stop > self.campaign_rows:
             raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
+        checks.check_number(self.sampling, self.campaign_rows)
         checks.check_histories(file, self.history_specs, self.n)
         self.point = next(iter(self.points)) if len(self.points) == 1 else None
         self._campaign = campaign_digest(file)
@@ -234,7 +228,9 @@ class Reader(CheckedTables):
         self.close()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; joints that were left out because their results are damaged are told as a warning."""
+        if self._file and self._file.mode == "r":
+            left_out.tell(self, "are left out", f"simulate these joints again: tolstat run STUDY --out {self.path}")
         self._file.close()
 
     def view(self, study_path: Path | None = None) -> View:
@@ -284,12 +280,11 @@ class Reader(CheckedTables):
                 counts = counts.after(one.status(slice(first, first + BLOCK)))
         return counts
 
-    def session(self) -> Session | None:
+    def session(self) -> session.Session | None:
         """Return the run under way; None if no process is writing the file."""
         if "session" not in self._file or not is_locked(self.path):
             return None
-        started, done = (self._file["session"][name][()] for name in ("started", "done"))
-        return Session(float(started), int(done)) if started > 0 else None
+        return session.read(self._file["session"], len(self.points) * self.n)
 
     def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Read the histories of one kind.
@@ -374,9 +369,9 @@ class Reader(CheckedTables):
         attrs = self._file.attrs
         self.study_name = text(attrs, "study_name")
         self.study_text = text(attrs, "study")
-        self.limits: dict[str, float] = json.loads(text(attrs, "limits"))
         self.points = checks.points(self._file)
-        self.joint = checks.mapping(self._file, "joint")
+        self.limits = checks.limits(self._file, self.points)
+        self.joint: dict[str, Any] = metadata.read(self._file, "joint")
 
     def _reopen(self) -> bool:
         """Switch to the file that has replaced this one and includes the histories; return whether there is one."""

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.files import only_below
+from tolstat.common.strict import validate
 from tolstat.store.recorded import joint_of
 from tolstat.study import Study, load, subset_of
 from tolstat.study.model import Solver
@@ -42,17 +45,19 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         When the study does not have the identity of the campaign in the file.
     """
     held = store.sampling["n"]
-    source = path if path is not None else store.path.parent / f"{store.study_name}.toml"
+    source = path if path is not None else store.path.parent / f"{Path(store.study_name).name}.toml"
     text = None if path is not None else store.study_text
     joint = None if path is not None or store.variants else joint_of(store, 0)
     try:
-        study = load(source, n=held, text=text, joint=joint)
+        with nullcontext() if path is not None else only_below(store.path.parent):
+            study = load(source, n=held, text=text, joint=joint)
     except InputError as error:
         if path is not None:
             raise
+        own = [fault for fault in error.faults if fault.place.startswith(f"{source}: ")]
         found = "holds the text of this study; what the text names is looked for in the folder of the result file"
         remedy = "give the study file, if the command has this option: --study STUDY"
-        raise InputError([*error.faults, Fault(str(store.path), found, remedy)]) from error
+        raise InputError([*own, Fault(str(store.path), found, remedy)]) from error
     if store.sampling["method"] == "subset":
         study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
     if path is None:
@@ -65,7 +70,9 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         raise StoreError(str(Fault(str(store.path), found, "give the study file of the campaign: --study STUDY")))
     if n is None:
         return study
-    return replace(_at_point(store, load(source, n=n, text=text, joint=joint)), solver=study.solver)
+    with nullcontext() if path is not None else only_below(store.path.parent):
+        larger = load(source, n=n, text=text, joint=joint)
+    return replace(_at_point(store, larger), solver=study.solver)
 
 
 def _at_point(store: Reader, study: Study) -> Study:
@@ -97,4 +104,5 @@ def _solver(store: Reader, study: Study) -> Solver:
     held = {key.removeprefix("solver."): value for key, value in store.identity.items() if key.startswith("solver.")}
     own = study.solver.model_dump()
     changed = {key: value for key, value in held.items() if key in own and own[key] != value}
-    return study.solver.model_copy(update=changed)
+    given = study.solver.model_dump(exclude_unset=True) | changed
+    return validate(Solver, given, f"{store.path}: solver") if changed else study.solver

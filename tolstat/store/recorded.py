@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, InputError
-from tolstat.common.solver_options import from_names, unknown_names
+from tolstat.common.solver_options import from_names
 from tolstat.common.strict import validate
 from tolstat.common.tables import PARAM, Options
 from tolstat.joint import Joint, Operation, operating, perturb, varied
@@ -61,7 +60,7 @@ def options_of(store: Reader, row: int) -> Options:
     Raises
     ------
     InputError
-        When the file has options that this version does not know.
+        When the settings of the variant cannot be used.
     """
     attempt = int(store.attempt(slice(row, row + 1))[0])
     own = {key: value for key, value in _values(store, row).items() if key.startswith("solver.")}
@@ -71,14 +70,7 @@ def options_of(store: Reader, row: int) -> Options:
             written.pop("solver.error_budget", None)  # identity holds its default; studies give it with "auto" only
         solver = validate(Solver, nested(written)["solver"], f"{store.path}: solver")
         return settings(solver, store.fidelity)
-    held = store.retries[attempt - 1]["options"] if attempt else store.options
-    unknown = [*sorted(held.keys() - set(Options._fields)), *unknown_names(held)]
-    if unknown:
-        found = f"has solver options that this version of tolstat does not know: {', '.join(unknown)}"
-        raise InputError(
-            [Fault(str(store.path), found, f"use the version that made it: {store.versions.get('tolstat')}")]
-        )
-    return from_names(held)
+    return from_names(store.retries[attempt - 1]["options"] if attempt else store.options)
 
 
 def settings(solver: Solver, choice: dict[str, Any]) -> Options:

@@ -132,6 +132,8 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
     """
     if path.is_dir():
         raise store_error(path, "is a folder", "give the path of a file")
+    if path.exists() and not path.is_file():
+        raise store_error(path, "is a pipe or a device, not a file", "give a result file made by tolstat run")
     if mode != "r" and path.is_file() and not h5py.is_hdf5(path):
         # h5py would turn an empty file that it opens for writing into an HDF5 file
         raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")

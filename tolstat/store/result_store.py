@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from tolstat.common import selected_results
 from tolstat.common.files import atomic_write, check_disk_space, make_parent, reason
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
+from tolstat.store import left_out
 from tolstat.store.histories import HISTORY_BYTES, parts_folder
-from tolstat.store.integrity import history_checks, results_hash
+from tolstat.store.integrity import attempt_hash, history_checks, results_hash
 from tolstat.store.new_file import attributes, fill, size_of_new, study_attributes
 from tolstat.store.reader import Reader
 from tolstat.store.result_file import copy_open, get, is_at, put, put_attributes, replace, store_error, text
@@ -121,8 +122,11 @@ class ResultStore(Reader):
         """
         store = cls._opened(Path(path), "r+")
         for one in store.each():
-            one._make_pending(one.damaged())
+            damaged = one.damaged()
+            store._left_out[damaged] = True
+            one._make_pending(damaged)
             one._reset_rows_without_histories()
+        left_out.tell(store, "pending again", "run its study to simulate these joints: tolstat run STUDY")
         return store
 
     def write(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
@@ -247,7 +251,9 @@ class ResultStore(Reader):
             put_attributes(file, {"retries": json.dumps(retries, allow_nan=False)})
             for one, slots in each:
                 held = file[one._held().name]
-                put(held["ledger/attempt"], slots, np.full(slots.size, len(retries), np.int32))
+                ledger, attempt = held["ledger"], np.full(slots.size, len(retries), np.int32)
+                put(ledger["attempt"], slots, attempt)
+                put(ledger["attempt_check"], slots, attempt_hash(get(ledger["errors_check"], slots), attempt))
                 put(held["results/status"], slots, np.full(slots.size, Status.PENDING, np.uint8))
                 if "histories" in held:
                     del held["histories"]

@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 from tolstat.common import selected_results, tables
 from tolstat.common.columns import Column
 from tolstat.common.shown import shown
+from tolstat.store import metadata
+from tolstat.store.checks import DAMAGE_ERRORS
+from tolstat.store.integrity import are_sealed, seal_values
 from tolstat.store.new_file import create_table
-from tolstat.store.result_file import put_attributes, text
+from tolstat.store.result_file import put_attributes, store_error, text
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -69,18 +72,39 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
     held = store._held()
     if name not in held:
         return None
-    group = held[name]
+    try:
+        rows, checks = _read(held[name], store)
+        seed = int(held[name].attrs["seed"])
+    except DAMAGE_ERRORS as error:
+        found = f"is damaged: its verification cannot be used: {error}"
+        again = f"tolstat verify {store.path}" + (" --near LIMIT" if name == NEAR else "")
+        raise store_error(store.path, found, f"make it anew: {again}") from error
+    base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in store.slot(rows).tolist()])
+    return Verification(seed, rows, base, checks)
+
+
+def _read(group: h5py.Group, store: Reader) -> tuple[NDArray[np.intp], dict[str, Check]]:
+    if not are_sealed(group):
+        raise ValueError("its values do not match their checksum")
     rows = np.asarray(group["rows"][:], np.intp)
+    if rows.ndim != 1 or not len(rows) <= store.n:
+        raise ValueError(f"its rows have the shape {rows.shape}")
+    if np.any(np.diff(rows) <= 0) or not np.isin(rows[[0, -1]] if len(rows) else rows, store.rows).all():
+        raise ValueError("its rows are no ascending rows of the campaign")
     checks = {}
     for check in text(group.attrs, "checks").split():
         table = np.empty(len(rows), tables.RESULT)
         selected_results.blank_others(table, store.columns)
         for c in store.columns:
-            c.of(table)[:] = group[check][c.name][:]
-        attrs = group[check].attrs
-        checks[check] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
-    base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in store.slot(rows).tolist()])
-    return Verification(int(group.attrs["seed"]), rows, base, checks)
+            held = group[check][c.name]
+            if held.shape != rows.shape or held.dtype != np.dtype(c.dtype):
+                raise ValueError(f"{held.name} is {held.shape} of {held.dtype}")
+            c.of(table)[:] = held[:]
+        if table["status"].size and table["status"].max() > max(tables.Status):
+            raise ValueError(f"{check} has an unknown status")
+        options = metadata.read(group[check], "options", {})
+        checks[check] = Check(text(group[check].attrs, "description"), options, table)
+    return rows, checks
 
 
 def write(store: ResultStore, verification: Verification, name: str = VERIFY) -> None:
@@ -110,3 +134,4 @@ def _write(holder: h5py.Group, place: str, verification: Verification, columns: 
         put_attributes(
             group[name], {"description": check.description, "options": json.dumps(check.options, allow_nan=False)}
         )
+    seal_values(group)

@@ -11,8 +11,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.loads import LOADS, split
 from tolstat.common.shown import shown
-from tolstat.store import meanings
+from tolstat.common.tables import Status
+from tolstat.store import meanings, metadata
 from tolstat.store.new_file import GROUPS
 from tolstat.store.result_file import put_attributes, text
 
@@ -82,18 +84,24 @@ def read(store: Reader) -> dict[str, Altered]:
         attrs = group.attrs
         try:
             one = Altered(
-                json.loads(text(attrs, "change")),
+                metadata.read(group, "change"),
                 int(group["sample"][0]),
                 tuple(group["load"].asstr()[:].tolist()),
                 np.asarray(group["loads"][:], float),
                 np.asarray(group["status"][:], np.uint8),
             )
-            sound = text(attrs, "check") == _check(one) and key(one.about) == name
+            sound = _fits(one) and text(attrs, "check") == _check(one) and key(one.about) == name
         except (KeyError, ValueError, IndexError, TypeError, AttributeError):  # not what `write` writes
             sound = False
         if sound:
             found[name] = one
     return found
+
+
+def _fits(one: Altered) -> bool:
+    """Whether shapes, states and names are such as `write` writes."""
+    shaped = one.first >= 0 and one.loads.shape == (len(one.status), len(one.names))
+    return shaped and one.status.max(initial=0) <= max(Status) and {split(own)[0] for own in one.names} <= LOADS.keys()
 
 
 def write(store: ResultStore, sets: Mapping[str, Altered]) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Sequence
+from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -17,6 +18,7 @@ from pydantic import Field, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.files import read_input
 from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
@@ -130,15 +132,14 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
             found |= dict.fromkeys(names, cost)
     if faults:
         toml = path.suffix != ".csv"
-        raise InputError(strict.with_lines(faults, str(path), path.read_text(encoding="utf-8")) if toml else faults)
+        raise InputError(strict.with_lines(faults, str(path), read_input(path)) if toml else faults)
     kept = CostEntry(cost=0.0, keep=True)
     return [Cost(t.width, tuple(found.get(name, kept) for name in t.names)) for t in tolerances]
 
 
 def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.DictReader(file))
+        rows = list(csv.DictReader(StringIO(read_input(path, "utf-8-sig"))))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError([Fault(str(path), f"cannot be read: {error}", "give a TOML or CSV file")]) from error
     if not rows or "tolerance" not in rows[0]:

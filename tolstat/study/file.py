@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from tolstat import joint
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.files import read_input
 from tolstat.common.loads import UNIT_OF_LOAD, load_of, split
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
@@ -66,7 +67,7 @@ class StudyFile:
         self.path = path
         self.place = str(path)
         self.data = read_toml(path, text)
-        self.text = path.read_text(encoding="utf-8") if text is None else text
+        self.text = read_input(path) if text is None else text
         self._lined = text is None
         self._overridden: set[str] = set()
         self._faults: list[Fault] = []

@@ -40,6 +40,8 @@ FETCH_S = 60.0
 """Time limit for fetching a result, s."""
 MAX_FAILURES = 3
 """Number of failed blocks, before any has succeeded, at which the cluster is given up."""
+LOOPBACK = "127.0.0.1"
+"""Address of a cluster on this machine: Dask runs what it is sent, so nothing listens to other machines."""
 
 Fingerprint = Callable[[], Mapping[str, str]]
 
@@ -237,16 +239,19 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         raise InputError([Fault("--executor dask", "Dask's distributed is not installed", remedy)]) from error
     if scheduler is None:
         with one_thread_each(), signals_blocked():
-            cluster = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
+            cluster = LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, host=LOOPBACK
+            )
         with cluster, Client(cluster) as client:
             yield client
         return
     try:
         client = Client(scheduler, timeout=CONNECT_S)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError, RuntimeError) as error:
         found = f"{scheduler} does not answer: {error}"
-        raise InputError(
-            [Fault("--scheduler", found, "give the address that dask scheduler prints: --scheduler tcp://HOST:PORT")]
-        ) from error
+        remedy = "give the address that dask scheduler prints: --scheduler tcp://HOST:PORT"
+        if scheduler.startswith("tls:"):
+            remedy = "check the certificates: docs/cluster.md names the variables that Dask reads them from"
+        raise InputError([Fault("--scheduler", found, remedy)]) from error
     with client:
         yield client

@@ -8,7 +8,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from tolstat.display.text import visible
+from tolstat.display.unseen import visible
 
 FOLDER = Path(__file__).parent
 

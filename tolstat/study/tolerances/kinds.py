@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from io import StringIO
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,6 +16,7 @@ from pydantic import Field
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import may_quote, read_input
 from tolstat.common.strict import refuse
 from tolstat.study.axes import ORIENTATIONS, columns_of
 from tolstat.study.tolerances import distributions as tolerance
@@ -238,21 +240,24 @@ class MeasuredEntry(SingleEntry):
 
     def _column(self, path: Path) -> list[float]:
         try:
-            with path.open(encoding="utf-8-sig", newline="") as file:
-                rows = csv.DictReader(line for line in file if line.strip() and not line.startswith("#"))
-                cells = [row.get(self.column) for row in rows]
-                columns = rows.fieldnames or ()
+            lines = StringIO(read_input(path, "utf-8-sig"), newline="")
+            rows = csv.DictReader(line for line in lines if line.strip() and not line.startswith("#"))
+            cells = [row.get(self.column) for row in rows]
+            columns = rows.fieldnames or ()
         except (OSError, UnicodeDecodeError, csv.Error) as error:
+            reason = getattr(error, "strerror", None) or str(error)
             raise refuse(
-                f"{path} cannot be read: {error}", "give a CSV file; its path starts from the study's folder"
+                f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"
             ) from error
         if self.column not in columns:
-            raise refuse(f"{path} has no column {self.column!r}", strict.did_you_mean(self.column, list(columns)))
+            remedy = strict.did_you_mean(self.column, list(columns)) if may_quote() else "give the name of a column"
+            raise refuse(f"{path} has no column {self.column!r}", remedy)
         values = []
         for number, cell in enumerate(cells, start=1):
             value = _number(cell)
             if value is None:
-                raise refuse(f"{path}: row {number} of {self.column!r} is {cell!r}", "give a finite number in each row")
+                shown = repr(cell) if may_quote() else "not a finite number"
+                raise refuse(f"{path}: row {number} of {self.column!r} is {shown}", "give a finite number in each row")
             values.append(value)
         if len(values) < 2:
             raise refuse(f"{path} has {len(values)} values in {self.column!r}", "give at least two measured parts")

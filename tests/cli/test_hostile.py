@@ -1,0 +1,102 @@
+"""What files hold does nothing on a terminal or in a spreadsheet, and damaged files end in data or one message."""
+
+from __future__ import annotations
+
+import csv
+import os
+import pty
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import h5py
+import pandas as pd
+import pytest
+
+from tests.support import corruption, synthetic
+from tests.support.environment import environment
+from tolstat.cli import _talk
+from tolstat.display import text
+from tolstat.store import integrity, result_file
+
+FORMULAS = ('=HYPERLINK("http://x")', "+1", "-1+1", "@SUM(1)", "\t=1", "\r=1")
+
+CASES = (
+    synthetic.HEAD
+    + """[sampling]
+method = "cases"
+[[case]]
+name = '=HYPERLINK("http://x")'
+errors.hole4.offset_t = "0.1 mm"
+"""
+)
+
+
+def test_cells_of_text_are_no_formulas() -> None:
+    frame = pd.DataFrame({"words": [*FORMULAS, "a=1"], "numbers": [-1.0] * 7, "whole": [-1] * 7})
+    cells = text.cells(frame)
+    assert cells["words"].tolist() == [*("'" + word for word in FORMULAS), "a=1"]
+    assert cells["numbers"].tolist() == frame["numbers"].tolist()
+    assert cells["whole"].dtype == frame["whole"].dtype
+
+
+def test_exports_hold_no_formulas(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    path = synthetic.store(tmp_path, CASES)
+    book = tmp_path / "a.xlsx"
+    ended = corruption.call(["export", path, "--csv", "-", "--xlsx", book], tmp_path)
+    assert ended.code == 0, ended.err
+    rows = list(csv.reader(StringIO(ended.out)))
+    cases = [row[rows[0].index("case")] for row in rows[2:]]
+    assert cases[1:] == ["'" + FORMULAS[0]]
+    sheet = openpyxl.load_workbook(book)["joints"]
+    assert not [cell for row in sheet.iter_rows() for cell in row if cell.data_type == "f"]
+
+
+def test_standard_error_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> None:
+    with _talk.session(quiet=False, verbose=False, log=None):
+        _talk.say("a\x1b[2J\x9b1m\u202eb\rc\nd")
+    assert capsys.readouterr().err == "a[U+001B][2J[U+009B]1m[U+202E]b[U+000D]c\nd\n"
+
+
+def test_a_terminal_gets_no_control_characters_and_a_pipe_what_is_there(tmp_path: Path) -> None:
+    path = synthetic.store(tmp_path, simulated=0)
+    with h5py.File(path, "r+") as file:
+        result_file.put_attributes(file, {"study_name": "a\x1b]0;title\x07b"})
+        integrity.seal(file)
+    command = [sys.executable, "-m", "tolstat", "status", str(path)]
+    own, terminal = pty.openpty()
+    subprocess.run(command, stdout=terminal, stderr=subprocess.DEVNULL, env=environment(), check=True)
+    os.close(terminal)
+    shown = os.read(own, 10_000).decode()
+    os.close(own)
+    assert shown.startswith("study: a[U+001B]]0;title[U+0007]b")
+    assert corruption.call(["status", path], tmp_path).out.startswith("study: a\x1b]0;title\x07b")
+
+
+@pytest.mark.slow
+def test_corrupted_files_end_in_data_or_one_message(tmp_path: Path) -> None:
+    """A share of ``python -m tests.measure.corruption``: no traceback, signal, hang or silent difference."""
+    path = synthetic.store(tmp_path)
+    commands = (("status", "FILE", "--json"), ("export", "FILE", "--csv", "-", "--quiet"))
+    corruption.warm(path, tmp_path, commands)
+    for k, words in enumerate(commands):
+        found, kinds = corruption.search(path, tmp_path / "x", range(k, 24, 2), [words])
+        assert not found
+        assert kinds["refused"] > 2
+
+
+def test_a_search_for_faults_finds_them(tmp_path: Path) -> None:
+    path = synthetic.store(tmp_path)
+    usual = corruption.call(["status", path, "--json"], tmp_path)
+    assert not corruption.fault(usual, usual)
+    for wrong, said in (
+        (usual._replace(out="{}"), "silent difference"),
+        (usual._replace(code=-11), "signal 11 after"),
+        (usual._replace(code=1, err="Traceback (most recent call last)"), "exit code 1"),
+        (usual._replace(code=2, err="oh"), "no message"),
+        (usual._replace(memory=1 << 31), "2048 MiB"),
+    ):
+        assert corruption.fault(wrong, usual).startswith(said)
+    assert not corruption.fault(usual._replace(out="{}", err="the results of 1 joint are damaged"), usual)

@@ -1,0 +1,41 @@
+"""Corrupted result files through the commands: each must end with correct data, or with exit code 2 and one message.
+
+``python -m tests.measure.corruption FILE 1000`` corrupts a copy of FILE, a result file of 220 joints, in 1000 ways,
+passes each to one of the commands below in turn and prints every traceback, signal, hang and silent difference.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from tests.support import corruption
+
+COMMANDS = (
+    ("status", "FILE", "--json"),
+    ("export", "FILE", "--csv", "-", "--quiet"),
+    ("export", "FILE", "--statistics", "-", "--quiet"),
+    ("report", "FILE", "--out", "page.html", "--quiet"),
+    ("causes", "FILE", "--by", "cross1.F", "--json"),
+    ("verify", "FILE", "--near", "cross1.F > 1500 N", "--joints", "50", "--json", "--workers", "1"),
+    ("replay", "FILE", "--row", "1", "--json"),
+    ("extend", "FILE", "--n", "230", "--workers", "1", "--no-report"),
+    ("merge", "FILE", "--out", "whole.h5"),
+)
+
+
+def main(path: Path, count: int, first: int = 0) -> None:
+    """Corrupt a file `count` times; print the faults and how many commands ended how."""
+    with tempfile.TemporaryDirectory() as folder:
+        corruption.warm(path, Path(folder), COMMANDS)
+        for k, words in enumerate(COMMANDS):
+            numbers = range(first + k, first + count, len(COMMANDS))
+            found, kinds = corruption.search(path, Path(folder) / "x", numbers, [words])
+            print(" ".join(words), kinds, flush=True)
+            for one in found:
+                print(f"  {one.fault}: {one.corruption}\n{one.ended.err[-1500:]}", flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]), *map(int, sys.argv[3:]))

@@ -394,7 +394,7 @@ print(counts)
 def test_a_second_process_finds_the_compiled_kernel():
     code = """
 from tolstat.kernel.lanes.lockstep import lockstep
-from tolstat.solver.simulation import warm_up
+from tolstat.solver.compilation import warm_up
 warm_up()
 print(sum(lockstep.stats.cache_hits.values()), sum(lockstep.stats.cache_misses.values()))
 """

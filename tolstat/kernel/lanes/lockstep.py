@@ -4,8 +4,8 @@ A round evaluates the residual of every lane once, at the lane's own time and tr
 gets a new tangent, or continues: from the search for equilibrium to its first step, to the next sub-step, grid point,
 cell or angle. Lanes never wait for each other's convergence, and a lane whose joint is finished takes the next one from
 the queue. A joint in which a step or angle has finally failed is left `PENDING`, unless its steps are error-controlled:
-the caller simulates it again from its start, alone, as in `simulate`. What a lane does depends only on its own joint, and so does every bit
-of the result.
+the caller simulates it again from its start, alone, as in `simulate`. What a lane does depends only on its own joint,
+and so does every bit of the result.
 """
 
 from tolstat.kernel.integrators.mesh import cells_of, load_error, parts_of

@@ -74,7 +74,7 @@ def halves(case):
     par = joint.perturb(case.joint, case.operation, errors).view(np.recarray)
     options = case.solver.options()
     left = np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
-    ((_, samples),) = simulation._alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
+    ((_, samples),) = simulation.simulate_alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
     work, found = make_work(), np.zeros((len(samples), 4, 2))
     outer = np.sign(par.station_s[0, : par.n_stations[0]]) / 2 + 0.5
     for k, sample in enumerate(samples):

@@ -155,6 +155,8 @@ def test_a_duty_cycle_of_one_file_is_that_of_a_file_for_each_point(tmp_path, who
         np.testing.assert_array_equal(one.status, view.status[:3])
         with pytest.raises(InputError, match="leave --share out"):
             load_cycles([view], [1.0])
+    assert [name for name, _ in one.duty] == [point.name for point in points]
+    np.testing.assert_allclose([share for _, share in one.duty], [0.5 / 1.9, 0.6 / 1.9, 0.8 / 1.9])
     np.testing.assert_array_equal(one.cycles.ranges, several.cycles.ranges)
     np.testing.assert_allclose(one.cycles.weights, several.cycles.weights)
     with Reader.open(whole) as store, pytest.raises(InputError, match=r"without a share of the time\n.*--point low"):

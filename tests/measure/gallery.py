@@ -1,7 +1,7 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
-FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5`` and
-``needle_bearings.h5``, of some joints or all, and gets a picture of each, and ``tilted_pin.png``.
+FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
+``needle_bearings.h5`` and ``duty_cycle.h5``, of some joints or all, and gets a picture of each, and ``tilted_pin.png``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 import tolstat
 from tests.support.environment import ROOT
 from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.common.loads import split
 from tolstat.common.tables import Status
 from tolstat.display import style
 from tolstat.joint import operating
@@ -106,6 +107,30 @@ def needle_bearings(folder: Path) -> None:
     save(figure, folder / "needle_bearings.png")
 
 
+def duty_cycle(folder: Path) -> None:
+    """Draw the share of joints above a force of cross1 at each operating point, with 95 % intervals, and its limits."""
+    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
+    with tolstat.open(folder / "duty_cycle.h5") as store:
+        view = store.view()
+        limits = {split(name)[1]: level for name, level in view.limits.items() if split(name)[0] == "cross1.F"}
+        for point, colour in zip(view.points, ("#0072B2", "#009E73", "#D55E00"), strict=True):
+            load = view.load(f"cross1.F at {point}")
+            x = np.sort(load.valid)
+            count = np.arange(x.size, 0, -1)
+            ax.step(x, 100 * count / x.size, color=colour, where="pre", label=point)
+            lower, upper = clopper_pearson(count, x.size)
+            ax.fill_between(x, 100 * lower, 100 * upper, color=colour, step="pre", alpha=0.2, lw=0)
+    for where, level in limits.items():
+        ax.axvline(level, color="#333333", ls="--")
+        said = f"limit {where and f'at {where}'}"
+        ax.annotate(said, (level, 1), (4, -4), xycoords=("data", "axes fraction"), textcoords="offset points", va="top")
+    ax.set(xlabel="largest force of cross1 (N)", ylabel="joints above it (%)", yscale="log", ylim=(0.1, 150))
+    ax.set_yticks([0.1, 1, 10, 100], ["0.1", "1", "10", "100"])
+    ax.grid(alpha=0.3)
+    figure.legend(loc="outside right upper", frameon=False, title="operating point")
+    save(figure, folder / "duty_cycle.png")
+
+
 def kind(status: np.ndarray) -> np.ndarray:
     """Name of the colour of each joint."""
     names = np.full(len(status), "other", dtype="U10")
@@ -164,7 +189,7 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    for draw in (welded_fork, overnight, fuzz, hard_cases, needle_bearings):
+    for draw in (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.tables import BUSHINGS, Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table
-from tolstat.questions.fatigue import parts
+from tolstat.questions.fatigue import parts, parts_rendering
 from tolstat.questions.fatigue.section import sections
 from tolstat.questions.fatigue.stress import Stresses, load_stresses
 from tolstat.solver import rainflow
@@ -182,7 +183,7 @@ def synthetic(n=400, seed=3, scatter=1.3, status=None):
     )
     own = Stresses(cycles, -0.5 * size, 0.5 * size)
     settings = Fatigue(revolutions=1e6, points=(point(line), point(line, "b")))
-    return Stressed("made", own, state, own.rows(slice(0)), True, settings, n, 0.0), size, line
+    return Stressed("made", own, state, own.rows(slice(0)), True, settings, n, 0.0, (("", 1.0),)), size, line
 
 
 def test_failures_and_lives_of_one_cycle_in_closed_form():
@@ -206,6 +207,15 @@ def test_failures_and_lives_of_one_cycle_in_closed_form():
         assert 1 - survive.mean() == pytest.approx(parts.SHARE, rel=2e-3)
         assert table["life_lower"][name] < table["life"][name] < table["life_upper"][name]
         assert (table["estimate"] > 0.1)[name] == (table["life"][name] < 1e6)
+
+
+def test_notes_of_a_duty_cycle_give_its_shares():
+    stressed, _, _ = synthetic(n=40)
+    table = parts.part_failures(stressed)
+    assert "duty cycle" not in parts_rendering.notes(stressed, table)
+    cycle = replace(stressed, duty=(("cruise", 0.95), ("start", 0.05)))
+    said = "over a duty cycle: 95 % at cruise, 5 % at start, shares of the revolutions"
+    assert said in parts_rendering.notes(cycle, table)
 
 
 def test_joints_without_stresses_count_both_ways_and_pending_ones_not_at_all():

@@ -92,6 +92,29 @@ def test_the_page_shows_the_scatter_with_the_limit(path):
     assert "of the others" in section.blocks[0].text
 
 
+def test_of_several_points_the_load_is_that_of_the_worst_and_the_page_names_it(tmp_path):
+    _, _, rest = TEXT.partition("[operation]\n")
+    keys, tolerances, others = rest.partition("[tolerances]")
+    points = "".join(f'[[operation]]\nname = "{name}"\n{keys}' for name in ("low", "high"))
+    source = tmp_path / "points.toml"
+    source.write_text(TEXT.partition("[operation]")[0] + points + tolerances + others, encoding="utf-8")
+    plan = study.load(source)
+    errors, tables = sampling.draw(plan), {name: synthetic.results(plan.rows) for name in ("low", "high")}
+    use = combinations(errors, perturb(plan.joint, plan.at("low").operation, errors))[MISSED]
+    tables["low"]["F_max"][:, 0], tables["high"]["F_max"][:, 0] = 640.0, 640.0 + 800.0 * use
+    with ResultStore.create(tmp_path / "points.h5", plan, errors) as store:
+        for name, table in tables.items():
+            store.at(name).write(np.arange(plan.rows), Simulation(table, None))
+    with Reader.open(tmp_path / "points.h5") as store:
+        found = tolstat.pairs_of(store.view(), "cross1.F")
+        at_one = tolstat.pairs_of(store.view(), "cross1.F at high")
+        (section,) = pairs_section.sections(store.view(), Asked(tmp_path / "points.h5"))
+    assert (found.points, found.worst, found.name) == (("low", "high"), "high", MISSED)
+    assert (at_one.points, at_one.worst) == (("high",), "high")
+    np.testing.assert_array_equal(found.values, at_one.values)
+    assert "cross1.F is the largest over low, high; it is most severe at high" in section.blocks[0].text
+
+
 def test_too_few_joints_are_refused(tmp_path):
     file = synthetic.store(tmp_path)
     with Reader.open(file) as store, pytest.raises(StoreError, match="60 joints"):

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.markers import CARETLEFT
 from typer.testing import CliRunner
 
 import tolstat
@@ -371,7 +372,9 @@ def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_p
         told = rendering.absent(query.what_if(view, "all limits")._replace(left_out=("pin*.position",)))
     assert "Most often 700 N on cross2.F: 22.2 %. Halve the tilt tolerance of the pins" in found.words
     assert found.words.endswith(" exceed at least one limit")
-    assert section.blocks[0].text.startswith("At least one limit exceeded in 22.2 % of the joints as drawn. Halve the ")
+    assert section.blocks[0].text.startswith(
+        f"At least one limit exceeded in 22.2 % of {both.n} joints as drawn. Halve the "
+    )
     assert told == [rendering.absent(both._replace(left_out=("pin*.position",)))[0]]
     assert told[0].startswith("left out: pin*.position; the width of their zone depends on other errors")
     shown = [
@@ -392,6 +395,10 @@ def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
     half = table.loc[table["half"] > 0.01].iloc[0]
     drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
     assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)
+    floor, marks = ax.get_xlim()[0], [line for line in ax.lines if line.get_marker() == CARETLEFT]
+    beyond = [(table[name] < floor).sum() for name in ("half_lower", "coarser_lower", "exact")]
+    assert [line.get_xdata()[0] for line in marks] == [floor] * sum(beyond)
+    assert sum(beyond) > 0
 
 
 TWO = TEXT.replace("[operation]", '[[operation]]\nname = "cruise"').replace(

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from tests.support import synthetic
 from tests.support.views import view
-from tolstat import report
+from tolstat import report, sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.exceedance import clopper_pearson, needed
 from tolstat.analysis.weighted import Trust
@@ -20,6 +20,7 @@ from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import headline, page, summary
 from tolstat.store import Reader, ResultStore
 from tolstat.store.sample_load import SampleLoad
+from tolstat.study import load
 
 ONE = synthetic.STUDY.partition("[limits]")[0] + '[limits]\n"cross1.F" = "1500 N"\n'
 PROPOSAL = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
@@ -43,9 +44,24 @@ def interfering(folder):
     return path
 
 
+def failed_at_one_point(folder):
+    """60 joints at two points: at the first all keep the limit, at the second 40 have failed."""
+    _, _, keys = synthetic.HEAD.partition("[operation]")
+    text = ONE.replace("[operation]", '[[operation]]\nname = "cruise"')
+    text = text.replace("[tolerances]", f'[[operation]]\nname = "start"{keys}[tolerances]')
+    source = folder / "points.toml"
+    source.write_text(text, encoding="utf-8")
+    plan = load(source)
+    with ResultStore.create(folder / "points.h5", plan, sampling.draw(plan)) as store:
+        for name, failed in (("cruise", 0), ("start", 40)):
+            store.at(name).write(np.arange(61), Simulation(synthetic.results(61, failed=failed), None))
+    return folder / "points.h5"
+
+
 MISLEADING = {
     "all failed": (lambda d: synthetic.store(d, study(), failed=60), "none", "100 % of the joints have no result"),
     "half interfering": (interfering, "none", "59 % of the joints have no result (36 of 61)"),
+    "failed at one point": (failed_at_one_point, "none", "66.7 % of the joints have no result (40 of 60)"),
     "Sobol'": (lambda d: synthetic.store(d, study(64, "sobol")), "none", "shares of Sobol' points have no interval"),
     "Latin hypercube": (lambda d: synthetic.store(d, study(64, "lhs")), "none", "a Latin hypercube have no interval"),
     "importance": (

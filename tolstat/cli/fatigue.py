@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -101,7 +101,10 @@ def fatigue(
             loads.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
         say(f"wrote {out}")
     if as_json:
-        found = {"points": text.records(failures)} if stressed is not None else {}
+        found: dict[str, Any] = {"points": text.records(failures)} if stressed is not None else {}
+        evaluated = loading if stressed is None else stressed
+        if evaluated is not None and len(evaluated.duty) > 1:
+            found["duty"] = dict(evaluated.duty)
         if loading is not None:
             found |= {"loads": text.records(loads), "damages": text.records(damages)}
         typer.echo(as_text(found))

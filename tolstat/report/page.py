@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -93,7 +92,6 @@ def compose(view: View, asked: Asked) -> Page:
         point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
         remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
         asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
-        asked = replace(asked, replay=0)
     sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
     facts = Facts(tuple(_facts(view.store)))
     text = Listing("The study as it was run", view.store.study_text)

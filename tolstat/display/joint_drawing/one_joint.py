@@ -14,11 +14,11 @@ from tolstat.display.joint_drawing.geometry import ALONG_T, ALONG_Z, KINDS, Arra
 HEADS = (("e", "µm"), ("t", "µm"), ("z", "µm"), ("tilt t", "deg"), ("tilt z", "deg"), ("⌀", "µm"))
 """Heads of the columns of numbers: names of `KINDS`, and units."""
 WAYS = {"along_z": ALONG_Z, "along_t": ALONG_T}
-HEAD, FOOT, VIEW = 0.12, 0.1, 0.225
+HEAD, FOOT, VIEW = 0.12, 0.1, 0.215
 """Shares of the drawing: height of head and foot, width of a view."""
-PLACES = (0.0, 0.235, 0.375, 0.515, 0.7, 0.88, 1.0)
+PLACES = (0.0, 0.24, 0.37, 0.5, 0.675, 0.85, 1.0)
 """Places of names and numbers, relative to the width left for them."""
-SIZE = 7.2
+SIZE = 6.8
 
 
 def enlargement(pairs: Sequence[Pair], pin: float, z: float) -> float:

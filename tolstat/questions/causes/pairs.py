@@ -19,6 +19,7 @@ from tolstat.common.errors import Fault, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import PINS
 from tolstat.joint import HOLE_OF_PIN, perturb
+from tolstat.store import worst
 from tolstat.store.view import View
 
 MOST = 4000
@@ -39,6 +40,10 @@ class Pairs(NamedTuple):
         The load, and its SI unit.
     limit : float
         Its limit, SI; NaN without one.
+    points : tuple of str
+        Operating points over which the load is the largest; ``("",)`` for one without a name.
+    worst : str
+        The one of these at which most joints exceed the limit, or else at which the load is largest.
     name : str
         The combination, chosen on the joints with an even number.
     use, values : ndarray, shape (n,)
@@ -54,6 +59,8 @@ class Pairs(NamedTuple):
     load: str
     unit: str
     limit: float
+    points: tuple[str, ...]
+    worst: str
     name: str
     use: FloatArray
     values: FloatArray
@@ -96,8 +103,10 @@ def pairs_of(view: View, by: str) -> Pairs:
         found = f"has {samples.size} joints with a valid {by} that scatters"
         raise StoreError(str(Fault(str(view.path), found, f"run {FEWEST} joints or more")))
     errors, values = view.errors(samples), load.values[samples]
+    point = worst.point_of(view, by)
     chosen, seen = slice(None, None, 2), slice(1, None, 2)
-    used = combinations(errors, perturb(view.study.joint, view.parts[0].store.operation, errors))
+    # what is taken of the parameters, clearances and stations, is the same at every operating point
+    used = combinations(errors, perturb(view.study.joint, view.at(point).store.operation, errors))
     rank = sorted(used, key=lambda name: -_spearman(used[name][chosen], values[chosen]))
     best = rank[0]
     single = {name: np.abs(errors[name] - errors[name].mean()) for name in _scattering(errors)}
@@ -106,6 +115,8 @@ def pairs_of(view: View, by: str) -> Pairs:
         load=by,
         unit=load.unit,
         limit=np.nan if load.limit is None else load.limit,
+        points=view.narrowed(by)[0].points,
+        worst=point,
         name=best,
         use=used[best][seen],
         values=values[seen],

@@ -38,19 +38,22 @@ def _blocks(found: Pairs) -> list[Block]:
     said = (
         f"{found.load} comes of errors of pins against their holes: a joint binds where they use up its clearance. "
         f"What tells most is {found.name}, as a share of the clearance: rank correlation with the load "
-        f"{found.correlation:.2f}, where that of the best single error is {found.single:.2f}. "
+        f"{found.correlation:.2f}, where that of the best single error is {round(found.single, 2) + 0.0:.2f}. "
         f"Of the tenth of the joints that use most of the clearance {text.percent(most)} exceed the limit, "
         f"of the others {text.percent(rest)}."
     )
-    head = ["share of the clearance used by", "rank correlation"]
-    rows = [[name, f"{value:+.2f}"] for name, value in list(found.others.items())[:LISTED]]
+    if len(found.points) > 1:
+        said += f" {found.load} is the largest over {', '.join(found.points)}; it is most severe at {found.worst}."
+    head = ["rank correlation", "share of the clearance used by"]
+    rows = [[f"{value:+.2f}", name] for name, value in list(found.others.items())[:LISTED]]
+    table = Table("The best combinations", head, rows, frozenset({0, 1}))
     how = (
-        "Chosen on the joints with an even number; picture and correlations are of the others. Errors are those of a "
-        "hole less those of its pin; a tilt counts by what it takes at the ends of the pin. Offsets along z: what is "
-        "left of the four after the cross has moved and turned, the middle of pins 1 and 2 against that of pins 3 and "
-        "4."
+        "Chosen, and in the order of the table, on the joints with an even number; picture and correlations are of the "
+        "others. Errors are those of a hole less those of its pin; a tilt counts by what it takes at the ends of the "
+        "pin. Offsets along z: what is left of the four after the cross has moved and turned, the middle of pins 1 and "
+        "2 against that of pins 3 and 4."
     )
-    return [Text(said), Panels([_panel(found)]), Table("The best combinations", head, rows), Text(how, small=True)]
+    return [Text(said), Panels([_panel(found)]), table, Text(how, small=True)]
 
 
 def _shares(found: Pairs) -> tuple[float, float]:
@@ -84,5 +87,5 @@ def _draw(ax: Axes, found: Pairs) -> None:
         ax.set_ylim(low, high)
     ax.axhline(found.limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
     ax.set_xlim(0.0, None)
-    ax.set(xlabel=f"share of the clearance used by {found.name}", ylabel=f"{found.load} [{unit_text(found.unit)}]")
+    ax.set(xlabel=f"share of the clearance used by\n{found.name}", ylabel=f"{found.load} [{unit_text(found.unit)}]")
     ax.legend(loc="upper left", ncols=3, columnspacing=1.2, handlelength=1.8)

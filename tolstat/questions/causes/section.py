@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -40,6 +41,8 @@ def sections(view: View, asked: Asked) -> list[Section]:
     with asked.noting("causes and worst joints are left out"):
         logarithmic = frozenset(load.name for load in view.loads(view.leading) if load.long_tailed)
         is_design = bool(view.study.groups)
+        if len(view.points) > 1:
+            asked = replace(asked, replay=0)  # histories are those of one operating point
         causes, against = _causes(view, asked, logarithmic, is_design)
         made += [_section(causes, against, logarithmic)] if causes or against else []
         made += [tail_section.section(view, view.leading, against, asked.replay > 0)] if view.leading else []

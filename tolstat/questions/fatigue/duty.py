@@ -45,6 +45,11 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
     return views, [share / total for share in shares]
 
 
+def described(views: Sequence[View], shares: Sequence[float]) -> tuple[tuple[str, float], ...]:
+    """Name and share of the revolutions of each of the `members`: its operating point or, without a name, its file."""
+    return tuple((view.points[0] or view.path.name, share) for view, share in zip(views, shares, strict=True))
+
+
 def status(views: Sequence[View], samples: int | None) -> NDArray[np.uint8]:
     """Status of the first samples, of several operating points that of the point that decides, (n,)."""
     own = [view.status[:samples] for view in views]

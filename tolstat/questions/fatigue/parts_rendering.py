@@ -14,6 +14,7 @@ from tolstat.analysis.strength import Line
 from tolstat.display import style, text
 from tolstat.display.table import Column, Row
 from tolstat.questions.fatigue.parts import ANY, failures_over_life
+from tolstat.questions.fatigue.rendering import duty_sentence
 from tolstat.questions.fatigue.stress import Stressed
 from tolstat.study.stress_point import StressPoint
 
@@ -80,6 +81,8 @@ def notes(stressed: Stressed, failures: pd.DataFrame) -> str:
         "without a valid load as failing and as surviving",
         *_lines(settings.points),
     ]
+    if cycle := duty_sentence(stressed.duty):
+        lines.insert(1, cycle)
     if (failures["point"] == ANY).any():
         lines.append(f"{ANY}: the joint fails with its first part; strengths of two points are independent")
     if not stressed.iid:

@@ -46,6 +46,8 @@ class Loading:
         Whether the joints are independent samples.
     settings : Fatigue
         Section ``[fatigue]`` of the study; of the first study if there are several.
+    duty : tuple of (str, float)
+        Operating points, or files, and their shares of the revolutions; one entry with share 1 for a single point.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Loading:
     nominal: Cycles
     iid: bool
     settings: Fatigue
+    duty: tuple[tuple[str, float], ...]
 
     @property
     def settled(self) -> int:
@@ -103,6 +106,7 @@ def load_cycles(
         iid=first.iid,
         # the section alone, like limits: it is at hand even where the study refers to files that are not
         settings=of_text(first.store.study_text, str(first.path)),
+        duty=duty.described(views, shares),
     )
 
 

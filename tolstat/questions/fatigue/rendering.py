@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
@@ -80,12 +82,22 @@ def notes(loading: Loading, table: pd.DataFrame) -> str:
         f"{_settled(loading)}; loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
         f"{settings.revolutions:g} revolutions"
     ]
+    if cycle := duty_sentence(loading.duty):
+        lines.append(cycle)
     if not loading.iid:
         lines.append("no intervals: order statistics hold for independent samples only")
     lacking = table["lacking"].max() if len(table) else 0.0
     if lacking > MAX_LACKING:
         lines.append(f"cycles that the file does not hold may add {lacking:.2g} of a sum of S^m")
     return "\n".join(lines)
+
+
+def duty_sentence(cycle: Sequence[tuple[str, float]]) -> str:
+    """Shares of a duty cycle in words, without full stop; empty for a single operating point."""
+    if len(cycle) < 2:
+        return ""
+    shares = ", ".join(f"{text.percent(share)} at {name}" for name, share in cycle)
+    return f"over a duty cycle: {shares}, shares of the revolutions"
 
 
 def figure(loading: Loading, confidence: float = 0.95) -> Figure:

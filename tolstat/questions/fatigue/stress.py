@@ -67,6 +67,8 @@ class Stressed:
         Number of samples of the campaign, those not evaluated included.
     apart : float
         As in `revolutions.Revolutions`.
+    duty : tuple of (str, float)
+        Operating points, or files, and their shares of the revolutions; one entry with share 1 for a single point.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Stressed:
     settings: Fatigue
     total: int
     apart: float
+    duty: tuple[tuple[str, float], ...]
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -125,7 +128,10 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     skips = [_nominal(view).size for view in views]
     nominal = [part.rows(slice(min(skips))) for part in parts]  # settled at all operating points, or no row
     own = [_spread(part.rows(slice(skip, None)), settled, status.size) for part, skip in zip(parts, skips, strict=True)]
-    return Stressed(name, _mixed(own, shares), status, _mixed(nominal, shares), first.iid, settings, first.n, apart)
+    cycle = duty.described(views, shares)
+    return Stressed(
+        name, _mixed(own, shares), status, _mixed(nominal, shares), first.iid, settings, first.n, apart, cycle
+    )
 
 
 def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:

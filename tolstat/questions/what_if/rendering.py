@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.markers import CARETDOWN, CARETLEFT
 from matplotlib.patches import Patch
 
 from tolstat.common.loads import ALL_LIMITS
@@ -238,17 +239,17 @@ def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], ac
     ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax(shares))))
     ax.axvspan(max(found.lower, floor), found.upper, color=drawing.GREY, alpha=0.3, lw=0)
     ax.axvline(found.share, color=style.INK, lw=1.2)
-    for step, colour, height in ((COARSER, style.COLOURS[1], 0.3), (HALF, style.COLOURS[0], 0.56)):
+    for step, colour, height, above in ((COARSER, style.COLOURS[1], 0.3, -0.1), (HALF, style.COLOURS[0], 0.56, 0.1)):
         for place, row in enumerate(table.to_dict("records")):
             if not np.isnan(row.get(step, np.nan)):
                 end = max(row[step], floor)
                 ax.barh(place, end - found.share, height, left=found.share, color=colour, zorder=2)
-                low, high = (max(row[f"{step}_{end}"], floor) for end in ("lower", "upper"))
-                ax.plot([low, high], [place, place], color=style.INK, lw=1.2, zorder=3)
+                _whisker(ax, place - above, row[f"{step}_lower"], row[f"{step}_upper"], floor)
     for place, row in enumerate(table.to_dict("records")):
         if not np.isnan(row.get(EXACT, np.nan)):
+            marker = "o" if row[EXACT] >= floor else CARETLEFT
             marks: dict[str, Any] = {"mfc": "white", "mec": style.INK, "ms": 5.5, "zorder": 4, "clip_on": False}
-            ax.plot(max(row[EXACT], floor), place, "o", **marks)
+            ax.plot(max(row[EXACT], floor), place, marker=marker, ls="", **marks)
     said: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0}
     ax.text(found.share, -0.9, f"as drawn {text.percent(found.share)}", backgroundcolor="white", **said)
     if accepted > 0.0:
@@ -258,6 +259,13 @@ def _tornado(ax: Axes, found: WhatIf, table: pd.DataFrame, labels: list[str], ac
     handles.append(Line2D([], [], ls="", marker="o", mfc="white", mec=style.INK, ms=5.5))
     drawing.legend_above(ax, handles, _STEPS)
     ax.set_xlabel(f"share of the joints {_above(found)}")
+
+
+def _whisker(ax: Axes, y: float, low: float, high: float, floor: float) -> None:
+    """Draw an interval; an arrow at the left edge stands for an end that is smaller than what the axis shows."""
+    ax.plot([max(low, floor), max(high, floor)], [y, y], color=style.INK, lw=1.2, zorder=3)
+    if low < floor:
+        ax.plot(floor, y, marker=CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
 
 
 def _curves(ax: Axes, found: WhatIf, table: pd.DataFrame, accepted: float) -> None:
@@ -273,6 +281,8 @@ def _curves(ax: Axes, found: WhatIf, table: pd.DataFrame, accepted: float) -> No
         colour = drawing.GREY if grey else style.COLOURS[place]
         dash = "-" if grey else style.DASHES[place]
         (drawn,) = ax.plot(x, np.maximum(y, floor), color=colour, ls=dash, marker="o", ms=3.0, lw=1.0 if grey else 1.6)
+        at_edge = np.full(int((y < floor).sum()), floor)
+        ax.plot(x[y < floor], at_edge, marker=CARETDOWN, ls="", color=colour, ms=5.0, clip_on=False)
         handles += [drawn] if place <= CURVES else []
         if place == 0:
             ends = (("share_lower", found.lower), ("share_upper", found.upper))

@@ -40,14 +40,15 @@ def _missing(asked: Asked) -> list[Block]:
 def _blocks(found: query.WhatIf, asked: Asked) -> list[Block]:
     best = rendering.sentence(found, asked.accepted)
     words = rendering.event(found)
-    said = text.sentence(f"{words} in {text.percent(found.share)} of the joints as drawn")
+    said = text.sentence(f"{words} in {text.percent(found.share)} of {found.n} joints as drawn")
     said += f" {best}." if best else " No line that is made half as wide surely lowers it."
     steps = [column for column in rendering.columns(found) if column.rank <= SHOWN]
     how = (
         "Each line is an entry of [tolerances]: made half as wide about the middle of its band, exact (in the middle "
         "of its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. The joints have the "
         f"same seeds, {found.n} as drawn ({rendering.joints(found)}); whiskers and bands are the 95 % intervals of "
-        "the table, without the numerical error. "
+        "the table, without the numerical error (upper whisker: half as wide; lower: coarser; band: first line). An "
+        "arrow at the edge of a picture: a share or the end of an interval is smaller than what its axis shows. "
         f"{_rest(found)}"
     )
     blocks: list[Block] = [

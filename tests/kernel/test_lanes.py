@@ -120,7 +120,7 @@ def assert_same(a, b):
 def alone(params, options):
     results = np.zeros(len(params), simulation.RESULT).view(np.recarray)
     left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))
-    samples = [own.copy() for _, own in simulation._alone(params, options, left, True, results)]
+    samples = [own.copy() for _, own in simulation.simulate_alone(params, options, left, True, results)]
     stationary.fill_intervals(results)
     results["clearance"] = params["clearance"]
     return results, samples

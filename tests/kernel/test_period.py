@@ -36,9 +36,9 @@ def undamped(params):
 def test_a_joint_that_settles_is_periodic(params):
     row = one(params(alpha=0.2))
     assert (row["status"], row["motion"], row["period"]) == (Status.OK, Motion.PERIODIC, 1)
-    assert row["closure_trend"] < -1
     assert np.isnan(row["lyapunov"])
     assert row["failed_step"] == -1
+    assert one(params(alpha=0.2), settle_tol=1e-9)["closure_trend"] < -0.5
 
 
 def test_slow_decay_is_told_from_motion_that_goes_on(params):

@@ -62,7 +62,7 @@ def test_the_repetition_alone_continues_the_budget(params: Params, monkeypatch: 
         yield from together(params, options, left, *others)
         spent.append(each + each // 2 - int(left[0]))
 
-    monkeypatch.setattr(simulation, "_together", counted)
+    monkeypatch.setattr(simulation, "simulate_together", counted)
     row = simulate_rows(table, FAST).results[0]
     assert row["status"] == Status.NEWTON_FAILED
     assert each + each // 2 <= spent[0] <= each + each // 2 + FAST.newton_max_iter

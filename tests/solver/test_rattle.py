@@ -80,12 +80,12 @@ def test_a_joint_has_the_same_bits_in_lanes_alone_and_in_any_order() -> None:
         list(how(these, options, left, False, results, blocks))
         return results.view(np.ndarray), blocks.view(np.ndarray)
 
-    together, blocks = run(simulation._together, params)
-    alone, own = run(simulation._alone, params)
+    together, blocks = run(simulation.simulate_together, params)
+    alone, own = run(simulation.simulate_alone, params)
     assert_same(together, alone)
     for i, made in enumerate(together["revolutions"].astype(int)):
         assert_same(blocks[i, :made], own[i, :made])
-    backwards, _ = run(simulation._together, params[::-1].copy())
+    backwards, _ = run(simulation.simulate_together, params[::-1].copy())
     assert_same(backwards[::-1], together)
 
 
@@ -97,7 +97,7 @@ def with_explicit_steps(params: np.ndarray, steps: np.ndarray) -> tuple[np.ndarr
     results = np.zeros(len(params), RESULT).view(np.recarray)
     blocks = np.zeros((len(params), EXPLICIT.max_revs), RESULT).view(np.recarray)
     left = np.full(len(params), iterations_allowed(EXPLICIT.steps_per_rev, EXPLICIT.max_revs))
-    list(simulation._together(params, EXPLICIT, left, False, results, blocks, steps))
+    list(simulation.simulate_together(params, EXPLICIT, left, False, results, blocks, steps))
     return results.view(np.ndarray), blocks.view(np.ndarray)
 
 

@@ -74,7 +74,7 @@ def halves(case):
     par = joint.perturb(case.joint, case.operation, errors).view(np.recarray)
     options = case.solver.options()
     left = np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
-    ((_, samples),) = simulation._alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
+    ((_, samples),) = simulation.simulate_alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
     work, found = make_work(), np.zeros((len(samples), 4, 2))
     outer = np.sign(par.station_s[0, : par.n_stations[0]]) / 2 + 0.5
     for k, sample in enumerate(samples):
@@ -207,6 +207,18 @@ def test_ramp_and_static_start_settle_to_the_same_revolution(params):
 
 METHODS = pytest.mark.parametrize("method", list(Method))
 TIGHT = {"settle_tol": 1e-7, "newton_tol": 1e-9, "max_revs": 40, "max_refinements": 0}
+
+
+def test_a_smooth_joint_settles_early_in_the_revolution_that_it_would_repeat(params):
+    early, samples = full(params(pin1__tilt_z=0.001, hole2__offset_t=1e-5))
+    late, again = full(
+        params(pin1__tilt_z=0.001, hole2__offset_t=1e-5), settle_tol=1e-14, max_revs=4, max_refinements=0
+    )
+    assert (early["status"], late["status"]) == (Status.OK, Status.NOT_SETTLED)
+    assert early["revolutions"] < 1.2
+    assert early["step_error"] < 0.02
+    for loads, repeated in ((samples["loads"][..., :3], again["loads"][..., :3]), (samples["loads"], again["loads"])):
+        assert np.abs(loads - repeated).max() < 1e-5 * np.abs(repeated).max()
 
 
 @METHODS
@@ -382,7 +394,7 @@ print(counts)
 def test_a_second_process_finds_the_compiled_kernel():
     code = """
 from tolstat.kernel.lanes.lockstep import lockstep
-from tolstat.solver.simulation import warm_up
+from tolstat.solver.compilation import warm_up
 warm_up()
 print(sum(lockstep.stats.cache_hits.values()), sum(lockstep.stats.cache_misses.values()))
 """

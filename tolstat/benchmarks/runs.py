@@ -20,8 +20,9 @@ from tolstat.benchmarks.timing import in_turn
 from tolstat.campaign.executors import Lost, Work, available_workers, map_in_processes
 from tolstat.common import loads
 from tolstat.common.tables import SIMULATED, Options, Status
+from tolstat.solver.compilation import warm_up
 from tolstat.solver.reference import FirstOrder, Largest, first_order, reference_rows
-from tolstat.solver.simulation import simulate_rows, warm_up
+from tolstat.solver.simulation import simulate_rows
 
 TRUTH = "truth"
 """Name of the reference solution among the contenders."""

@@ -22,7 +22,8 @@ from tolstat.display import text
 from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, origin_blocks, streams
 from tolstat.solver import refinement
-from tolstat.solver.simulation import history_specs, simulate_rows, warm_up
+from tolstat.solver.compilation import warm_up
+from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import worst
 from tolstat.store.axes import attach_scales
 from tolstat.store.histories import create_dataset, create_group

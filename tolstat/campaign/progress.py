@@ -74,7 +74,7 @@ def clock(seconds: float) -> str:
 
 def kernels() -> str:
     """Name of the stage that makes the kernels ready: says that they are compiled if they are not in the cache."""
-    from tolstat.solver.simulation import is_compiled
+    from tolstat.solver.compilation import is_compiled
 
     return "loading the kernels" if is_compiled() else "compiling the kernels, about a minute, once"
 

@@ -13,7 +13,8 @@ from tolstat.common.columns import Column
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.shown import shown
 from tolstat.common.tables import Options, Status
-from tolstat.solver.simulation import simulate_rows, warm_up
+from tolstat.solver.compilation import warm_up
+from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.provenance import versions
 from tolstat.store.recorded import options_of, parameters

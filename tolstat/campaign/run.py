@@ -175,7 +175,7 @@ def _write_blocks(
 
 def _own_stages() -> Stages:
     from tolstat import joint, sampling
-    from tolstat.solver import simulation
+    from tolstat.solver import compilation, simulation
 
     return Stages(
         sampling.draw_blocks,
@@ -183,7 +183,7 @@ def _own_stages() -> Stages:
         joint.perturb,
         simulation.history_specs,
         simulation.simulate_rows,
-        simulation.warm_up,
+        compilation.warm_up,
         sampling.origin_blocks,
     )
 

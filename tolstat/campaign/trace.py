@@ -13,7 +13,8 @@ from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
 from tolstat.common.shown import shown
 from tolstat.common.tables import BUSHINGS, CONTACTS, PINS, Motion, Options, Simulation, Status
-from tolstat.solver.simulation import simulate_rows, warm_up
+from tolstat.solver.compilation import warm_up
+from tolstat.solver.simulation import simulate_rows
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,7 +17,8 @@ from tolstat.campaign.executors import Lost, Work, map_in_processes, map_seriall
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status
 from tolstat.joint import perturb
-from tolstat.solver.simulation import simulate_rows, warm_up
+from tolstat.solver.compilation import warm_up
+from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Counts, ResultStore, what_if, worst
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered

@@ -285,7 +285,7 @@ def print_table(columns: Sequence[Column], frame: pd.DataFrame, wide: bool) -> N
 
 def announce_compilation() -> None:
     """Print a message if the kernels have to be compiled first."""
-    from tolstat.solver.simulation import is_compiled
+    from tolstat.solver.compilation import is_compiled
 
     if not is_compiled():
         say("compiling the kernels: about a minute, once per machine and version")

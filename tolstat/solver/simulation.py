@@ -13,7 +13,6 @@ from tolstat.common import progress_memory
 from tolstat.common.tables import (
     CONTACTS,
     KERNEL_RESULT,
-    PARAM,
     RESULT,
     SIMULATED,
     SPAN,
@@ -33,6 +32,8 @@ if TYPE_CHECKING:
     from tolstat.kernel.lanes.batch import Batch
     from tolstat.kernel.revolution.simulate import Scratch
 
+Run = Callable[..., Iterator[tuple[int, NDArray[np.void]]]]
+"""Simulation of joints, `simulate_alone` or `simulate_together`."""
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
 MAX_KEPT_SAMPLES = 12_000
@@ -194,7 +195,7 @@ def simulate_rows(
         found = np.zeros(len(rows), RESULT).view(np.recarray)
         revolutions = settings.max_revs if follows_error(settings) else 0
         blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
-        run: Callable[..., Iterator[tuple[int, NDArray[np.void]]]] = _together if in_lanes(settings) else _alone
+        run: Run = simulate_together if in_lanes(settings) else simulate_alone
         if follows_error(settings):
             run = partial(_resolved, steps[rows])
         own = left[rows]
@@ -220,7 +221,7 @@ def simulate_rows(
     return Simulation(results, kept)
 
 
-def _alone(
+def simulate_alone(
     params: NDArray[np.void],
     options: Options,
     left: NDArray[np.int64],
@@ -246,7 +247,7 @@ def _alone(
             yield i, alone.ring.samples
 
 
-def _together(
+def simulate_together(
     params: NDArray[np.void],
     options: Options,
     left: NDArray[np.int64],
@@ -257,8 +258,8 @@ def _together(
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints in lanes by number of contact stations; yield index and samples of each if `keep`.
 
-    `left` is as of `_alone`. `steps`: number of explicit steps of the first revolution, (n,); without it joints are
-    simulated in lock-step.
+    `left` is as of `simulate_alone`. `steps`: number of explicit steps of the first revolution, (n,); without it joints
+    are simulated in lock-step, and those in which a step fails are simulated again, alone.
     """
     from tolstat.kernel.lanes.explicit import explicit
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
@@ -276,6 +277,11 @@ def _together(
         rows, allowed = part.view(np.recarray), left[here]
         if steps is None:
             lockstep(rows, words, allowed, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+            again = np.flatnonzero(out["status"] == Status.PENDING)
+            found, remaining = out[again], allowed[again]
+            for i, revolution in simulate_alone(part[again], options, remaining, keep, found):
+                samples[again[i]] = revolution
+            out[again], allowed[again] = found, remaining
         else:
             explicit(rows, words, steps[here], allowed, options, scratch(options), batch, samples, own, out, tally)
         left[here] = allowed
@@ -315,7 +321,8 @@ def _resolved(
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints with explicit steps where `steps`, (n,), is not zero, else with error-controlled steps.
 
-    Joints that turn out too stiff for explicit steps get error-controlled ones. Other arguments are as of `_together`.
+    Joints that turn out too stiff for explicit steps get error-controlled ones. Other arguments are as of
+    `simulate_together`.
     """
     steps = steps.copy()
     for explicit in (True, False):
@@ -324,9 +331,9 @@ def _resolved(
             continue
         out = np.zeros(len(rows), RESULT).view(np.recarray)
         own = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray)
-        run: Callable[..., Iterator[tuple[int, NDArray[np.void]]]] = _together if in_lanes(options) else _alone
+        run: Run = simulate_together if in_lanes(options) else simulate_alone
         if explicit:
-            run = partial(_together, steps=steps[rows])
+            run = partial(simulate_together, steps=steps[rows])
         allowed = left[rows]
         for i, samples in run(params[rows], options, allowed, keep, out, own):
             results[rows[i]] = out[i]
@@ -354,29 +361,3 @@ def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, Hi
     if "harmonics" in histories:
         sample |= _harmonics(loads, specs["coefficients_real"].shape[-1])
     return sample
-
-
-def is_compiled(options: Options | None = None) -> bool:
-    """Whether the kernels that `options` need lie in the cache, so that `warm_up` only has to load them."""
-    from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
-
-    options = options or Options()
-    names = ["lockstep.lockstep" if in_lanes(options) else "simulate.simulate_joint"]
-    if refinement.may_refine(options):
-        names += ["explicit.explicit", "explicit.count_steps"]
-    return all(any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}")) for name in names)
-
-
-def warm_up(options: Options | None = None) -> None:
-    """Compile the kernels that `options` need, or load them from the cache, by a joint with negative clearance."""
-    options = options or Options()
-    params = np.zeros(1, PARAM)
-    params["clearance"] = -1.0
-    simulate_rows(params, options)
-    if refinement.may_refine(options):
-        params["omega"], params["alpha"], params["Js"] = 1.0, 0.1, 1.0  # its torque reverses
-        explicit_steps(params, options)
-        found, one = np.zeros(1, RESULT).view(np.recarray), np.full(1, options.steps_per_rev)
-        left = np.full(1, 2**31)
-        list(_together(params, refinement.settings(options), left, False, found, found[:, None], one))
-    rainflow.count(np.zeros((2, 8, 6)))

@@ -12,7 +12,8 @@ from tolstat.common.errors import Fault, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import BUSHINGS
 from tolstat.joint import perturb
-from tolstat.solver.simulation import restore, simulate_rows, warm_up
+from tolstat.solver.compilation import warm_up
+from tolstat.solver.simulation import restore, simulate_rows
 from tolstat.store.recorded import joint_of, options_of
 from tolstat.store.result_file import RUN_AGAIN
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tolstat.benchmarks.cost.rates import Sample
 from tolstat.campaign.executors import Lost, Work, available_workers, map_in_processes
 from tolstat.common.tables import Options
-from tolstat.solver import simulation
+from tolstat.solver import compilation, simulation
 
 BLOCKS, QUICK_BLOCKS = 8, 2
 """Blocks per worker."""
@@ -130,7 +130,7 @@ def _after_first(done: list[Stint]) -> float:
 
 def _run(blocks: Sequence[NDArray[np.void]], options: Options, workers: int) -> list[Stint]:
     work: Work[NDArray[np.void], Stint | Lost] = Work(
-        partial(_simulate, options), prepare=partial(simulation.warm_up, options)
+        partial(_simulate, options), prepare=partial(compilation.warm_up, options)
     )
     stints = []
     with closing(map_in_processes(work, blocks, workers)) as results:

@@ -89,9 +89,9 @@ def first_joint(study_path: str) -> None:
 def compile_kernels(fidelity: str) -> None:
     """Compile the kernels for joints of a fidelity; `measure` calls this in a new process."""
     from tolstat.common.tables import Fidelity, Options
-    from tolstat.solver import simulation
+    from tolstat.solver import compilation
 
-    simulation.warm_up(Options(fidelity=int(Fidelity[fidelity.upper()])))
+    compilation.warm_up(Options(fidelity=int(Fidelity[fidelity.upper()])))
 
 
 def _run(arguments: list[str], environment: dict[str, str]) -> tuple[float, float]:

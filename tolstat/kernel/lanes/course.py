@@ -33,7 +33,14 @@ from tolstat.kernel.revolution.resolve import (
     merge_extremes,
 )
 from tolstat.kernel.revolution.settle import grid_step, predict_increment, record
-from tolstat.kernel.revolution.simulate import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, check_settled
+from tolstat.kernel.revolution.simulate import (
+    CHECKS_PER_REV,
+    NEWTON_FAILED,
+    NOT_SETTLED,
+    OK,
+    QUASISTATIC,
+    check_settled,
+)
 from tolstat.kernel.simd.jit import njit
 
 GIVEN_UP = -1
@@ -138,14 +145,14 @@ def advance(lane, options, control, motion):
 
 
 @njit
-def step(lane, lanes, options, control, motion, samples, notes, out):
+def step(lane, par, lanes, options, control, motion, samples, notes, out):
     """Record the grid point that a lane has reached and set up the next step; return the status."""
     k = control.k[lane]
-    record(k, lane, k > options.steps_per_rev, lanes[0], lanes[1], lanes[2].v, samples)
+    record(k, lane, k > options.steps_per_rev // CHECKS_PER_REV, lanes[0], lanes[1], lanes[2].v, samples)
     motion.memory[AHEAD, lane] = predict_increment(
         k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples
     )
-    status = check_settled(k, int(control.iterations[lane]), options, samples, notes, out)
+    status = check_settled(k, int(control.iterations[lane]), par, options, samples, notes, out)
     if status != NOT_SETTLED:
         return status
     if k == options.max_revs * options.steps_per_rev:

@@ -3,9 +3,9 @@
 A round evaluates the residual of every lane once, at the lane's own time and trial point. Each lane is then corrected,
 gets a new tangent, or continues: from the search for equilibrium to its first step, to the next sub-step, grid point,
 cell or angle. Lanes never wait for each other's convergence, and a lane whose joint is finished takes the next one from
-the queue. A joint in which a step or angle has finally failed is simulated again from its start, alone, as in
-`simulate`, unless its steps are error-controlled. What a lane does depends only on its own joint, and so does every bit
-of the result.
+the queue. A joint in which a step or angle has finally failed is left `PENDING`, unless its steps are error-controlled:
+the caller simulates it again from its start, alone, as in `simulate`. What a lane does depends only on its own joint,
+and so does every bit of the result.
 """
 
 from tolstat.kernel.integrators.mesh import cells_of, load_error, parts_of
@@ -51,6 +51,8 @@ from tolstat.kernel.revolution.simulate import (
     NEWTON_FAILED,
     NOT_SETTLED,
     OK,
+    OUTSIDE_MODEL,
+    PENDING,
     QUASISTATIC,
     RAMP,
     acceleration,
@@ -62,7 +64,6 @@ from tolstat.kernel.revolution.simulate import (
     recall,
     residual,
     rigid_guess,
-    simulate_joint,
     write_counters,
     write_diagnostics,
 )
@@ -80,11 +81,9 @@ that wait stand still."""
 def finish_joint(lane, status, rows, left, options, alone, batch, samples, results):
     """Continue a lane whose joint has ended, or whose step of a closer look has: next closer look, or results.
 
-    A joint that has not settled gets no closer look. A joint in which a step has failed is simulated again, alone, with
-    the iterations that are left; a failed step of a closer look ends that look. `status` is that of the joint or step;
-    for the other arguments see `lockstep`.
+    A joint that has not settled gets no closer look. A joint in which a step has failed is left `PENDING`; a failed
+    step of a closer look ends that look. `status` is that of the joint or step; for the other arguments see `lockstep`.
     """
-    _, state, ring, _ = alone
     control, joint, own = batch.control, batch.control.joint[lane], samples_of(lane, batch, samples)
     par, out, k = rows[joint], results[joint], 0
     good = status in (OK, GIVEN_UP)
@@ -104,15 +103,13 @@ def finish_joint(lane, status, rows, left, options, alone, batch, samples, resul
         closer = status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1
         if closer and next_closeup_step(lane, k, par, options, alone, batch, own, out):
             return
-        get_counters(lane, batch, state.counters)
-        write_counters(status, options.steps_per_rev, state.counters, out)
-        left[joint] -= state.counters[ITERATIONS]
+        counters = alone.state.counters
+        get_counters(lane, batch, counters)
+        write_counters(status, options.steps_per_rev, counters, out)
+        left[joint] -= counters[ITERATIONS]
     else:
         left[joint] -= int(control.iterations[lane])
-        simulate_joint(par, options, left[joint], alone, out)
-        left[joint] -= state.counters[ITERATIONS]
-        for s in range(own.size):
-            own[s] = ring.samples[s]
+        out.status = PENDING
     empty(lane, batch)
 
 
@@ -194,7 +191,9 @@ def load_joint(lane, joint, rows, words, left, options, alone, batch, samples, r
     control.k[lane], control.iterations[lane] = 0, 0.0
     put_joint(lane, words[joint], batch)
     if not inside_model(par):
-        finish_joint(lane, NEWTON_FAILED, rows, left, options, alone, batch, samples, results)
+        state.counters[:] = 0
+        finish(OUTSIDE_MODEL, -1, options.steps_per_rev, options, state.counters, results[joint])
+        empty(lane, batch)
         return
     clear(par, state, samples_of(lane, batch, samples), batch.notes[lane])
     control.origin[lane], control.grid[lane] = 0.0, grid_step(par, options)
@@ -253,7 +252,7 @@ def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks
         Written unless empty: statistics of the last revolutions of every joint with error-controlled steps; revolution
         r (from 0) at r modulo their number.
     results : ndarray of KERNEL_RESULT, shape (n,)
-        Written.
+        Written; status `PENDING` means that the joint is to be simulated alone, with the iterations in `left`.
     tally : ndarray of int, shape (3,)
         Counters, increased: rounds; lanes with a joint, summed over rounds; rounds with new tangents.
     """
@@ -319,7 +318,7 @@ def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks
                 next_phase(lane, rows[joint], options, at, own)
             elif advance(lane, options, at, own):
                 if phase == STEP:
-                    status = step(lane, lanes, options, at, own, here, batch.notes[lane], results[joint])
+                    status = step(lane, rows[joint], lanes, options, at, own, here, batch.notes[lane], results[joint])
                 else:
                     status = finish_closeup_part(
                         lane, rows[joint], lanes, options, at, own, batch.fine[lane], results[joint]

@@ -355,7 +355,7 @@ def after_revolution(point, par, options, samples, past, out):
         return NOT_FINITE, False
     turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
-        out.closure = closure_error(samples)
+        out.closure = closure_error(0, samples.size, samples)
         note_closure(turns.revolution, out.closure, trail.notes)
         if repeats(last, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_PERIODIC), False

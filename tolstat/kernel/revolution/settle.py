@@ -125,6 +125,8 @@ def record(k, lane, in_full, par, work, v, samples):
 def predict_increment(k, q, v, ahead, samples):
     """Store the motion at grid point `k`; predict the increment of the next step by that of one revolution earlier.
 
+    In the first revolution the polynomial through the last five grid points is continued.
+
     Parameters
     ----------
     k : int
@@ -139,27 +141,33 @@ def predict_increment(k, q, v, ahead, samples):
     Returns
     -------
     float
-        1 if there is a prediction, 0 in the first revolution.
+        1 if there is a prediction, 0 at the first four grid points.
     """
     n = samples.size
     here, following = samples[k % n], samples[(k + 1) % n]
+    before = samples[(k - 1) % n], samples[(k - 2) % n], samples[(k - 3) % n], samples[(k - 4) % n]
     known = k > n
     for i in range(N_DOF):
         if known:
             ahead[i] = following.q[i] - here.q[i]
-            here.v[i] = v[i]
-        here.q[i] = q[i]
-    return 1.0 if known else 0.0
+        here.q[i], here.v[i] = q[i], v[i]
+        if not known:
+            ahead[i] = 4 * q[i] - 10 * before[0].q[i] + 10 * before[1].q[i] - 5 * before[2].q[i] + before[3].q[i]
+    return 1.0 if k >= 5 else 0.0
 
 
 @njit
-def closure_error(samples):
-    """Largest change of any bushing load's modulus since the revolution before, relative to the largest of its kind."""
+def closure_error(first, last, samples):
+    """Largest change of any bushing load's modulus since the revolution before, relative to the largest of its kind.
+
+    Changes count at samples `first` to `last` - 1.
+    """
     worst = 0.0
     for kind in (0, 1):
         change = largest = 0.0
-        for s in range(samples.size):
+        for s in range(first, last):
             change = larger(change, samples[s].change[kind])
+        for s in range(samples.size):
             for b in range(8):
                 largest = max(largest, samples[s].loads[(FORCES, TORQUES)[kind] + b])
         error = change / largest if largest > 0 else change
@@ -194,15 +202,17 @@ def extremes(values):
 
 
 @njit
-def step_error(par, samples, out):
+def step_error(par, samples):
     """Estimated error of a BDF2 step, as a load relative to the largest one: mean over the recorded revolution.
 
     A step of BDF2 errs by 2/9 of the third difference of an unknown (Hairer, Wanner: Solving ODEs I, III.2); the
     stiffness of the lump's bushing converts it to a load.
     """
     force = torque = 0.0
-    for b in range(8):
-        force, torque = max(force, out.largest[FORCES + b]), max(torque, out.largest[TORQUES + b])
+    for s in range(samples.size):
+        for b in range(8):
+            force = max(force, samples[s].loads[FORCES + b])
+            torque = max(torque, samples[s].loads[TORQUES + b])
     total = 0.0
     for s in range(samples.size):
         q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q

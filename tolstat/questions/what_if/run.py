@@ -15,7 +15,7 @@ from tolstat.campaign.what_if import Asked, Wanted
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ALL_LIMITS, split
 from tolstat.questions.what_if import query
-from tolstat.solver.simulation import warm_up
+from tolstat.solver.compilation import warm_up
 from tolstat.store import Counts, ResultStore, what_if
 from tolstat.store.provenance import versions
 from tolstat.store.view import View

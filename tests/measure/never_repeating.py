@@ -20,7 +20,7 @@ from tolstat.common import tables
 from tolstat.common.tables import RESULT, SPAN, Motion, Options, Status
 from tolstat.solver import refinement
 from tolstat.solver.reference import first_order
-from tolstat.solver.simulation import _together, explicit_steps, simulate_rows
+from tolstat.solver.simulation import explicit_steps, simulate_rows, simulate_together
 
 STUDY = ROOT / "studies" / "iso2768_f.toml"
 STARTED, LONG, DURATION = 100, 1100, 100
@@ -50,7 +50,7 @@ def watch(params: NDArray[np.void], revolutions: int) -> tuple[NDArray[np.void],
     results = np.zeros(len(params), RESULT).view(np.recarray)
     blocks = np.zeros((len(params), revolutions), RESULT).view(np.recarray)
     left = np.full(len(params), 2**62)
-    list(_together(params, options, left, False, results, blocks, explicit_steps(params, Options())))
+    list(simulate_together(params, options, left, False, results, blocks, explicit_steps(params, Options())))
     return results.view(np.ndarray), blocks.view(np.ndarray)
 
 

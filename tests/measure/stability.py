@@ -72,7 +72,7 @@ def growths(params: Table, options: Options) -> list[Growth | None]:
     matrices = np.empty((ANGLES, 2 * N_DOF, 2 * N_DOF))
     results = np.zeros(len(params), RESULT).view(np.recarray)
     left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))
-    for i, samples in simulation._alone(params, options, left, True, results):
+    for i, samples in simulation.simulate_alone(params, options, left, True, results):
         if results[i].status not in SIMULATED:
             found.append(None)
             continue

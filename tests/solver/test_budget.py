@@ -56,7 +56,7 @@ def test_the_repetition_alone_continues_the_budget(params: Params, monkeypatch: 
     assert each > MAX_ITERATIONS * 60 * FAST.max_revs
     allow(monkeypatch, each + each // 2)
     spent: list[int] = []
-    together = simulation._together
+    together = simulation.simulate_together
 
     def counted(params, options, left, *others):
         yield from together(params, options, left, *others)

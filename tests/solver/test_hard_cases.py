@@ -177,7 +177,7 @@ def test_joints_are_verified_with_the_settings_of_their_variant(tmp_path: Path) 
         assert found.rows.tolist() == [0, 1, 2, 3, 4, 5]
         (check,) = found.checks.values()
         assert (check.results["status"] == Status.OK).all()
-        assert (check.results["steps"] / found.base["steps"] > 1.7).all()
+        assert (check.results["steps_per_rev"] == 2 * found.base["steps_per_rev"]).all()
 
 
 def test_the_table_holds_the_errors_against_the_reference(tmp_path: Path) -> None:

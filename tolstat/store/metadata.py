@@ -124,6 +124,13 @@ class FidelityRecord(_File):
     table: list[RungRecord]
 
 
+class LooksRecord(_File):
+    """Looks of a stop rule at a campaign that was extended since."""
+
+    reached: Literal[False]
+    looks: list[Count]
+
+
 class StopRecord(_File):
     """Why a campaign ended early, see `campaign.stop_rule.Outcome.record`."""
 
@@ -211,7 +218,7 @@ MODELS: dict[str, TypeAdapter[Any]] = {
     "fidelity": TypeAdapter(FidelityRecord),
     "versions": TypeAdapter(dict[str, str]),
     "retries": TypeAdapter(list[RetryRecord]),
-    "stop": TypeAdapter(StopRecord),
+    "stop": TypeAdapter(StopRecord | LooksRecord),
     "design": TypeAdapter(DesignRecord),
     "histories": TypeAdapter(dict[str, list[Any]]),
     "change": TypeAdapter(Annotated[WidthRecord | ExchangeRecord | AsDrawnRecord, Field(discriminator="kind")]),

@@ -21,6 +21,8 @@ COMMANDS = [name.replace("_", "-") for names in cli.COMMANDS.values() for name i
 STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
 FEW = {"codes": 'codes = ["LSODA"]', "methods": 'methods = ["bdf2"]', "fidelities": 'fidelities = ["quasistatic"]'}
 """One integrator of each side in ``studies/precision.toml``."""
+SHORT = {"rare": ("--n", "100", "--repeats", "1"), "bench coverage": ("--seeds", "20")}
+"""Options with which an example takes seconds."""
 
 
 def call(*args: object) -> Result:
@@ -67,7 +69,7 @@ def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch:
     shutil.copytree(made, tmp_path / "work")
     monkeypatch.chdir(tmp_path / "work")
     monkeypatch.setattr(webbrowser, "open", lambda page: True)
-    done = call(*example(command))
+    done = call(*example(command), *SHORT.get(command, ()))
     assert done.exit_code == 0, done.stderr
     assert "Traceback" not in done.stderr
     if command not in bench.INSTRUMENTS:

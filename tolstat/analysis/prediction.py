@@ -74,3 +74,8 @@ def of_share(lower: float, upper: float, number: int, confidence: float = 0.95) 
         return math.nan, math.nan
     tail = 0.5 * (1.0 - half(confidence))
     return float(binom.ppf(tail, number, lower)), float(binom.ppf(1.0 - tail, number, upper))
+
+
+def columns(ends: tuple[float, float], number: int) -> dict[str, float]:
+    """Columns of a table: a prediction interval, and the number of joints that it is of."""
+    return {"next_lower": ends[0], "next_upper": ends[1], "delivery": number}

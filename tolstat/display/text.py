@@ -111,9 +111,9 @@ def ppm(share: float) -> str:
 
 
 def delivery(row: Mapping[Any, Any]) -> str:
-    """Prediction interval of a row with ``next_lower`` and ``next_upper``; NaN gives a dash."""
+    """Prediction interval of a row with the columns of `analysis.prediction`; NaN gives a dash."""
     low, high = row["next_lower"], row["next_upper"]
-    return "-" if math.isnan(low) else f"{low:.0f} .. {high:.0f}"
+    return "-" if math.isnan(low) else f"{low:.0f} .. {high:.0f} of {row['delivery']:.0f}"
 
 
 def percent(share: float) -> str:

@@ -121,7 +121,9 @@ def _cards(view: View, found: Headline | None) -> list[Card]:
             together = capabilities.together(table)
             cards.append(Card(together.value, together.words, "Yield"))
         if predicted := capabilities.delivery(table):
-            cards.append(Card(text.delivery(table.iloc[-1].to_dict()), predicted, "95 % prediction interval"))
+            last = table.iloc[-1]
+            interval = text.ends(last["next_lower"], last["next_upper"], ".0f")
+            cards.append(Card(interval, predicted, "95 % prediction interval"))
     if found is not None and found.load and found.load not in found.words:
         worst = next(row for row in exceedance.limits(view).to_dict("records") if row["load"] == found.load)
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"

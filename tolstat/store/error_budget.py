@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tolstat.analysis import prediction
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
 from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS
 from tolstat.store.several_loads import largest_of, together
@@ -144,7 +145,7 @@ def delivery(
     Returns
     -------
     dict
-        ``next_lower``, ``next_upper``: whole numbers, ends included; NaN for dependent samples.
+        ``next_lower``, ``next_upper``: whole numbers, ends included; NaN for dependent samples; ``delivery``: `number`.
     """
     found = [part.delivery(level, number, confidence) for part in (load, *(ends or ()))]
-    return {"next_lower": min(low for low, _ in found), "next_upper": max(high for _, high in found)}
+    return prediction.columns((min(low for low, _ in found), max(high for _, high in found)), number)

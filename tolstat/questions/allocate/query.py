@@ -316,7 +316,7 @@ def _limits(
         row |= {"lower": min(one.lower for one in found), "upper": max(one.upper for one in found)}
         least, most = min(one.lower for one in wide), max(one.upper for one in wide)
         following = prediction.of_share(least, most, delivery, confidence)
-        row |= dict(zip(("next_lower", "next_upper"), following, strict=True))
+        row |= prediction.columns(following, delivery)
         rows.append(row | {"ess": found[0].ess, "usable": found[0].support.usable, "numerical": known})
     return pd.DataFrame(rows)
 

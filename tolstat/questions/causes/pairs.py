@@ -51,7 +51,8 @@ class Pairs(NamedTuple):
     correlation : float
         Spearman's rank correlation of `use` and `values`.
     single : float
-        Largest correlation of the load and the distance of a single error from zero, chosen and found in the same way.
+        Largest magnitude of the correlation of the load and a single error, or its distance from the mean, chosen and
+        found in the same way.
     others : dict of str to float
         Correlation of each combination, in descending order of that of the joints with an even number.
     """
@@ -109,8 +110,9 @@ def pairs_of(view: View, by: str) -> Pairs:
     used = combinations(errors, perturb(view.study.joint, view.at(point).store.operation, errors))
     rank = sorted(used, key=lambda name: -_spearman(used[name][chosen], values[chosen]))
     best = rank[0]
-    single = {name: np.abs(errors[name] - errors[name].mean()) for name in _scattering(errors)}
-    one = max(single, key=lambda name: abs(_spearman(single[name][chosen], values[chosen])))
+    scattering = [errors[name] for name in _scattering(errors)]
+    single = [*scattering, *(np.abs(error - error.mean()) for error in scattering)]
+    one = max(single, key=lambda error: abs(_spearman(error[chosen], values[chosen])))
     return Pairs(
         load=by,
         unit=load.unit,
@@ -121,7 +123,7 @@ def pairs_of(view: View, by: str) -> Pairs:
         use=used[best][seen],
         values=values[seen],
         correlation=_spearman(used[best][seen], values[seen]),
-        single=_spearman(single[one][seen], values[seen]),
+        single=abs(_spearman(one[seen], values[seen])),
         others={name: _spearman(used[name][seen], values[seen]) for name in rank},
     )
 

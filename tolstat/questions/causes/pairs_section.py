@@ -38,20 +38,21 @@ def _blocks(found: Pairs) -> list[Block]:
     said = (
         f"{found.load} comes of errors of pins against their holes: a joint binds where they use up its clearance. "
         f"What tells most is {found.name}, as a share of the clearance: rank correlation with the load "
-        f"{found.correlation:.2f}, where that of the best single error is {round(found.single, 2) + 0.0:.2f}. "
+        f"{found.correlation:.2f}, where that of the best single error is {found.single:.2f}. "
         f"Of the tenth of the joints that use most of the clearance {text.percent(most)} exceed the limit, "
         f"of the others {text.percent(rest)}."
     )
     if len(found.points) > 1:
         said += f" {found.load} is the largest over {', '.join(found.points)}; it is most severe at {found.worst}."
     head = ["rank correlation", "share of the clearance used by"]
-    rows = [[f"{value:+.2f}", name] for name, value in list(found.others.items())[:LISTED]]
+    listed = sorted(list(found.others.items())[:LISTED], key=lambda pair: -pair[1])
+    rows = [[f"{value:+.2f}", name] for name, value in listed]
     table = Table("The best combinations", head, rows, frozenset({0, 1}))
     how = (
-        "Chosen, and in the order of the table, on the joints with an even number; picture and correlations are of the "
-        "others. Errors are those of a hole less those of its pin; a tilt counts by what it takes at the ends of the "
-        "pin. Offsets along z: what is left of the four after the cross has moved and turned, the middle of pins 1 and "
-        "2 against that of pins 3 and 4."
+        "Chosen on the joints with an even number, so that it need not be the first of the table; picture and "
+        "correlations are of the others. Errors are those of a hole less those of its pin; a tilt counts by what it "
+        "takes at the ends of the pin. Offsets along z: what is left of the four after the cross has moved and turned, "
+        "the middle of pins 1 and 2 against that of pins 3 and 4."
     )
     return [Text(said), Panels([_panel(found)]), table, Text(how, small=True)]
 

@@ -101,7 +101,7 @@ def part_failures(stressed: Stressed, confidence: float = 0.95, delivery: int = 
         found = course.failures(1.0, confidence)._asdict()
         wide = course.failures(1.0, prediction.half(confidence))
         following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, confidence)
-        head |= dict(zip(("next_lower", "next_upper"), following, strict=True))
+        head |= prediction.columns(following, delivery)
         head |= life | {"nominal_failures": ideal.failures().estimate} | found | {"confidence": confidence}
         rows.append(head)
     return pd.DataFrame(rows)

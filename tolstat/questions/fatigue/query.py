@@ -191,7 +191,7 @@ def _above_one(loading: Loading, sums: FloatArray, confidence: float, delivery: 
         least, most = round(above.n * above.bound_lower), round(above.n * above.bound_upper)
         following = prediction.of_counts(least, most, above.n, delivery, confidence)
     median = quantile.quantile(sums, loading.status, 0.5).estimate
-    ends = dict(zip(("next_lower", "next_upper"), following, strict=True))
+    ends = prediction.columns(following, delivery)
     return {"median": median} | asdict(above) | ends | {"confidence": confidence}
 
 

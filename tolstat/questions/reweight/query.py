@@ -256,7 +256,7 @@ def _share_above(
     row |= {key: numbers[key] for key in GIVEN}
     row |= dict(zip(("total_lower", "total_upper"), widest(confidence) if known else (np.nan, np.nan), strict=True))
     following = prediction.of_share(*widest(prediction.half(confidence)), delivery, confidence)
-    row |= dict(zip(("next_lower", "next_upper"), following, strict=True))
+    row |= prediction.columns(following, delivery)
     return row | {"ess": found.ess} | found.support._asdict()
 
 

@@ -32,7 +32,7 @@ def draw(ax: Axes, d: Dimensions, marked: Container[str] = ()) -> None:
     _angle(ax, d, along, reach)
     place = sizes.end - 0.12 * d.R
     _turning(ax, np.array([-place, 0.0]), np.array([1.0, 0.0]), sizes.shaft, "ω", "side.omega", -1.0)
-    _turning(ax, place * along, along, sizes.shaft, "T_r", "side.torque", 1.0)
+    _turning(ax, (place + 0.1 * d.R) * along, along, sizes.shaft, "T_r", "side.torque", 1.0)  # clears the name
     _names(ax, d, marked, sizes.yoke, sizes.shaft)
     width, height = sizes.end + 0.2 * d.R, d.end + 0.56 * d.R
     ink.frame(ax, (-width, -height), (width, height))

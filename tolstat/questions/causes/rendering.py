@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 SIGNIFICANT = 0.05
 """p-value below which a table marks an error of the tail."""
+SHOWN = 10
+"""Number of errors shown for each load on the page."""
 ERRORS = 5
 """Number of errors of a joint that the table of the worst joints shows."""
 
@@ -40,7 +42,7 @@ def columns(causes: Causes) -> list[Column]:
     if causes.from_design:
         total = Column("in all, %", partial(_interval, name="total", factor=100), shown=_has("total"))
     else:  # given data yield bounds only
-        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=_has("total_lower"), rank=3)
+        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=has_narrow_bounds, rank=3)
     return [
         Column("error", lambda row: str(row["error"])),
         Column("alone, %", partial(_interval, name="first", factor=100), shown=_has("first")),
@@ -49,6 +51,12 @@ def columns(causes: Causes) -> list[Column]:
         Column("tail: larger", partial(_tail, name="direction"), shown=_has("direction"), rank=2),
         Column("tail: farther out", partial(_tail, name="size"), shown=_has("size"), rank=1),
     ]
+
+
+def has_narrow_bounds(table: pd.DataFrame) -> bool:
+    """Whether the bounds of the total indices tell something: median width of the first `SHOWN` below 0.5."""
+    part = table.head(SHOWN)
+    return bool((part["total_upper"] - part["total_lower"]).median() < 0.5)  # false without bounds (NaN)
 
 
 def _has(name: str) -> Callable[[pd.DataFrame], bool]:
@@ -80,6 +88,8 @@ def note(causes: Causes, log: bool = False) -> str:
         )
     if causes.table["total"].isna().all():
         lines.append("errors are correlated: shares overlap, and shares in all are not given")
+    elif not causes.from_design and not has_narrow_bounds(causes.table):
+        lines.append("no shares in all: given joints bound them too widely; tolstat causes --run gives them")
     if causes.table["first_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only")
     return "\n".join(lines)

@@ -24,8 +24,6 @@ from tolstat.store.view import View
 
 JOINTS = 20_000
 """Maximum number of joints (the first ones) used for causes: more add little and take memory."""
-SHOWN = 10
-"""Number of errors shown for each load."""
 ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)"
 
 
@@ -75,7 +73,7 @@ def _section(causes: Sequence[Causes], against: Sequence[AgainstAngle], logarith
         blocks.append(Panels([_tornado_panel(found, _quantity(found.load, logarithmic)) for found in causes]))
     for found in causes:
         title = f"{_quantity(found.load, logarithmic)}: share of the variance, direction, and part in the tail"
-        blocks.append(as_block(title, rendering.columns(found), rendering.largest(found, SHOWN)))
+        blocks.append(as_block(title, rendering.columns(found), rendering.largest(found, rendering.SHOWN)))
         notes = rendering.note(found, found.load in logarithmic).splitlines()
         blocks += [Text(text.sentence(line), small=True) for line in notes]
     if against:
@@ -96,7 +94,7 @@ def _introduction(causes: Sequence[Causes], logarithmic: Container[str]) -> str:
         "Bars: share of a load's variance that vanishes when the error is removed (first-order index).",
         "The rest up to 100 % comes from errors that act together.",
     ]
-    if any(_has_narrow_bounds(found) for found in causes):
+    if any(rendering.has_narrow_bounds(found.table) for found in causes):
         said.append("Grey: share that the error takes part in, alone or with others (bounds of the total index).")
     if any(found.load in logarithmic for found in causes):
         said.append("Where a few joints with large loads dominate the variance, it is that of the logarithm.")
@@ -105,14 +103,8 @@ def _introduction(causes: Sequence[Causes], logarithmic: Container[str]) -> str:
     return " ".join(said)
 
 
-def _has_narrow_bounds(causes: Causes) -> bool:
-    """Whether the bounds of the total indices are narrow enough to be shown: median width below 0.5."""
-    part = causes.table.head(SHOWN)
-    return bool((part["total_upper"] - part["total_lower"]).median() < 0.5)  # false without bounds (NaN)
-
-
 def _tornado_panel(causes: Causes, quantity: str) -> Panel:
-    part = causes.table.head(SHOWN)
+    part = causes.table.head(rendering.SHOWN)
     top = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in part.head(5).to_dict("records"))
     return Panel(
         f"tornado-{causes.load}",
@@ -121,19 +113,19 @@ def _tornado_panel(causes: Causes, quantity: str) -> Panel:
         partial(_tornado, causes=causes, quantity=quantity),
         (4.9, drawing.rows_height(len(part)) + 0.25),
         left := drawing.rows_left(list(part["error"])),
-        drawing.legend_room([ALONE, *([IN_ALL] if _has_narrow_bounds(causes) else [])], left),
+        drawing.legend_room([ALONE, *([IN_ALL] if rendering.has_narrow_bounds(causes.table) else [])], left),
     )
 
 
 def _tornado(ax: Axes, causes: Causes, quantity: str) -> None:
-    part = causes.table.head(SHOWN)
+    part = causes.table.head(rendering.SHOWN)
     place = np.arange(len(part))
     drawing.rows(ax, list(part["error"]))
     first = 100.0 * part["first"].clip(lower=0.0).to_numpy()
     ax.barh(place, first, height=0.5, color=style.COLOURS[0], zorder=2)
     handles: list[Patch | Line2D] = [Patch(color=style.COLOURS[0])]
     labels = [ALONE]
-    if _has_narrow_bounds(causes):
+    if rendering.has_narrow_bounds(causes.table):
         low, high = (100.0 * part[f"total_{end}"].to_numpy() for end in ("lower", "upper"))
         ax.barh(place, high - low, left=low, height=0.74, color=drawing.GREY, alpha=0.45, zorder=1)
         handles.append(Patch(color=drawing.GREY, alpha=0.45))

@@ -41,6 +41,7 @@ def test_jobs_cover_every_contender_joint_and_setting():
     assert by_name["Radau"].params.tobytes() == params[count - 1 : count].tobytes()
 
 
+@pytest.mark.slow
 def test_every_fault_of_a_setup_is_told(tmp_path):
     text = STUDY.read_text(encoding="utf-8").replace('"iso2768_f.toml"', f'"{STUDY.parent / "iso2768_f.toml"}"')
     path = tmp_path / "setup.toml"

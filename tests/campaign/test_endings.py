@@ -108,6 +108,7 @@ def _burn_for(seconds: float, xs: list[int]) -> int:
     return len(xs)
 
 
+@pytest.mark.slow
 def test_what_makes_progress_is_no_timeout() -> None:
     assert list(map_in_processes(Work(count_slowly, limit_s=LIMIT_S), [3], 1)) == [(3, 9)]
 
@@ -140,6 +141,7 @@ def test_workers_are_kept_for_the_same_work() -> None:
     assert not running(first)
 
 
+@pytest.mark.slow
 def test_a_worker_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
     """Compiled code that loops lets no thread of Python run, here neither does a lock that is never released."""
     script = tmp_path / "script.py"

@@ -53,6 +53,7 @@ def path(tmp_path, monkeypatch):
     return synthetic.store(tmp_path, text + '[limits]\n"cross1.F" = "720 N"\n"fork3.T" = "26 N*m"\n')
 
 
+@pytest.mark.slow
 def test_the_joints_nearest_to_the_limits_are_verified_once(path):
     found = near.check_near(path, "cross1.F > 720 N")
     with Reader.open(path) as store:
@@ -75,6 +76,7 @@ def test_the_joints_nearest_to_the_limits_are_verified_once(path):
         assert error_budget.unknown(view) == ""
 
 
+@pytest.mark.slow
 def test_ppm_and_reweighting_carry_it(path):
     def tables():
         with Reader.open(path) as store:

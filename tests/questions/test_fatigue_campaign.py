@@ -237,6 +237,7 @@ def test_pylifes_own_damage(campaign):
     np.testing.assert_allclose(theirs.to_numpy()[large], sums[valid][large], rtol=2e-2)
 
 
+@pytest.mark.slow
 def test_command_prints_loads_and_damage(campaign, tmp_path):
     from tests.cli.test_cli import call
 

@@ -87,6 +87,7 @@ def misses(factor, n=1024, share=0.05):
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.1])
+@pytest.mark.slow
 def test_shares_cover_over_seeds_and_unweighted_ones_do_not(factor):
     usable, above, below, width, unweighted = misses(factor)
     slack = 3.0 * np.sqrt(0.025 * 0.975 / SEEDS)

@@ -451,6 +451,7 @@ def test_changed_joints_are_simulated_at_all_points(tmp_path):
 
 
 @pytest.mark.usefixtures("quick")
+@pytest.mark.slow
 def test_points_without_a_limit_are_simulated_when_they_are_asked_for(tmp_path):
     path = written(tmp_path, OWN)
     done = runner.simulate(path, budget=60.0, workers=1)
@@ -488,6 +489,7 @@ def test_a_joint_that_fails_at_one_point_has_no_worst_load(tmp_path, monkeypatch
 
 
 @pytest.mark.usefixtures("quick")
+@pytest.mark.slow
 def test_command_and_page_name_the_point(tmp_path, monkeypatch):
     path = written(tmp_path, OWN)
     monkeypatch.setattr(runner, "available_workers", lambda: 1)
@@ -505,6 +507,7 @@ def test_command_and_page_name_the_point(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("quick")
+@pytest.mark.slow
 def test_merged_files_keep_what_they_agree_on(path, tmp_path):
     other, out = tmp_path / "other.h5", [tmp_path / f"out{k}.h5" for k in range(3)]
     other.write_bytes(path.read_bytes())

@@ -308,6 +308,7 @@ def words(path, accepted=np.nan):
 
 
 @pytest.mark.parametrize("simulated", [0, 31])
+@pytest.mark.slow
 def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
     path = synthetic.store(tmp_path, simulated=simulated)
     said = words(path)[1][0]

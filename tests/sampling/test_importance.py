@@ -246,6 +246,7 @@ def test_a_verdict_is_kept_only_if_nothing_that_is_missed_could_change_it():
     assert headline.verdict(row | {"unsearched_upper": np.nan}, 0.01) == "yes"
 
 
+@pytest.mark.slow
 def test_the_report_of_importance_sampling_has_both_ends(stored):
     with Reader.open(stored) as store:
         row = exceeded.limits(store.view()).iloc[0]

@@ -84,6 +84,7 @@ def groups(path: Path) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_every_group_is_described_and_opens_in_xarray_without_a_warning(whole: Path) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")

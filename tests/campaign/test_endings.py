@@ -133,6 +133,7 @@ def test_ten_busy_processes_beside_change_no_byte(tmp_path: Path) -> None:
     assert datasets(tmp_path / "b.h5") == datasets(tmp_path / "a.h5")
 
 
+@pytest.mark.slow
 def test_workers_are_kept_for_the_same_work() -> None:
     with kept_workers():
         first, second = (next(iter(dict(map_in_processes(Work(process), [1], 1)).values())) for _ in range(2))

@@ -271,6 +271,7 @@ def test_export_into_a_pipe_that_closes_early(tmp_path):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
     path = synthetic.store(tmp_path)
     done = call("report", path)

@@ -266,6 +266,7 @@ seed = 1
 )
 
 
+@pytest.mark.slow
 def test_bearings_may_be_edited_after_the_run(tmp_path):
     file, target = tmp_path / "study.toml", tmp_path / "study.h5"
     file.write_text(STUDY, encoding="utf-8")

@@ -358,6 +358,7 @@ def test_of_all_limits_the_largest_ratio_counts():
 
 
 @pytest.mark.usefixtures("quick")
+@pytest.mark.slow
 def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_path, monkeypatch):
     path = made(tmp_path, TEXT.replace('"cross1.F" = "700 N"', '"cross1.F" = "800 N"\n"cross2.F" = "700 N"'))
     runner.simulate(path, budget=60.0, workers=1)

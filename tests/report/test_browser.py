@@ -21,7 +21,10 @@ QUIET = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage"),
 )
-pytestmark = pytest.mark.skipif(not BROWSER, reason="no Chromium here: .ci/extras installs it")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not BROWSER, reason="no Chromium here: .ci/extras installs it"),
+]
 
 PROBE = """
 <script>

@@ -217,6 +217,7 @@ def test_a_small_numerical_error_is_not_given_in_digits():
     assert rendering.in_percent(1.08e-3) == "0.108 %"
 
 
+@pytest.mark.slow
 def test_same_file_same_bytes(path, tmp_path):
     contents = []
     for k in (0, 1):
@@ -335,6 +336,7 @@ def test_dependent_samples_have_no_interval_on_the_page(tmp_path):
     assert said.count("no verdict") == 7
 
 
+@pytest.mark.slow
 def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
     page.write_page(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"), tmp_path / "page.html")
     read = Reading((tmp_path / "page.html").read_text(encoding="utf-8"))

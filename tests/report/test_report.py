@@ -193,6 +193,7 @@ def test_sweep_page_shows_unsettled_and_failed_joints():
     assert said.count("pin*.diameter [mm]") == 4
 
 
+@pytest.mark.slow
 def test_report_of_a_random_view(tmp_path):
     path = synthetic.store(tmp_path, failed=2)
     made = report.build(path, width=None)
@@ -249,6 +250,7 @@ def test_same_file_same_bytes(tmp_path):
             assert [file.read_bytes() for file in report.write_report(source)] == first
 
 
+@pytest.mark.slow
 def test_folder_that_cannot_be_made_and_file_that_is_not_ours(tmp_path):
     path = synthetic.store(tmp_path)
     assert report.write_report(path, tmp_path / "new")[0].parent == tmp_path / "new"

@@ -371,6 +371,7 @@ def test_the_kernel_is_the_same_without_compilation():
     np.testing.assert_allclose(eval(python(ACCELERATION)), plain, rtol=1e-9, atol=1e-9 * np.abs(plain).max())
 
 
+@pytest.mark.slow
 def test_nothing_is_allocated_per_step():
     code = """
 from numba.core.runtime import _nrt_python, rtsys

@@ -16,8 +16,9 @@ from typing import Any
 import pytest
 
 from tests.support.environment import environment
-from tolstat.campaign.executors import Lost, Work, WorkerDied, available_workers, map_in_processes, map_serially
+from tolstat.campaign.executors import Lost, Work, WorkerDied, map_in_processes, map_serially
 from tolstat.campaign.executors.common import THREAD_VARIABLES, never_stop
+from tolstat.common.cores import available_cores
 
 SQUARES = {i: i * i for i in range(20)}
 
@@ -258,5 +259,5 @@ def running(pid: int) -> bool:
     return not status.exists() or status.read_text().rsplit(")", 1)[1].split()[0] != "Z"
 
 
-def test_available_workers_is_what_this_process_may_use() -> None:
-    assert 1 <= available_workers() <= (os.cpu_count() or 1)
+def test_available_cores_is_what_this_process_may_use() -> None:
+    assert 1 <= available_cores() <= (os.cpu_count() or 1)

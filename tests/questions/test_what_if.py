@@ -331,7 +331,7 @@ def test_command_and_page(path, monkeypatch):
     with Reader.open(path) as store:
         (section,) = sections(store.view(), Asked(path))
     assert f"tolstat causes {path.name} --run; then this page again: tolstat report" in section.blocks[0].text
-    monkeypatch.setattr(runner, "available_workers", lambda: 1)
+    monkeypatch.setattr(runner, "available_cores", lambda: 1)
     shown = run("--run", "--budget", "1 min", "--top", "2", "--workers", "1")
     assert shown.exit_code == 0, shown.output
     assert "lines, 400 joints of each change" in shown.stderr
@@ -493,7 +493,7 @@ def test_a_joint_that_fails_at_one_point_has_no_worst_load(tmp_path, monkeypatch
 @pytest.mark.slow
 def test_command_and_page_name_the_point(tmp_path, monkeypatch):
     path = written(tmp_path, OWN)
-    monkeypatch.setattr(runner, "available_workers", lambda: 1)
+    monkeypatch.setattr(runner, "available_cores", lambda: 1)
     shown = CliRunner().invoke(app, ["causes", str(path), "--run", "--budget", "1 min", "--top", "2"])
     assert shown.exit_code == 0, shown.output
     assert "joints to simulate at start, " in shown.stderr

@@ -34,7 +34,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     noted: dict[str, Callable[[Options], None]] = {name: partial(note, name) for name in compilation.KERNELS}
     monkeypatch.setattr(subprocess, "Popen", Process)
     monkeypatch.setattr(compilation, "missing", compilation.kernels)
-    monkeypatch.setattr(compilation, "_cores", lambda: 2)
+    monkeypatch.setattr(compilation, "available_cores", lambda: 2)
     monkeypatch.setattr(compilation, "KERNELS", noted)
     return called
 
@@ -49,7 +49,7 @@ def test_every_other_kernel_is_compiled_in_a_second_process(calls: list[str]) ->
 
 
 def test_one_core_compiles_alone(calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compilation, "_cores", lambda: 1)
+    monkeypatch.setattr(compilation, "available_cores", lambda: 1)
     compilation.warm_up(Options(max_refinements=0))
     assert "wait" not in calls
     assert set(calls) == set(compilation.KERNELS) - {"explicit.explicit", "explicit.count_steps"}

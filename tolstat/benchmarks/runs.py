@@ -17,8 +17,9 @@ import numpy as np
 from tolstat.benchmarks.integrators import Integrator, Outcome, solve
 from tolstat.benchmarks.joints import Params
 from tolstat.benchmarks.timing import in_turn
-from tolstat.campaign.executors import Lost, Work, available_workers, map_in_processes
+from tolstat.campaign.executors import Lost, Work, map_in_processes
 from tolstat.common import loads
+from tolstat.common.cores import available_cores
 from tolstat.common.tables import SIMULATED, Options, Status
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.reference import FirstOrder, Largest, first_order, reference_rows
@@ -172,7 +173,7 @@ def run(jobs: Sequence[Job], say: Callable[[str], None]) -> list[Run]:
     prepare(first_order(truth.params, truth.options, from_start=True))
     places = {job.contender: place for place, job in enumerate(jobs)}
     runs: list[Run] = []
-    with closing(map_in_processes(Work(_work), jobs, available_workers())) as finished:
+    with closing(map_in_processes(Work(_work), jobs, available_cores())) as finished:
         for done, (job, found) in enumerate(finished, 1):
             if isinstance(found, Lost):
                 say(f"{job.contender} on joint {job.joint}: {found.reason}")

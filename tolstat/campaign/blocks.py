@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign import executors
 from tolstat.campaign.executors import Lost
+from tolstat.common.cores import available_cores
 from tolstat.common.solver_options import from_names
 from tolstat.common.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
 from tolstat.store import Reader
@@ -194,7 +195,7 @@ def simulate_pending(
         When worker processes die whichever block they work on.
     """
     todo = sum(len(slots) for _, slots in pending(store, stop_slot))
-    workers = execution.workers or executors.available_workers()
+    workers = execution.workers or available_cores()
     size = execution.block or default_block(todo, workers)
     if not todo:
         return

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, quantile
 from tolstat.campaign import verify
-from tolstat.campaign.executors import available_workers
 from tolstat.campaign.progress import Tell, kernels, silent
 from tolstat.campaign.run import choose_fidelity
+from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation, Status
 from tolstat.display import text
@@ -217,7 +217,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     -------
     Plan
     """
-    workers = workers or available_workers()
+    workers = workers or available_cores()
     stage(kernels())
     warm_up()
     stage("pilot")

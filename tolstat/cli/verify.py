@@ -55,16 +55,16 @@ def verify(
     """
     from tolstat.analysis.accuracy import LEAST_NEAR
     from tolstat.campaign import verify as verification
-    from tolstat.campaign.executors import available_workers
     from tolstat.campaign.near import check_near
     from tolstat.campaign.verify import QUICK_CHECKS
+    from tolstat.common.cores import available_cores
     from tolstat.common.files import check_target
     from tolstat.questions.accuracy import query, rendering
 
     if out is not None:
         check_target(out, what)
     with progress("checks, then tight references") as shown:
-        count = workers or available_workers()
+        count = workers or available_cores()
         if near is None:
             found = verification.check(what, joints or 24, seed, announce_compilation, count, progress=shown)
         else:

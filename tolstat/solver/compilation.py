@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.cores import available_cores
 from tolstat.common.tables import PARAM, RESULT, Options
 from tolstat.solver import rainflow, refinement, simulation
 
@@ -101,7 +101,7 @@ def compile_kernels(names: list[str], options: Options) -> None:
 @contextmanager
 def _compiling(names: list[str], options: Options) -> Iterator[None]:
     """Compile kernels into the cache in another process; what fails there is compiled when it is called."""
-    if not names or _cores() < 2:
+    if not names or available_cores() < 2:
         yield
         return
     said = f"from {__name__} import *; compile_kernels({names!r}, Options{tuple(options)!r})"
@@ -113,7 +113,3 @@ def _compiling(names: list[str], options: Options) -> Iterator[None]:
     finally:
         other.kill()
         other.wait()
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

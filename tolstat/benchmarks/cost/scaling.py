@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.benchmarks.cost.rates import Sample
-from tolstat.campaign.executors import Lost, Work, available_workers, map_in_processes
+from tolstat.campaign.executors import Lost, Work, map_in_processes
+from tolstat.common.cores import available_cores
 from tolstat.common.tables import Options
 from tolstat.solver import compilation, simulation
 
@@ -87,7 +88,7 @@ def measure(these: Sample, quick: bool, workers: Sequence[int] | None = None) ->
     """
     block = np.resize(these.params, QUICK_BLOCK if quick else BLOCK)
     blocks = QUICK_BLOCKS if quick else BLOCKS
-    stints = {n: _run([block] * (blocks * n), these.options, n) for n in workers or counts(available_workers())}
+    stints = {n: _run([block] * (blocks * n), these.options, n) for n in workers or counts(available_cores())}
     return table(stints)
 
 

@@ -23,10 +23,10 @@ from tolstat.campaign.executors.common import (
     ResultT,
     Work,
     WorkerDied,
-    available_workers,
     never_stop,
 )
 from tolstat.campaign.executors.processes import map_in_processes, one_thread_each, signals_blocked
+from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def map_on_cluster(
         yield from cluster.run(stop)
     pieces = [piece for block in cluster.suspects for piece in work.split(block)]
     if pieces:
-        yield from map_in_processes(work, pieces, min(len(pieces), available_workers()), stop)
+        yield from map_in_processes(work, pieces, min(len(pieces), available_cores()), stop)
 
 
 class _Cluster:

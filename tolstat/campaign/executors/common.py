@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Literal, NamedTuple, TypeVar
@@ -81,13 +80,6 @@ class Work(Generic[BlockT, ResultT]):
     size: Callable[[BlockT], int] = of_one
     prepare: Callable[[], object] = no_preparation
     limit_s: float | None = None
-
-
-def available_workers() -> int:
-    """Return the number of processor cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def never_stop() -> bool:

@@ -45,13 +45,13 @@ def coverage(
     Example: tolstat bench coverage --only band --seeds 200
     """
     from tolstat.benchmarks.coverage import page, run
-    from tolstat.campaign.executors.common import available_workers
+    from tolstat.common.cores import available_cores
     from tolstat.display import marks
 
     if into is not None:
         marks.split(into, MARK)
     number = seeds if seeds is not None else run.QUICK if quick else run.FULL
-    found = run.measure(number, only, available_workers() if workers is None else workers, say)
+    found = run.measure(number, only, available_cores() if workers is None else workers, say)
     typer.echo(as_text({"cases": found.plain()}) if as_json else page.text(found, every))
     if into is not None:
         marks.insert(into, MARK, page.markdown(found))

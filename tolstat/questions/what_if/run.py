@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tolstat.campaign import what_if as sets
-from tolstat.campaign.executors import available_workers
 from tolstat.campaign.progress import clock, silent
 from tolstat.campaign.verify import no_progress
 from tolstat.campaign.what_if import Asked, Wanted
+from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ALL_LIMITS, split
 from tolstat.questions.what_if import query
@@ -116,7 +116,7 @@ def simulate(
     StoreError
         When the file cannot be used, or was made by other code.
     """
-    workers = workers or available_workers()
+    workers = workers or available_cores()
     with ResultStore.open_to_write(path) as store:
         view = store.view()
         load = _checked(view, by)

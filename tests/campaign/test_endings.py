@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -22,8 +23,8 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.campaign.executors import Lost, Work, kept_workers, map_in_processes
 from tolstat.common import progress_memory
-from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import Reader
+from tolstat.common.tables import Fidelity, Options, Simulation, Status
+from tolstat.store import Reader, verification
 
 LIMIT_S = 0.05
 
@@ -39,6 +40,24 @@ def simulate_slowly(
 ) -> Simulation:
     """Simulate joints that take processor time, `seconds` each, without progress."""
     burn(seconds * len(params))
+    return fakes.simulate(params, options, histories, n_harmonics)
+
+
+def simulate_checks_badly(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+    """Simulate; joints with finer steps kill their process, and those with a tighter tolerance take for ever."""
+    if options.steps_per_rev > Options().steps_per_rev:
+        os.kill(os.getpid(), signal.SIGKILL)
+    while options.newton_tol < Options().newton_tol:
+        pass
+    return fakes.simulate(params, options, histories, n_harmonics)
+
+
+def simulate_pilot_badly(
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, kills: float
+) -> Simulation:
+    """Simulate; one joint kills its process with few quasi-static steps."""
+    if kills in params["R"] and options.fidelity == Fidelity.QUASISTATIC and options.steps_per_rev < 90:
+        os.kill(os.getpid(), signal.SIGKILL)
     return fakes.simulate(params, options, histories, n_harmonics)
 
 
@@ -96,6 +115,30 @@ def test_a_joint_that_hangs_in_a_campaign_of_one_block_is_given_up_alone(tmp_pat
         first, *others = store.status()
     assert others == [Status.CRASHED, Status.TIMEOUT]
     assert first in (Status.OK, Status.NOT_SETTLED, Status.NEWTON_FAILED)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("supervised")
+def test_joints_that_kill_or_hang_in_the_check_of_a_run_do_not_end_it(tmp_path: Path) -> None:
+    study, path = fakes.Study(n=3, solver=fakes.Solver(Options().steps_per_rev)), tmp_path / "a.h5"
+    execution = Execution(workers=1, block=3, joint_timeout=LIMIT_S)
+    assert campaign.run(study, path, stages=fakes.stages(simulate_checks_badly), execution=execution).done == 3
+    with Reader.open(path) as store:
+        found = verification.read(store)
+    assert found is not None
+    status = {name: check.results["status"].tolist() for name, check in found.checks.items()}
+    assert status == {"half_step": [Status.CRASHED], "newton": [Status.TIMEOUT], "settling": [Status.OK]}
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("supervised")
+def test_a_joint_that_kills_in_the_pilot_of_a_fidelity_is_no_joint_of_the_others() -> None:
+    study = fakes.Study(n=3)
+    kills = fakes.draw(study)["pin1.offset_t"][1]
+    stages = fakes.stages(partial(simulate_pilot_badly, kills=kills))
+    record = campaign.choose_fidelity(study, stages, Execution(workers=1))
+    differing = {(rung["fidelity"], rung["steps_per_rev"]): rung["differing"] for rung in record["table"]}
+    assert [rung for rung, joints in differing.items() if joints] == [("quasistatic", 36), ("quasistatic", 60)]
 
 
 def test_blocks_that_take_as_long_as_their_joints_may_are_no_timeouts() -> None:

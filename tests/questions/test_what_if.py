@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+from functools import partial
 
 import h5py
 import numpy as np
@@ -12,9 +15,10 @@ from matplotlib.markers import CARETLEFT
 from typer.testing import CliRunner
 
 import tolstat
-from tests.support import synthetic
+from tests.support import fakes, synthetic
 from tolstat import sampling, study
 from tolstat.campaign import what_if as sets
+from tolstat.campaign.executors import kept_workers
 from tolstat.campaign.extend import extend, merge
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
@@ -251,6 +255,28 @@ def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, tmp_path, monk
             expected[name].loads.tobytes(),
             expected[name].status.tobytes(),
         )
+
+
+def killing(params, options, tilt, **given):
+    """Stand in for the solver; a joint with this tilt kills its process."""
+    if tilt in params["pin_axis"][:, 0, 2]:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return stand_in(params, options)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick", "supervised")
+def test_a_joint_that_kills_its_process_has_no_results(tmp_path, monkeypatch):
+    path, plan = made(tmp_path), loaded(tmp_path, TEXT)
+    params = perturb(plan.joint, plan.operation, sets.as_drawn(plan).draw(range(4)))
+    monkeypatch.setattr(sets, "simulate_rows", partial(killing, tilt=params["pin_axis"][2, 0, 2]))
+    monkeypatch.setattr(sets, "warm_up", fakes.warm_up)
+    with ResultStore.open_to_write(path) as store, kept_workers():
+        options, wanted = sets.options_of(plan, store), [sets.Wanted(sets.as_drawn(plan), range(4))]
+        assert 0 < sets.seconds_per_joint(plan, options, 4, [""]) < 1
+        asked = sets.Asked(["cross1.F"], [""])
+        held = sets.simulate(plan, store, wanted, asked, 1, lambda: False, lambda counts: None)
+    assert [one.status.tolist() for one in held.values()] == [[Status.OK, Status.OK, Status.CRASHED, Status.OK]]
 
 
 @pytest.mark.usefixtures("quick")

@@ -130,6 +130,11 @@ class Study:
         return self.sampling.first_sample
 
     @property
+    def asked(self) -> tuple[str, ...]:
+        """Loads that limits ask for."""
+        return tuple(self.limits)
+
+    @property
     def rows(self) -> int:
         """Number of rows of every table."""
         return self.n

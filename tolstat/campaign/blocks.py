@@ -100,12 +100,27 @@ class Execution:
 
 
 class Block(NamedTuple):
-    """File slots that are simulated together at an operating point, their parameters and their solver options."""
+    """Joints that are simulated together.
+
+    Attributes
+    ----------
+    point : str
+        Operating point.
+    slots : ndarray of int, shape (m,)
+        Their file slots.
+    params : ndarray of PARAM, shape (m,)
+        Their parameters.
+    options : Options
+        Their solver options.
+    histories : bool
+        Whether to keep the load histories that the study asks for, or none.
+    """
 
     point: str
     slots: NDArray[np.intp]
     params: NDArray[np.void]
     options: Options
+    histories: bool = True
 
     def split(self) -> list[Block]:
         """Split into halves; a block of one joint is its only piece."""
@@ -123,6 +138,10 @@ class Timed(NamedTuple):
 
     simulation: Simulation
     seconds: float
+
+
+BlockWork = executors.Work[Block, Timed | Lost]
+"""How a worker simulates a block."""
 
 
 class Pace:
@@ -182,10 +201,27 @@ def pending(store: Reader, stop_slot: int) -> Iterator[tuple[Reader, NDArray[np.
                 yield one, slots
 
 
+def work_of(study: Study, store: Reader, stages: Stages, execution: Execution) -> BlockWork:
+    """Return how a worker simulates the blocks of a campaign."""
+    return executors.Work(
+        partial(simulate_block, stages.simulate, study.output.histories, study.output.harmonics, store.history_specs),
+        Block.split,
+        Block.size,
+        partial(prepare, stages.warm_up, settings_in_use(study, store)),
+        execution.joint_timeout,
+    )
+
+
 def simulate_pending(
-    study: Study, store: Reader, stop_slot: int, stages: Stages, execution: Execution, stop: Callable[[], bool]
+    study: Study,
+    store: Reader,
+    stop_slot: int,
+    work: BlockWork,
+    perturb: Callable[..., NDArray[np.void]],
+    execution: Execution,
+    stop: Callable[[], bool],
 ) -> Generator[Finished, None, None]:
-    """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true.
+    """Simulate the joints in the pending file slots below `stop_slot` as `work_of` says, until `stop` returns true.
 
     Close the generator (`contextlib.closing`) when leaving it early.
 
@@ -201,14 +237,7 @@ def simulate_pending(
         return
     kind = execution.kind or default_kind(workers, -(-todo // size))
     pace = Pace(todo, workers, execution.block)
-    blocks = _blocks(study, store, stop_slot, pace, stages.perturb)
-    work: executors.Work[Block, Timed | Lost] = executors.Work(
-        partial(_simulate, stages.simulate, study.output.histories, study.output.harmonics, store.history_specs),
-        Block.split,
-        Block.size,
-        partial(prepare, stages.warm_up, settings_in_use(study, store)),
-        execution.joint_timeout,
-    )
+    blocks = _blocks(study, store, stop_slot, pace, perturb)
     results: Generator[tuple[Block, Timed | Lost], None, None]
     if kind == "serial":
         results = executors.map_serially(work, blocks, stop)
@@ -221,14 +250,18 @@ def simulate_pending(
     with closing(results):
         for block, result in results:
             if isinstance(result, Lost):
-                status = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
-                blank = without_simulation(len(block.slots), status, store.history_specs)
+                blank = without_simulation(len(block.slots), status_of(result), store.history_specs)
                 yield Finished(block.point, block.slots, blank, result.reason)
             else:
                 begin = time.perf_counter()
                 # the caller writes the block to the file before it asks for the next one
                 yield Finished(block.point, block.slots, result.simulation, "")
                 pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
+
+
+def status_of(lost: Lost) -> Status:
+    """Return the status of joints that were given up."""
+    return Status.TIMEOUT if lost.kind == "timeout" else Status.CRASHED
 
 
 def default_kind(workers: int, blocks: int) -> Literal["processes", "serial"]:
@@ -291,7 +324,7 @@ def _finite(params: NDArray[np.void]) -> NDArray[np.bool_]:
     return good
 
 
-def _simulate(
+def simulate_block(
     simulate: Callable[..., Simulation],
     histories: str,
     n_harmonics: int,
@@ -300,7 +333,8 @@ def _simulate(
 ) -> Timed:
     """Simulate a block and measure the time that it takes."""
     begin = time.perf_counter()
-    simulation = simulate_finite(simulate, histories, n_harmonics, specs, block)
+    kept = (histories, n_harmonics, specs) if block.histories else ("none", 0, {})
+    simulation = simulate_finite(simulate, *kept, block)
     return Timed(simulation, time.perf_counter() - begin)
 
 

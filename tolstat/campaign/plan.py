@@ -295,7 +295,7 @@ def _check(study: Study, params: NDArray[np.void], simulation: Simulation, optio
     if not settled.size:
         return 0.0
     begin = time.process_time()
-    verify.run_checks(params[settled], [options[i] for i in settled.tolist()], verify.QUICK_CHECKS)
+    verify.run_checks(params[settled], [options[i] for i in settled.tolist()], verify.QUICK_CHECKS, simulate_rows)
     return time.process_time() - begin
 
 

@@ -14,11 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import signals, verify
-from tolstat.campaign.blocks import Execution, Finished, Stages, pending, prepare, settings_in_use, simulate_pending
-from tolstat.campaign.executors import WorkerDied
+from tolstat.campaign.blocks import (
+    Execution,
+    Finished,
+    Stages,
+    pending,
+    prepare,
+    settings_in_use,
+    simulate_pending,
+    work_of,
+)
+from tolstat.campaign.executors import WorkerDied, kept_workers
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
 from tolstat.campaign.retry import Retry, begin
+from tolstat.campaign.supervised import Supervised, supervised
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
 from tolstat.solver import fidelity, rainflow
@@ -122,7 +132,11 @@ def run(
     stages = stages or _own_stages()
     path = Path(out)
     stage("drawing the errors" if not path.exists() else "opening the file")
-    with signals.caught() as stop, _create_or_resume(study, path, stages, rows, tell) as store:
+    with (
+        signals.caught() as stop,
+        _create_or_resume(study, path, stages, rows, execution, tell) as store,
+        kept_workers(),
+    ):
         if retry:
             retry = retry.chosen(store.fidelity)
             begin(store, retry, stages.history_specs(retry.options, *_history_options(study)), tell)
@@ -134,13 +148,15 @@ def run(
                 prepare(stages.warm_up, settings_in_use(study, store))
                 store.begin_session(counts.done)
             stage(JOINTS)
-            finished = simulate_pending(study, store, last, stages, execution, stop)
+            work = work_of(study, store, stages, execution)
+            finished = simulate_pending(study, store, last, work, stages.perturb, execution, stop)
             with stop.deferred(), closing(finished):
                 counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
                 stage("check of the numerical error")
+                again = Supervised(work, stages.warm_up, execution.kind)
                 for one in store.each():
-                    verify.check_few(one, partial(_rows_of, study.at(one.point or ""), one, stages), stages.simulate)
+                    verify.check_few(one, partial(_rows_of, study.at(one.point or ""), one, stages), again)
             store.finish()
             store.end_session()
         except KeyboardInterrupt:
@@ -189,12 +205,12 @@ def _own_stages() -> Stages:
 
 
 def _create_or_resume(
-    study: Study, path: Path, stages: Stages, rows: range | None, tell: Callable[[str], None]
+    study: Study, path: Path, stages: Stages, rows: range | None, execution: Execution, tell: Callable[[str], None]
 ) -> ResultStore:
     rows = range(study.rows) if rows is None else rows
     _check_part(rows, study.rows)
     if not path.exists():
-        choice = choose_fidelity(study, stages) if study.solver.fidelity == "auto" else {}
+        choice = choose_fidelity(study, stages, execution) if study.solver.fidelity == "auto" else {}
         if choice:
             tell(fidelity.describe(choice))
         options = settings(study.solver, choice)
@@ -225,8 +241,8 @@ def _rows_of(study: Study, store: Reader, stages: Stages, rows: NDArray[np.intp]
     return perturbed(study, store.row(rows), errors, stages.perturb)
 
 
-def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any]:
-    """Choose the fidelity of a new campaign from a pilot of its joints.
+def choose_fidelity(study: Study, stages: Stages | None = None, execution: Execution | None = None) -> dict[str, Any]:
+    """Choose the fidelity of a new campaign from a pilot of its joints, simulated as in the campaign.
 
     Returns
     -------
@@ -234,14 +250,16 @@ def choose_fidelity(study: Study, stages: Stages | None = None) -> dict[str, Any
         The record of the choice, see `fidelity.Choice`.
     """
     stages = stages or _own_stages()
-    stages.warm_up(study.solver.options())
+    options = study.solver.options()
+    stages.warm_up(options)
     rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
     errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
     each = [perturbed(study.at(point.name), rows, errors, stages.perturb) for point in study.points]
     params = np.concatenate(each)  # one choice for all points
-    simulate = partial(stages.simulate, histories="none", n_harmonics=0)
+    simulate = supervised(stages.simulate, stages.warm_up, [options], execution or Execution())
     budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
-    return fidelity.choose(params, study.solver.options(), budget, study.asked, simulate, min_steps).record
+    with kept_workers():
+        return fidelity.choose(params, options, budget, study.asked, simulate, min_steps).record
 
 
 def _min_steps(histories: str, n_harmonics: int) -> int:

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.campaign.executors import Lost, Work, map_in_processes, map_serially
+from tolstat.campaign import blocks
+from tolstat.campaign.blocks import Execution
+from tolstat.campaign.executors import Lost, Work, kept_workers, map_in_processes, map_serially
+from tolstat.campaign.supervised import supervised
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.solver_options import to_names
@@ -100,7 +103,7 @@ def run_checks(
     names : iterable of str
         Names from `ALL_CHECKS`; ``fidelity`` is added if a joint is below dynamic fidelity.
     simulate : callable, optional
-        Replaces `simulation.simulate_rows`.
+        Replaces `simulation.simulate_rows` in supervised processes.
     workers : int
         Processes that compute the references, seconds each; their number changes results within the tolerance only.
     progress : callable
@@ -112,13 +115,14 @@ def run_checks(
     """
     lower = any(own.fidelity != Fidelity.DYNAMIC for own in options)
     checks = {}
-    for name in (*names, *(("fidelity",) if lower else ())):
-        own = [options_of_check(one, name) for one in options]
-        if name == "reference":
-            results = _references(params, own, workers, progress)
-        else:
-            results = solve_by_options(partial(_plain, simulate), params, own)
-        checks[name] = Check(DESCRIPTION[name], to_names(own[0]), results)
+    with kept_workers():
+        for name in (*names, *(("fidelity",) if lower else ())):
+            own = [options_of_check(one, name) for one in options]
+            if name == "reference":
+                results = _references(params, own, workers, progress)
+            else:
+                results = solve_by_options(partial(_plain, simulate), params, own)
+            checks[name] = Check(DESCRIPTION[name], to_names(own[0]), results)
     return checks
 
 
@@ -130,12 +134,13 @@ def _references(
     params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
 ) -> NDArray[np.void]:
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
-    blocks: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
+    joints: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
     work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
     done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
-    workers = min(workers, len(blocks))
-    done = map_in_processes(work, blocks, workers) if workers > 1 else map_serially(work, blocks)
-    results, counts = without_results(len(blocks), Status.CRASHED), Counts(len(blocks), 0, 0, 0)
+    workers = min(workers, len(joints))
+    serial = blocks.default_kind(workers, len(joints)) == "serial"
+    done = map_serially(work, joints) if serial else map_in_processes(work, joints, workers)
+    results, counts = without_results(len(joints), Status.CRASHED), Counts(len(joints), 0, 0, 0)
     progress(counts)
     with closing(done):
         for (i, _, _), result in done:
@@ -154,9 +159,11 @@ def _reference(joint: Single) -> NDArray[np.void]:
 
 
 def _plain(simulate: Simulate | None, params: NDArray[np.void], options: Options) -> NDArray[np.void]:
+    from tolstat.solver.compilation import warm_up
     from tolstat.solver.simulation import simulate_rows
 
-    return (simulate or simulate_rows)(params, options, histories="none", n_harmonics=0).results
+    simulate = simulate or supervised(simulate_rows, warm_up, [Options()], Execution())
+    return simulate(params, options, histories="none", n_harmonics=0).results
 
 
 def solve_by_options(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.campaign.blocks import JOINT_TIMEOUT_S, Block, simulate_finite
-from tolstat.campaign.executors import Lost, Work, map_in_processes, map_serially
+from tolstat.campaign import blocks, supervised
+from tolstat.campaign.blocks import JOINT_TIMEOUT_S, Block, BlockWork, Execution, Timed
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status
 from tolstat.joint import perturb
@@ -120,12 +120,10 @@ def options_of(study: Study, store: ResultStore) -> Options:
 
 def seconds_per_joint(study: Study, options: Options, joints: int, points: Sequence[str]) -> float:
     """Time of a joint at all these points in one process, s, from the first samples; kernels must be ready."""
-    errors = as_drawn(study).draw(range(joints))
-    params = [perturb(study.joint, study.at(point).operation, errors) for point in points]
-    begin = time.perf_counter()
-    for own in params:
-        simulate_rows(own, options)
-    return (time.perf_counter() - begin) / joints
+    pilot = list(_blocks(study, options, [(as_drawn(study), range(joints))], points))
+    with closing(supervised.map_blocks(_work(), pilot, 1, blocks.default_kind(1, len(pilot)))) as done:
+        spent = sum(result.seconds for _, result in done if isinstance(result, Timed))
+    return (spent or JOINT_TIMEOUT_S * joints) / joints
 
 
 def simulate(
@@ -165,17 +163,15 @@ def simulate(
     names = asked.names(study)
     todo = [(one.change, numbers) for one in wanted if (numbers := missing(held, one, names))]
     table = _Table(todo, asked, names)
-    work: Work[Block, NDArray[np.void] | Lost] = Work(_solve, Block.split, Block.size, warm_up, JOINT_TIMEOUT_S)
-    blocks = _blocks(study, options_of(study, store), todo, asked.points)
-    done: Generator[tuple[Block, NDArray[np.void] | Lost], None, None]
-    parallel = workers > 1 and table.status.size > BLOCK
-    done = map_in_processes(work, blocks, workers, stop) if parallel else map_serially(work, blocks, stop)
+    every = _blocks(study, options_of(study, store), todo, asked.points)
+    kind = blocks.default_kind(workers, -(-table.status.size // BLOCK))
+    done = supervised.map_blocks(_work(), every, workers, kind, stop)
     counts, saved = Counts(table.status.size, 0, 0, 0), time.monotonic()
     progress(counts)
     try:
         with closing(done):
             for block, result in done:
-                counts = counts.after(table.put(block, result))
+                counts = counts.after(table.put(block, supervised.results_of(block, result)))
                 progress(counts)
                 if time.monotonic() - saved > SAVE_S:
                     what_if.write(store, table.sets(held))
@@ -196,14 +192,11 @@ class _Table:
         self.loads = np.full((n, len(asked.points), len(asked.loads)), np.nan)
         self.status = np.full((n, len(asked.points)), Status.PENDING, np.uint8)
 
-    def put(self, block: Block, result: NDArray[np.void] | Lost) -> NDArray[np.uint8]:
+    def put(self, block: Block, results: NDArray[np.void]) -> NDArray[np.uint8]:
         own = block.slots, self.asked.points.index(block.point)
-        if isinstance(result, Lost):
-            self.status[own] = Status.TIMEOUT if result.kind == "timeout" else Status.CRASHED
-        else:
-            loads = np.column_stack([LOADS[name].of(result) for name in self.asked.loads])
-            self.loads[own] = np.where(np.isin(result["status"], VALID)[:, None], loads, np.nan)
-            self.status[own] = result["status"]
+        loads = np.column_stack([LOADS[name].of(results) for name in self.asked.loads])
+        self.loads[own] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
+        self.status[own] = results["status"]
         return np.asarray(self.status[own])
 
     def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
@@ -242,8 +235,8 @@ def _blocks(
         begin += len(numbers)
 
 
-def _solve(block: Block) -> NDArray[np.void]:
-    return simulate_finite(simulate_rows, "none", 0, {}, block).results
+def _work() -> BlockWork:
+    return supervised.supervised(simulate_rows, warm_up, [Options()], Execution()).work
 
 
 def _draw(study: Study, numbers: range) -> NDArray[np.void]:

@@ -139,13 +139,19 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
 
 def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
     try:
-        rows = list(csv.DictReader(StringIO(read_input(path, "utf-8-sig"))))
+        rows = list(csv.DictReader(StringIO(read_input(path, "utf-8-sig")), restval=""))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError([Fault(str(path), f"cannot be read: {error}", "give a TOML or CSV file")]) from error
     if not rows or "tolerance" not in rows[0]:
         raise InputError(
             [Fault(str(path), "has no column tolerance", "write the header line: tolerance,cost,fixed,at,power")]
         )
+    if faults := [
+        Fault(f"{path}: row {number}", "has more cells than the header line", "write decimals with a point: 0.5")
+        for number, row in enumerate(rows, start=2)
+        if None in row
+    ]:
+        raise InputError(faults)
     return {row.pop("tolerance"): {key: _value(cell) for key, cell in row.items() if cell} for row in rows}
 
 

@@ -1,14 +1,15 @@
 """Executor on a Dask cluster; blocks that its workers do not survive are repeated in supervised processes here.
 
-The scheduler reassigns the blocks of a lost worker. A block that kills several workers, or raises, is not submitted
-again: at the end its pieces are processed on this machine, which shows which of them crash or hang.
+The scheduler reassigns the blocks of a lost worker. A worker that hangs is killed by its `guard`. A block that kills
+several workers, or raises, is not submitted again: at the end its pieces are processed on this machine, which shows
+which of them crash or hang. If blocks fail before any has succeeded, a worker must get ready without one: if it does,
+the fault is in the blocks.
 """
 
 from __future__ import annotations
 
 import os
 import queue
-import signal
 import tempfile
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
@@ -25,6 +26,7 @@ from tolstat.campaign.executors.common import (
     WorkerDied,
     never_stop,
 )
+from tolstat.campaign.executors.guard import Guard
 from tolstat.campaign.executors.processes import map_in_processes, one_thread_each, signals_blocked
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError
@@ -39,7 +41,9 @@ CONNECT_S = 15.0
 FETCH_S = 60.0
 """Time limit for fetching a result, s."""
 MAX_FAILURES = 3
-"""Number of failed blocks, before any has succeeded, at which the cluster is given up."""
+"""Number of failed blocks, before any has succeeded, at which a worker must show that it can get ready."""
+READINESS = "readiness"
+"""Takes the place of a block when a worker only has to get ready."""
 LOOPBACK = "127.0.0.1"
 """Address of a cluster on this machine: Dask runs what it is sent, so nothing listens to other machines."""
 
@@ -64,7 +68,7 @@ def map_on_cluster(
     Parameters
     ----------
     work : Work
-        Function to apply, and how. A worker that exceeds the time limit is killed.
+        Function to apply, and how.
     blocks : iterable
         Blocks; consumed only as they are needed.
     scheduler : str, optional
@@ -86,7 +90,7 @@ def map_on_cluster(
     InputError
         When Dask is not installed, the scheduler does not answer, or a worker's fingerprint differs.
     WorkerDied
-        When the scheduler is lost or has no workers, every block fails, or every remaining piece kills its process.
+        When the scheduler is lost or has no workers, or its workers cannot get ready; otherwise as `map_in_processes`.
     """
     with _client(scheduler, workers) as client:
         _check_fingerprints(client, fingerprint)
@@ -109,7 +113,7 @@ class _Cluster:
         self.running: dict[Future, Any] = {}
         self.ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self.suspects: list[Any] = []
-        self.succeeded = False
+        self.proven = self.asked = False
 
     def run(self, stop: Callable[[], bool]) -> Iterator[tuple[Any, Any]]:
         more = True
@@ -135,9 +139,12 @@ class _Cluster:
             block = next(self.blocks, None)
             if block is None:
                 return False
-            future = self.client.submit(process_block, self.work, self.fingerprint, self.expected, block, pure=False)
-            self._watch(future, block)
+            self._submit(process_block, block)
         return True
+
+    def _submit(self, function: Callable[..., Any], block: Any) -> None:
+        future = self.client.submit(function, self.work, self.fingerprint, self.expected, block, pure=False)
+        self._watch(future, block)
 
     def _watch(self, future: Future, block: Any) -> None:
         self.running[future] = block
@@ -155,31 +162,47 @@ class _Cluster:
         except InputError:
             raise
         except Exception as error:  # workers died on the block or with its result, or it raised this
+            if block is READINESS:
+                found = f"the first {len(self.suspects)} blocks failed on the Dask cluster, and no worker gets ready"
+                raise WorkerDied(f"{found}: {error!r}\n  hint: read the logs of its workers") from error
             self.suspects.append(block)
-            if not self.succeeded and len(self.suspects) >= MAX_FAILURES:
-                found = f"the first {len(self.suspects)} blocks failed on the Dask cluster: {error!r}"
-                raise WorkerDied(f"{found}\n  hint: read the logs of its workers") from error
+            if not (self.proven or self.asked) and len(self.suspects) >= MAX_FAILURES:
+                self.asked = True
+                self._submit(make_ready, READINESS)
             return
-        self.succeeded = True
-        yield block, result
+        self.proven = True
+        if block is not READINESS:
+            yield block, result
 
 
 def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
     """Process a block in a worker, one block at a time."""
-    check(expected, _own(fingerprint), "a Dask worker")
-    with _ONE_AT_A_TIME:
-        _prepare(work.prepare)
-        _alarm(work.limit_s and work.limit_s * work.size(block))
+    with _ready(work, fingerprint, expected) as guard:
+        guard.begin(work.limit_s, work.size(block))
         try:
             return work.function(block)
         finally:
-            _alarm(None)
+            guard.end()
 
 
-def _alarm(seconds: float | None) -> None:
-    """Let the operating system kill this process after some processor time, s; None cancels the timer."""
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_PROF, seconds or 0.0)
+def make_ready(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], _: Any) -> None:
+    """Get a worker ready as for a block."""
+    with _ready(work, fingerprint, expected):
+        pass
+
+
+@contextmanager
+def _ready(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str]) -> Iterator[Guard]:
+    check(expected, _own(fingerprint), "a Dask worker")
+    with _ONE_AT_A_TIME:
+        guard = _guard()
+        _prepare(work.prepare)
+        yield guard
+
+
+@cache
+def _guard() -> Guard:
+    return Guard()
 
 
 @cache

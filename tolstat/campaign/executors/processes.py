@@ -8,9 +8,10 @@ time.
 
 A block whose worker died, hung or raised is halved, and its halves go next, down to single joints. One that fails twice
 alone is given up as `Lost`. If it hung, that is final: the time is processor time without progress, so that nothing but
-the joint can be the cause. If it crashed, the machine may be at fault (no memory left, a broken installation), and then
-all blocks fail. Therefore another block has to succeed first; if none is left, one that succeeded before is repeated as
-a control. Only a control that fails ends the map, or many crashes before anything has succeeded.
+the joint can be the cause. If it crashed, the machine may be at fault (no memory left, a broken installation). What
+tells is another block that succeeds; if none is left, one that succeeded before and is repeated as a control; and
+before any has succeeded, another worker that gets ready, which loads and calls the same code. The map ends early only
+if a control fails again and again, if workers cannot start, or if the function raises an exception for all blocks.
 
 Workers are spawned, because a forked child inherits locks of threads that it does not have.
 """
@@ -48,8 +49,8 @@ LOSSES_BEFORE_CONTROL = 3
 """Number of consecutive crashes after which a block that succeeded before is repeated, to test the workers."""
 MAX_FAILED_CONTROLS = 3
 """Number of times that a control may fail, one after the other."""
-MOST_UNPROVEN = 100
-"""Number of joints that may be given up because they crashed before any block has succeeded."""
+MOST_RAISED = 5
+"""Number of exceptions, beyond one a worker and before any block has succeeded, at which one is raised here."""
 MAX_FAILED_STARTS = 3
 """Number of consecutive workers ending before they are ready at which `WorkerDied` is raised."""
 START_LIMIT_S = 600.0
@@ -88,7 +89,7 @@ def map_in_processes(
     Raises
     ------
     WorkerDied
-        When workers cannot be started, or the machine is at fault.
+        When workers cannot be started, or die at a block that succeeded before.
     Exception
         The function's own, when it raised one for block after block and no block succeeded.
     """
@@ -153,7 +154,7 @@ class _Team(Generic[BlockT, ResultT]):
         self.given_up: list[tuple[BlockT, Lost]] = []
         self.doubtful: list[tuple[BlockT, Lost]] = []
         self.control: _Task[BlockT] | None = None
-        self.losses = self.failed_controls = self.failed_starts = 0
+        self.losses = self.raised = self.failed_controls = self.failed_starts = 0
 
     def run(self, stop: Callable[[], bool]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
         while True:
@@ -241,6 +242,8 @@ class _Team(Generic[BlockT, ResultT]):
         task, worker.task = worker.task, None
         if kind == READY:
             worker.ready, self.failed_starts = True, 0
+            if self.control is None:
+                yield from self._confirm()
         elif kind == RAISED and task is not None:
             self._handle_failure(task, Lost("crashed", f"{type(content).__name__}: {content}"), content)
         elif task is not None:
@@ -252,6 +255,10 @@ class _Team(Generic[BlockT, ResultT]):
             self.control = task._replace(control=True)
         if not task.control:
             yield task.block, result
+        yield from self._confirm()
+
+    def _confirm(self) -> Iterator[tuple[BlockT, Lost]]:
+        """Give up the joints that crashed: the machine works."""
         yield from self.doubtful
         self.doubtful.clear()
 
@@ -274,7 +281,8 @@ class _Team(Generic[BlockT, ResultT]):
                 raise error or WorkerDied(f"{found}; the last worker: {lost.reason}\n  {HINT}")
             return
         self.losses += lost.kind == "crashed"
-        if error is not None and self.control is None and self.losses >= 5 + self.size:
+        self.raised += error is not None
+        if error is not None and self.control is None and self.raised >= MOST_RAISED + self.size:
             raise error
         pieces = self.work.split(task.block)
         if len(pieces) > 1:
@@ -285,9 +293,6 @@ class _Team(Generic[BlockT, ResultT]):
             self.given_up.append((task.block, lost))
         else:
             self.doubtful.append((task.block, lost))
-            if self.control is None and len(self.doubtful) == MOST_UNPROVEN:
-                found = f"worker processes died at each of {MOST_UNPROVEN} joints, and no block was finished"
-                raise WorkerDied(f"{found}; the last worker: {lost.reason}\n  {HINT}")
 
 
 def _end_worker(worker: _Worker[Any]) -> None:

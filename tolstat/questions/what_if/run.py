@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tolstat.campaign import what_if as sets
+from tolstat.campaign.executors import kept_workers
 from tolstat.campaign.progress import clock, silent
 from tolstat.campaign.verify import no_progress
 from tolstat.campaign.what_if import Asked, Wanted
@@ -117,7 +118,7 @@ def simulate(
         When the file cannot be used, or was made by other code.
     """
     workers = workers or available_cores()
-    with ResultStore.open_to_write(path) as store:
+    with ResultStore.open_to_write(path) as store, kept_workers():
         view = store.view()
         load = _checked(view, by)
         lines = query.find_lines(view, each, list(groups))

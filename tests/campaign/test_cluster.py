@@ -14,15 +14,16 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 from tests.campaign.test_campaign import datasets
 from tests.support import fakes
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
-from tolstat.campaign.executors import Work
+from tolstat.campaign.executors import Work, WorkerDied
 from tolstat.common.errors import InputError
-from tolstat.common.tables import Status
+from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import Counts, Reader
 
 pytest.importorskip("distributed")
@@ -85,6 +86,33 @@ def test_a_cluster_of_this_machine_finds_bad_joints(tmp_path: Path) -> None:
     assert campaign.run(study, path, stages=bad, execution=execution).done == 40
     with Reader.open(path) as store:
         assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
+
+
+def test_the_first_blocks_that_fail_are_no_fault_of_the_cluster(tmp_path: Path) -> None:
+    """A worker gets ready without them, so that the cluster goes on; this machine shows which joints crash."""
+    study, path, bad = fakes.Study(n=12), tmp_path / "a.h5", [0, 4, 8]
+    stages = fakes.stages(partial(simulate_or_raise, bad=fakes.draw(study)["pin1.offset_t"][bad]))
+    campaign.run(study, path, stages=stages, check=False, execution=Execution("dask", workers=1, block=3))
+    with Reader.open(path) as store:
+        assert np.flatnonzero(store.status() == Status.CRASHED).tolist() == bad
+
+
+def simulate_or_raise(
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, bad: np.ndarray
+) -> Simulation:
+    if np.isin(params["R"], bad).any():
+        raise ZeroDivisionError("a bug of this joint")
+    return fakes.simulate(params, options, histories, n_harmonics)
+
+
+@pytest.mark.slow
+def test_a_cluster_whose_workers_cannot_get_ready_ends() -> None:
+    with pytest.raises(WorkerDied, match="blocks failed on the Dask cluster, and no worker gets ready"):
+        list(map_on_cluster(Work(abs, prepare=cannot), range(9), None, 1, dict))
+
+
+def cannot() -> None:
+    raise MemoryError
 
 
 def test_other_versions_are_refused() -> None:

@@ -14,7 +14,7 @@ from tolstat.common.columns import Column
 from tolstat.common.shown import shown
 from tolstat.store import metadata
 from tolstat.store.checks import DAMAGE_ERRORS
-from tolstat.store.integrity import are_sealed, seal_values
+from tolstat.store.integrity import seal_values, sealed_values
 from tolstat.store.new_file import create_table
 from tolstat.store.result_file import put_attributes, store_error, text
 
@@ -84,9 +84,10 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
 
 
 def _read(group: h5py.Group, store: Reader) -> tuple[NDArray[np.intp], dict[str, Check]]:
-    if not are_sealed(group):
+    values = sealed_values(group)
+    if not values:
         raise ValueError("its values do not match their checksum")
-    rows = np.asarray(group["rows"][:], np.intp)
+    rows = np.asarray(values["/rows"], np.intp)
     if rows.ndim != 1 or not len(rows) <= store.n:
         raise ValueError(f"its rows have the shape {rows.shape}")
     if np.any(np.diff(rows) <= 0) or not np.isin(rows[[0, -1]] if len(rows) else rows, store.rows).all():
@@ -96,10 +97,10 @@ def _read(group: h5py.Group, store: Reader) -> tuple[NDArray[np.intp], dict[str,
         table = np.empty(len(rows), tables.RESULT)
         selected_results.blank_others(table, store.columns)
         for c in store.columns:
-            held = group[check][c.name]
+            held = values[f"/{check}/{c.name}"]
             if held.shape != rows.shape or held.dtype != np.dtype(c.dtype):
-                raise ValueError(f"{held.name} is {held.shape} of {held.dtype}")
-            c.of(table)[:] = held[:]
+                raise ValueError(f"{check}/{c.name} is {held.shape} of {held.dtype}")
+            c.of(table)[:] = held
         if table["status"].size and table["status"].max() > max(tables.Status):
             raise ValueError(f"{check} has an unknown status")
         options = metadata.read(group[check], "options", {})

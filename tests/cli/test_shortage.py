@@ -7,12 +7,14 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
+from tests.support import corruption, synthetic
 from tests.support.environment import ROOT, environment
 from tolstat import cli
 from tolstat.common.errors import InputError
@@ -102,3 +104,32 @@ def test_a_page_that_does_not_fit_the_disk_leaves_the_old_one(tmp_path: Path, mo
         html.write(SimpleNamespace(), tmp_path / "page.html")
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
     assert (tmp_path / "page.html").read_bytes() == b"the old one"
+
+
+@pytest.mark.slow
+def test_a_full_disk_ends_in_one_message_and_leaves_no_half_file(tmp_path: Path) -> None:
+    """No file may become longer than 20 kB: the system refuses what lies beyond, as on a full disk."""
+    path = synthetic.store(tmp_path)
+    names, content = sorted(tmp_path.iterdir()), path.read_bytes()
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for words in (
+        ["export", path, "--csv", "new.csv"],
+        ["export", path, "--xlsx", "new.xlsx"],
+        ["merge", path, "--out", "new.h5"],
+        ["report", path, "--out", "new.html"],
+    ):
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+                ended = corruption.call([*words[:-1], tmp_path / str(words[-1]), "--quiet"], Path(folder))
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+        assert (ended.code, ended.err.splitlines()) == (
+            2,
+            [
+                f"error: {tmp_path / str(words[-1])}: cannot be written: File too large",
+                "  hint: check that the folder is writable and the disk has space",
+            ],
+        )
+        assert sorted(tmp_path.iterdir()) == names
+        assert path.read_bytes() == content

@@ -147,6 +147,10 @@ def atomic_write(path: Path, overwrite: bool = True) -> Iterator[Path]:
         else:
             _rename_new(temporary, path)
         sync(path.parent)
+    except OSError as error:
+        if error.errno is not None and error.filename in (None, str(temporary)):
+            error.filename = str(path)  # a full disk gives no name, others the temporary one
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

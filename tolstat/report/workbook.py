@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,7 +66,9 @@ def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:
     meanings = {name: column.description for name, column in columns.items()}
     units = ((name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items())
     _sheet(book, "units", ("column", "unit", "meaning"), units)
-    book.save(path)
+    whole = BytesIO()  # openpyxl does not recover from a full disk
+    book.save(whole)
+    path.write_bytes(whole.getvalue())
 
 
 def _limits(view: View) -> Iterable[Sequence[object]]:

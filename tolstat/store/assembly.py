@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.files import atomic_write, reason
+from tolstat.common.files import atomic_write, check_disk_space, make_parent, reason
 from tolstat.common.tables import Status
 from tolstat.store.axes import attach_scales
 from tolstat.store.histories import (
@@ -22,7 +22,7 @@ from tolstat.store.histories import (
     rows_per_chunk,
 )
 from tolstat.store.integrity import seal
-from tolstat.store.new_file import fill
+from tolstat.store.new_file import fill, size_of_new
 from tolstat.store.reader import Reader
 from tolstat.store.result_file import BLOCK, LINKED, campaign_digest, store_error
 
@@ -82,7 +82,13 @@ def assemble(
     StoreError
         When `path` exists and must not be replaced, or cannot be written.
     """
+    new = max(0, n - sum(source.n for source in sources))
+    size = size_of_new(new, sources[0].columns, len(sources[0].points)) + sum(
+        one._file.id.get_filesize() for one in sources
+    )
     try:
+        make_parent(path)
+        check_disk_space(path, size)
         with atomic_write(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
             fill(file, attrs, range(n), errors, design, origin)
             for source in (one for whole in sources for one in whole.each()):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -240,6 +242,12 @@ def accuracy_end(count, n):
     from scipy.stats import binomtest
 
     return binomtest(count, n).proportion_ci(0.95, "exact")
+
+
+def test_an_error_that_is_not_known_is_null_in_json():
+    """As when the rows of all checked joints are damaged."""
+    found = tables.summary(SimpleNamespace(numerical_error={"F": math.nan, "T": 0.01}), 0.95)
+    assert json.loads(json.dumps(found, allow_nan=False)) == {"numerical_error": {"F": None, "T": 0.01}}
 
 
 def test_checks_that_fail_are_counted_and_not_measured(tmp_path):

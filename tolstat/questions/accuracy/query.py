@@ -94,5 +94,6 @@ def joints(verification: Verification) -> pd.DataFrame:
 
 
 def summary(view: View, confidence: float) -> dict[str, Any]:
-    """JSON value: ``numerical_error`` that 95 % of the joints stay below, by kind of load."""
-    return {"numerical_error": view.numerical_error}
+    """JSON value: ``numerical_error`` that 95 % of the joints stay below, by kind of load; null if none is known."""
+    known = {kind: None if np.isnan(error) else error for kind, error in view.numerical_error.items()}
+    return {"numerical_error": known}

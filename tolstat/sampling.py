@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from tolstat.analysis import process
 from tolstat.common import draw_records
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation, nominal_errors
@@ -319,6 +320,13 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
         here = part == number
         for name, (mean, deviation) in proposal.scores.items():
             scores[name][here] = mean + deviation * scores[name][here]
+        for one in proposal.processes:
+            open_ = (_stream(study.sampling.seed, f"{of} {one.streams[0]}", numbers.start) for of in ("deviation", "mean"))
+            u = [np.maximum(stream.random(len(numbers))[here], 2.0**-54) for stream in open_]
+            deviation = process.deviation(u[0], one.parts)
+            mean = process.mean(ndtri(u[1]), deviation, one.parts)
+            for name in one.streams:
+                scores[name][here] = mean + deviation * scores[name][here]
     return scores, part
 
 

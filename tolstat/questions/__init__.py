@@ -68,6 +68,7 @@ class Question(NamedTuple):
 QUESTIONS = (
     Question("what_if", ("query.what_if",), has_section=True),
     Question("exceedance", has_section=True, has_summary=True),
+    Question("known_parts", has_section=True),
     Question("histograms", has_section=True),
     Question("capability", (), "Read", ("capability",), has_section=True, has_summary=True),
     Question(

@@ -16,7 +16,7 @@ from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
 from tolstat.joint.overrides import merged
-from tolstat.study import fatigue, listing, points, proposal, selection, swept
+from tolstat.study import fatigue, known, listing, points, proposal, selection, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
@@ -73,6 +73,7 @@ class StudyFile:
         self._faults: list[Fault] = []
         self._claims = Assignments(self.place)
         self._toleranced: dict[str, str] = {}
+        self._together: list[tuple[str, ...]] = []
         self._accepted: set[str] = set()
         allowed = list(sections)
         for key in self.data:
@@ -168,6 +169,7 @@ class StudyFile:
                 self._toleranced |= {name: TOLERANCED[name] for name in selected}
                 written.append((entry, selected))
         found = reading.read(written, Nominal(joint, self.path.parent), self.place, self._faults)
+        self._together = [tuple(entry.quantities) for entry in found.entries]
         self._accepted = {bonus.diameter for bonus in found.rejecting}
         drawn: dict[str, list[str]] = {}
         for quantity in found.distributions:
@@ -194,7 +196,8 @@ class StudyFile:
         found = []
         for number, entry in enumerate(self._list("proposal", ProposalEntry)):
             with gather(self._faults):
-                found.append(proposal.resolve(entry, list(self._toleranced), self.place, ("proposal", number)))
+                names = list(self._toleranced)
+                found.append(proposal.resolve(entry, names, self._together, self.place, ("proposal", number)))
         with gather(self._faults):
             proposal.check_shares(found, self.place)
         return tuple(found)
@@ -284,11 +287,15 @@ class StudyFile:
             remedy = 'write "random", and run: tolstat rare STUDY --limit "cross1.F > 900 N"'
             self._fault(("sampling", "method"), "'subset' is set by tolstat rare, not in a study", remedy)
         if sampling.method == "importance" and not self.data.get("proposal"):
-            remedy = "add [[proposal]] with share, and widen or shift"
+            remedy = "add [[proposal]] with share, and widen, shift or parts"
             self._fault(("proposal",), "missing table: distributions to draw joints from beside the tolerances", remedy)
         points = math.prod(axis.points for axis in sweep)
         if points > MAX_ROWS:
             self._fault(("sweep",), f"gives {points} joints", f"give at most {MAX_ROWS}")
+
+    def check_known(self, read: Tolerances, copula: Copula, method: str) -> None:
+        """Note entries known from measured parts whose joints cannot be reweighted; call `tolerances` first."""
+        self._faults += known.faults(known.of(read.entries), method, copula.names, self._accepted, self.place)
 
     def check_one_joint(self, solver: Solver) -> None:
         """Note settings that only a campaign can have."""

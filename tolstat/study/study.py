@@ -258,7 +258,7 @@ class Study(Case):
         if self.axes:
             parts["axes"] = {name: axis.describe() for name, axis in self.axes.items()}
         if self.proposals:
-            parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
+            parts["proposal"] = [proposal.identity() for proposal in self.proposals]
         if self.groups:
             parts["groups"] = [[group.label, list(group.names)] for group in self.groups]
         if self.swept:
@@ -355,6 +355,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     if sampling is not None:
         file.check_method(sampling, sweep)
         file.check_points(sampling, sweep, points)
+        file.check_known(read, copula, sampling.method)
     if output is not None:
         file.check_fatigue(output)
         file.check_limits(output, limits)

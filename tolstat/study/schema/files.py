@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
+from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import json_schema, loads, strict
 from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
@@ -135,10 +136,10 @@ def _positive(unit: str) -> Schema:
     return quantity | json_schema.sign(quantity)
 
 
-def numbers(low: float, high: float) -> Schema:
+def numbers(low: float, high: float, kind: str = "number") -> Schema:
     """JSON schema of numbers by name or pattern of the quantities that are drawn: errors, and vectors of zones."""
     drawn = [own for name in TOLERANCED for own in (vectors_of(name) if is_zone(name) else (name,))]
-    return table({name: {"type": "number", "minimum": low, "maximum": high} for name in drawn})
+    return table({name: {"type": kind, "minimum": low, "maximum": high} for name in drawn})
 
 
 SECTIONS: dict[str, Section] = {
@@ -173,6 +174,7 @@ def tables() -> dict[str, Schema]:
         "solver": of_model(Solver),
         "widen": {"anyOf": [{"type": "number", "minimum": 1 / MAX_WIDEN, "maximum": MAX_WIDEN}, widen]},
         "shift": numbers(-MAX_SHIFT, MAX_SHIFT),
+        "parts": numbers(LEAST_PARTS, MOST_PARTS, "integer"),
         "quantity": {"type": ["string", "number"]},
         fits.KEY: of_model(fits.FitEntry),
         "points": {"type": "object", "additionalProperties": of_model(StressPointEntry)},

@@ -137,6 +137,10 @@ class ToleranceEntry(strict.Strict):
     def meaning(self, site: Site) -> list[Meaning]:
         """Return what the entry says of the errors that it sets."""
 
+    def measured_parts(self, site: Site) -> int | None:
+        """Return the number of parts that mean and deviation were estimated from; None if they are taken as exact."""
+        return None
+
     @model_validator(mode="after")
     def _can_be_built(self, info: ValidationInfo) -> Self:
         self.quantities((info.context or {})["site"])
@@ -198,6 +202,12 @@ class Toleranced(NamedTuple):
     def quantities(self) -> dict[str, Distribution]:
         """Distribution of each quantity that the entry draws."""
         return {name: d for site, model in self.models for name, d in model.quantities(site).items()}
+
+    @property
+    def measured_parts(self) -> int | None:
+        """Number of parts that mean and deviation were estimated from; None if they are taken as exact."""
+        site, model = self.models[0]
+        return model.measured_parts(site)
 
 
 class HalfBand(SingleEntry):

@@ -321,12 +321,12 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
         for name, (mean, deviation) in proposal.scores.items():
             scores[name][here] = mean + deviation * scores[name][here]
         for one in proposal.processes:
-            open_ = (_stream(study.sampling.seed, f"{of} {one.streams[0]}", numbers.start) for of in ("deviation", "mean"))
-            u = [np.maximum(stream.random(len(numbers))[here], 2.0**-54) for stream in open_]
-            deviation = process.deviation(u[0], one.parts)
-            mean = process.mean(ndtri(u[1]), deviation, one.parts)
+            first = one.streams[0]
+            u, v = (_stream(study.sampling.seed, f"{of} {first}", numbers.start) for of in ("deviation", "mean"))
+            spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), one.parts)
+            middle = process.mean(ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)), spread, one.parts)
             for name in one.streams:
-                scores[name][here] = mean + deviation * scores[name][here]
+                scores[name][here] = middle + spread * scores[name][here]
     return scores, part
 
 

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat.analysis import process
 from tolstat.analysis.exceedance import FloatArray, Mask
@@ -135,9 +134,7 @@ def tallies(
     return [Split(*made[2 * k : 2 * k + 2]) for k in range(len(events))]
 
 
-def _weights(
-    sums: Sequence[Sums], known: Sequence[Known], drawn: Draws, base: FloatArray
-) -> Iterator[FloatArray]:
+def _weights(sums: Sequence[Sums], known: Sequence[Known], drawn: Draws, base: FloatArray) -> Iterator[FloatArray]:
     """Weights of all joints for some of the processes at a time, (n, k), up to a factor of each process."""
     step = max(1, BLOCK // len(base))
     for first in range(0, len(drawn.mean), step):
@@ -185,7 +182,9 @@ def _upper_end(split: Split, side: int, usable: Mask, tail: float) -> float:
     inner = usable & (split[1 - side].total > 0.0) & np.isfinite(own) & (own > 0.0) & (other > 0.0)
 
     def not_above(share: float) -> float:
-        return float(np.where(inner, betainc(np.where(inner, own, 1.0), np.where(inner, other, 1.0), share), 0.0).mean())
+        return float(
+            np.where(inner, betainc(np.where(inner, own, 1.0), np.where(inner, other, 1.0), share), 0.0).mean()
+        )
 
     return _first(not_above, 1.0 - tail)
 

@@ -135,7 +135,9 @@ class Split(NamedTuple):
         """
         tail = 0.5 * (1.0 - confidence)
         ends = []
-        for (own, beside), (_, other) in zip(self.far(), ((self.above, self.below), (self.below, self.above)), strict=True):
+        for (own, beside), (_, other) in zip(
+            self.far(), ((self.above, self.below), (self.below, self.above)), strict=True
+        ):
             with np.errstate(invalid="ignore"):
                 end = _far_end(own, beside, tail, least)
             ends.append(np.where((other.total == 0) | np.isnan(end), 1.0, end))

@@ -1,4 +1,4 @@
-"""What measured parts leave unknown of the process, in shares above the limits of a file; see `analysis.known_share`."""
+"""What measured parts leave open of the process, in shares above limits; see `analysis.known_share`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolstat.analysis import known_share, process
+from tolstat.analysis.exceedance import FloatArray, Mask
 from tolstat.analysis.known_share import Event, KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.weighted import Split
@@ -40,6 +41,10 @@ def of(view: View) -> KnownParts | None:
     return KnownParts(view, entries) if entries else None
 
 
+def _refused(unsupported: float) -> KnownShare:
+    return KnownShare(np.nan, np.nan, np.nan, np.nan, np.nan, unsupported)
+
+
 def _has_key(table: Mapping[str, Any]) -> bool:
     """Whether a table has one of `KEYS`, at any depth: names of errors may be dotted."""
     return any(key in KEYS or (isinstance(inner, Mapping) and _has_key(inner)) for key, inner in table.items())
@@ -66,13 +71,13 @@ class KnownParts:
         Numbers are NaN where so many likely processes are not supported that the upper end would be 1.
         """
         if not self._done.any():
-            return KnownShare(*[np.nan] * 5, unsupported=1.0)
+            return _refused(1.0)
         found = known_share.intervals(*self._tallies[name], self.supported, confidence)
         refused = found.unsupported >= 0.5 * (1.0 - confidence)
-        return KnownShare(*[np.nan] * 5, unsupported=found.unsupported) if refused else found
+        return _refused(found.unsupported) if refused else found
 
     @cached_property
-    def supported(self) -> known_share.Mask:
+    def supported(self) -> Mask:
         """Which of the likely processes the joints support, (K,)."""
         done = int(self._done.sum())
         return known_share.supported(done, self._drawn, self._known, self._mixture)
@@ -107,7 +112,7 @@ class KnownParts:
         return found
 
     @cached_property
-    def _done(self) -> known_share.Mask:
+    def _done(self) -> Mask:
         return np.asarray(self.view.status != Status.PENDING)
 
     @cached_property
@@ -144,18 +149,21 @@ class KnownParts:
         return [Sums(*(np.concatenate(one)[self._done] for one in zip(*entry, strict=True))) for entry in each]
 
     def _plain(self, load: SampleLoad) -> Event:
+        assert load.limit is not None
         return Event(load.values > load.limit, load.is_valid)
 
     def _fewest(self, load: SampleLoad) -> Event:
         """Event with all joints without a valid load below, and the least load of those that never repeat."""
+        assert load.limit is not None
         return Event(load.is_valid & (_finite(load.ends[0], load.values) > load.limit), self._done)
 
     def _most(self, load: SampleLoad) -> Event:
         """Event with all joints without a valid load above, and the largest load of those that never repeat."""
+        assert load.limit is not None
         return Event(~load.is_valid | (_finite(load.ends[1], load.values) > load.limit), self._done)
 
 
-def _finite(ends: known_share.FloatArray, values: known_share.FloatArray) -> known_share.FloatArray:
+def _finite(ends: FloatArray, values: FloatArray) -> FloatArray:
     return np.where(np.isfinite(ends), ends, values)
 
 

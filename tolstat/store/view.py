@@ -304,7 +304,7 @@ class View:
 
         A process of unknown mean and deviation is wider than the tolerances on all sides.
         """
-        return any(set(drawn) != {"parts"} for _, drawn in self.store.identity.get("proposal", ()))
+        return self.weighted and any(set(drawn) != {"parts"} for _, drawn in self.store.identity["proposal"])
 
     def check_sample(self, allow_weights: bool = True) -> None:
         """Refuse a file whose joints are no sample of a production, or (unless `allow_weights`) differ in weight.

@@ -64,8 +64,8 @@ class ProposalEntry(Strict):
         dict[str, Any],
         Field(
             default_factory=dict,
-            description="draws mean and deviation of the scores for each joint anew, as so many measured parts leave them "
-            f"open, by name or pattern of errors, from {LEAST_PARTS} to {MOST_PARTS}; errors of one entry share them",
+            description="draws mean and deviation of the scores for each joint anew, as so many parts leave them "
+            f"open, by name or pattern of errors, from {LEAST_PARTS} to {MOST_PARTS}; those of one entry share them",
             examples=[{"pin*.tilt_[tz]": 30}],
             json_schema_extra={"x-table": "parts"},
         ),

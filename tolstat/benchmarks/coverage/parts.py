@@ -19,6 +19,7 @@ ENTRIES = 2
 """Entries of the tolerances, each with a process and measured parts of its own."""
 TOLERANCES = 0.2
 """Share of the joints drawn from the tolerances; the others come from the posterior predictive."""
+ADDED = "an unknown mean can only add to a sum of squares: lower ends lie too high"
 TAKEN_FOR_KNOWN = "the tolerances are taken as exact: the interval of a study without `known_from`"
 CASES = ((30, 1024, 0.05), (30, 4096, 0.005), (50, 1024, 0.002))
 """Measured parts, joints, and share above the level."""
@@ -59,7 +60,7 @@ def _known(load: Load, parts: int, n: int, share: float) -> Experiment:
     fresh = fresh_share(n, share)
     return Experiment(
         (
-            Asked("share, parts and joints", case, n, fresh),
+            Asked("share, parts and joints", case, n, fresh, ADDED if load.name == "squares" else ""),
             Asked("share, parts left out", case, n, fresh, TAKEN_FOR_KNOWN),
         ),
         once,

@@ -52,7 +52,7 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
         `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
         Where tolerances are known from measured parts also ``both_lower``, ``both_upper`` and the fields `KNOWN`, see
-        `known_share.KnownShare`: with unresolved joints and the numerical error; NaN where the joints do not support it.
+        `known_share.KnownShare`: with unresolved joints and the numerical error; NaN without support.
         Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `SampleLoad.supports`.
     """

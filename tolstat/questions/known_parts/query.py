@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pandas as pd
 
 from tolstat.common.loads import ALL_LIMITS
@@ -26,7 +28,7 @@ def intervals(view: View, confidence: float = 0.95) -> pd.DataFrame:
         the joints; the fields of `known_share.KnownShare`, the last two ends with ``both_`` before them. Empty if the
         tolerances are taken as exact.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for load in view.loads([*view.limits, *([ALL_LIMITS] if len(view.limits) > 1 else [])]):
         if view.known is None or load.limit is None:
             continue

@@ -30,9 +30,13 @@ def sections(view: View, asked: Asked) -> list[Section]:
         left = drawing.rows_left(labels)
         top = drawing.legend_room(rendering.LABELS, left)
         size = (drawing.WIDTH, 0.47 * len(given) + drawing.BOTTOM + top + 0.1)
-        said = "; ".join(f"{row['load']}: {text.span(row['both_lower'], row['both_upper'])}" for row in given.to_dict("records"))
+        said = "; ".join(
+            f"{row['load']}: {text.span(row['both_lower'], row['both_upper'])}" for row in given.to_dict("records")
+        )
         draw = partial(rendering.forest, table=given)
-        panel = Panel("known-parts", "What joints and parts leave open", f"Intervals of both: {said}", draw, size, left, top)
+        panel = Panel(
+            "known-parts", "What joints and parts leave open", f"Intervals of both: {said}", draw, size, left, top
+        )
         blocks.append(Panels([panel], beside=[Text(line, small=True) for line in _how(view)]))
     blocks.append(as_block("Shares above the limits, with what leaves them open", rendering.INTERVALS, table))
     if len(given) < min(len(table), DRAWN):
@@ -46,7 +50,7 @@ def _how(view: View) -> list[str]:
     entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in view.known.entries)
     return [
         f"Mean and deviation are estimated from measured parts: {entries}.",
-        "Joints: the tolerances are as stated, and the joints are a sample. Parts: the process may be any that the parts "
-        "make likely. Both: the verdict's, with joints without a valid load and the numerical error. Grey line: the "
+        "Joints: the tolerances are as stated, and the joints are a sample. Parts: the process may be any that the "
+        "parts make likely. Both: the verdict's, with joints without a valid load and the numerical error. Grey line: the "
         "share at the tolerances as stated.",
     ]

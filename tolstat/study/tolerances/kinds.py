@@ -55,7 +55,7 @@ class NormalEntry(Banded):
             strict=True,
             ge=LEAST_PARTS,
             le=MOST_PARTS,
-            description="number of measured parts that mean and sigma were estimated from; no part of the study's identity",
+            description="number of measured parts that mean and sigma were estimated from; affects no result",
             examples=[50],
         ),
     ] = None
@@ -67,7 +67,9 @@ class NormalEntry(Banded):
     def build(self, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
         """See `ToleranceEntry.build`."""
         if self.known_from is not None and self.truncate:
-            raise refuse("known_from is of parts as they are made, truncate of parts that are sorted", "remove one of them")
+            raise refuse(
+                "known_from is of parts as they are made, truncate of parts that are sorted", "remove one of them"
+            )
         if self.std is not None:
             return self._from_std(self.std, site)
         lower, upper = self.needed_band(site)

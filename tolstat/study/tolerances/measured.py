@@ -1,4 +1,4 @@
-"""Entry of ``[tolerances]`` that brings its measured parts: drawn one by one, or as the law that they are a sample of."""
+"""Entry of ``[tolerances]`` that brings its measured parts: drawn as they are, or a sample of a law."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class MeasuredEntry(SingleEntry):
     file: Annotated[
         str | None, Field(description="path of the CSV file, from the study's folder", examples=["rattle.csv"])
     ] = None
-    column: Annotated[
-        str | None, Field(description="name of the column in the header row", examples=["speed_rpm"])
-    ] = None
+    column: Annotated[str | None, Field(description="name of the column in the header row", examples=["speed_rpm"])] = (
+        None
+    )
     values: Annotated[
         list[float] | None,
         Field(description="the measured values, in place of a file; needs `law`", examples=[[0.012, -0.004, 0.007]]),

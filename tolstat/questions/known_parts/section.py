@@ -51,6 +51,6 @@ def _how(view: View) -> list[str]:
     return [
         f"Mean and deviation are estimated from measured parts: {entries}.",
         "Joints: the tolerances are as stated, and the joints are a sample. Parts: the process may be any that the "
-        "parts make likely. Both: the verdict's, with joints without a valid load and the numerical error. Grey line: the "
-        "share at the tolerances as stated.",
+        "parts make likely. Both: the verdict's, with joints without a valid load and the numerical error. Grey line: "
+        "the share at the tolerances as stated.",
     ]

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from tolstat.analysis.weighted import Split
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
+from tolstat.store.recall import mentions
 from tolstat.study import known
 from tolstat.study.axes import streams_of
 from tolstat.study.known import KnownEntry
@@ -34,8 +33,7 @@ KEYS = ("known_from", "law")
 
 def of(view: View) -> KnownParts | None:
     """Read what a file's study knows of its processes; None if it takes its tolerances as exact."""
-    written = tomllib.loads(view.store.study_text).get("tolerances", {})
-    if not _has_key(written) or not view.sampled or not view.limits:
+    if not (view.sampled and view.limits and mentions(view.store, KEYS, "tolerances")):
         return None
     entries = known.of(view.study.entries)
     return KnownParts(view, entries) if entries else None
@@ -43,11 +41,6 @@ def of(view: View) -> KnownParts | None:
 
 def _refused(unsupported: float) -> KnownShare:
     return KnownShare(np.nan, np.nan, np.nan, np.nan, np.nan, unsupported)
-
-
-def _has_key(table: Mapping[str, Any]) -> bool:
-    """Whether a table has one of `KEYS`, at any depth: names of errors may be dotted."""
-    return any(key in KEYS or (isinstance(inner, Mapping) and _has_key(inner)) for key, inner in table.items())
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,13 +16,14 @@ from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
 from tolstat.joint.overrides import merged
-from tolstat.study import fatigue, known, listing, points, proposal, selection, swept
+from tolstat.study import fatigue, known, listing, points, proposal, selection, sorting, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.points import Point
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
+from tolstat.study.sorting import Gauge
 from tolstat.study.swept import KEYS, Swept
 from tolstat.study.tolerances import fits, reading
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
@@ -32,7 +33,7 @@ from tolstat.study.tolerances.reading import Nominal, Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
 
-SCATTER = ("tolerances", "correlation", "errors")
+SCATTER = ("tolerances", "correlation", "errors", "reject")
 """Sections that define the joints of most sampling methods; the first is required."""
 SECTIONS_OF = {
     "sweep": ("sweep", "errors"),
@@ -223,6 +224,10 @@ class StudyFile:
         with gather(self._faults):
             return swept.read(sweep, variants, nominal.joint, nominal_first, self.place)
         return None
+
+    def rejects(self) -> tuple[Gauge, ...]:
+        """``[reject]``: joints that are rejected at assembly."""
+        return sorting.read(self._entries("reject"), self.path.parent, self.place, self._faults)
 
     def limits(self, at: Sequence[Point]) -> dict[str, float]:
         """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""

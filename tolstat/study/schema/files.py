@@ -23,6 +23,7 @@ from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
 from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.sorting import MEASURABLE, RejectEntry
 from tolstat.study.stress_point import StressPointEntry
 from tolstat.study.swept import KEYS
 from tolstat.study.tolerances import fits
@@ -121,6 +122,15 @@ def grid() -> Schema:
     return table(made) | {"description": text}
 
 
+def reject() -> Schema:
+    """JSON schema of the inspections at assembly."""
+    made: dict[str, Schema] = {
+        name: {"x-table": _of_unit(RejectEntry.__name__, unit)} for name, unit in MEASURABLE.items()
+    }
+    text = "Joints that are rejected at assembly by a measured error or clearance; affects no result."
+    return table(made) | {"description": text}
+
+
 def limits() -> Schema:
     """JSON schema of the limits of loads."""
     text = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
@@ -155,6 +165,7 @@ SECTIONS: dict[str, Section] = {
     "grid": Section(grid),
     "case": Section(lambda: of_model(CaseEntry), repeated=True),
     "variant": Section(lambda: of_model(VariantEntry), repeated=True),
+    "reject": Section(reject),
     "limits": Section(limits),
     "fatigue": Section(lambda: of_model(Settings)),
     "output": Section(lambda: of_model(Output)),
@@ -186,6 +197,7 @@ def tables() -> dict[str, Schema]:
     for unit in dict.fromkeys((UNITS | KEYS).values()):
         found[_of_unit(SweepEntry.__name__, unit)] = for_unit(of_model(SweepEntry), unit)
     for unit in dict.fromkeys(UNITS.values()):
+        found[_of_unit(RejectEntry.__name__, unit)] = for_unit(of_model(RejectEntry), unit)
         found[_of_unit("quantity", unit)] = json_schema.quantity(unit, EXAMPLES[unit])
     for unit in dict.fromkeys(UNIT_OF_LOAD.values()):
         found[_of_unit("limit", unit)] = _positive(unit)

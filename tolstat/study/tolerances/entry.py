@@ -115,6 +115,14 @@ def _read_half_width(value: object, info: ValidationInfo) -> float:
 _NEARLY_ALL = np.array([1e-3, 1.0 - 1e-3])
 """Probabilities between which an error of the operating point must be zero."""
 
+
+def _not_negative(value: float) -> float:
+    if value < 0.0:
+        raise refuse("is negative", "give a standard deviation; 0 for a gauge without error")
+    return value
+
+
+NotNegative = Annotated[Value, AfterValidator(_not_negative)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
 HalfWidth = Annotated[
     float, BeforeValidator(_read_half_width), AfterValidator(units.positive), WithJsonSchema({"x-unit": "error"})
@@ -139,6 +147,10 @@ class ToleranceEntry(strict.Strict):
 
     def measured_parts(self, site: Site) -> int | None:
         """Return the number of parts that mean and deviation were estimated from; None if they are taken as exact."""
+        return None
+
+    def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
+        """Return the band outside which parts are scrapped, and the gauge's deviation, SI; None if none is."""
         return None
 
     @model_validator(mode="after")

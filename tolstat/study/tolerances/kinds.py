@@ -21,6 +21,7 @@ from tolstat.study.tolerances.entry import (
     Banded,
     HalfBand,
     Meaning,
+    NotNegative,
     Positive,
     PositiveNumber,
     Site,
@@ -60,9 +61,21 @@ class NormalEntry(Banded):
         ),
     ] = None
 
+    gauge: Annotated[
+        NotNegative | None,
+        Field(
+            description="parts outside the band are scrapped, by a gauge of this standard deviation; affects no result",
+            examples=["0.01 mm"],
+        ),
+    ] = None
+
     def measured_parts(self, site: Site) -> int | None:
         """See `ToleranceEntry.measured_parts`."""
         return self.known_from
+
+    def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
+        """See `ToleranceEntry.gauge_of`."""
+        return None if self.gauge is None else (*self.needed_band(site), self.gauge)
 
     def build(self, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
         """See `ToleranceEntry.build`."""
@@ -70,6 +83,9 @@ class NormalEntry(Banded):
             raise refuse(
                 "known_from is of parts as they are made, truncate of parts that are sorted", "remove one of them"
             )
+        if self.gauge is not None and self.truncate:
+            raise refuse("gauge scraps parts, with truncate none are left to scrap", "remove one of them")
+        self.gauge_of(site)
         if self.std is not None:
             return self._from_std(self.std, site)
         lower, upper = self.needed_band(site)
@@ -85,10 +101,10 @@ class NormalEntry(Banded):
         band = self.band(site)
         if self.cpk is not None:
             raise refuse("std and cpk both define the standard deviation", "remove one of them")
-        if self.truncate != (band is not None):
+        if (self.truncate or self.gauge is not None) != (band is not None):
             raise refuse(
-                "with std, a band and truncate need each other",
-                "give a band and truncate = true, or neither",
+                "with std, a band and truncate or gauge need each other",
+                "give a band and truncate = true or a gauge, or neither",
             )
         middle = site.center if band is None else 0.5 * sum(band)
         mean = middle if self.mean is None else self.mean
@@ -96,7 +112,7 @@ class NormalEntry(Banded):
             return tolerance.Normal(mean, std)
         if not band[0] < mean < band[1]:
             raise refuse("mean is outside the band", "give lower < mean < upper")
-        return tolerance.TruncatedNormal(mean, std, *band)
+        return tolerance.TruncatedNormal(mean, std, *band) if self.truncate else tolerance.Normal(mean, std)
 
 
 class UniformEntry(Banded):

@@ -1,8 +1,8 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5`` and ``known_parts.h5``, of some joints or all, and gets a picture of each,
-and ``tilted_pin.png``.
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5`` and ``sorting.h5``, of some joints or
+all, and gets a picture of each, and ``tilted_pin.png``.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from tolstat.questions.bearing_life.rendering import curve
 from tolstat.questions.fatigue import parts_rendering
 from tolstat.questions.known_parts import rendering as known_rendering
 from tolstat.questions.known_parts.query import intervals
+from tolstat.questions.sorting import rendering as sorting_rendering
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -75,6 +76,16 @@ def known_parts(folder: Path) -> None:
         figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
         known_rendering.forest(ax, table)
         save(figure, folder / "known_parts.png")
+
+
+def sorting(folder: Path) -> None:
+    """Draw yield and cost before and after sorting, as the page does."""
+    with tolstat.open(folder / "sorting.h5") as store:
+        table = tolstat.sorted_joints(store.view()).stages.head(3)
+    with style.settings():
+        figure, ax = plt.subplots(figsize=(6.5, 2.6), layout="constrained")
+        sorting_rendering.yields(ax, table)
+        save(figure, folder / "sorting.png")
 
 
 def overnight(folder: Path) -> None:
@@ -202,7 +213,7 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    for draw in (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts):
+    for draw in (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, sorting):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)
 

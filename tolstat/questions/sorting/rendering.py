@@ -48,5 +48,6 @@ def yields(ax: Axes, table: pd.DataFrame) -> None:
         ax.plot([100.0 * row["lower"], 100.0 * row["upper"]], [i, i], color=style.COLOURS[0], lw=3.0)
         ax.plot(100.0 * row["estimate"], i, "o", color=style.COLOURS[0], ms=6.0)
         said = f"a good joint costs {_cost(row, 'cost_good')}"
-        ax.text(100.0 * row["upper"], i - 0.22, said, ha="right", va="bottom", size=8.0, color=style.INK)
+        at, side = (row["lower"], "left") if row["lower"] < 0.5 * high else (row["upper"], "right")
+        ax.text(100.0 * at, i - 0.14, said, ha=side, va="bottom", size=8.0, color=style.INK)
     ax.set_xlabel("share of the joints above a limit, per cent")

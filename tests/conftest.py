@@ -129,4 +129,6 @@ def example_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = bearings.read_text(encoding="utf-8").replace("[sampling]", f"[output]\n{CHEAP}")
     bearings.write_text(text, encoding="utf-8")
     tolstat.run(tolstat.load(bearings, n=60), folder / "needle_bearings.h5", workers=1)
+    sorting = folder / "studies" / "sorting.toml"
+    tolstat.run(tolstat.load(sorting, n=60), folder / "sorting.h5", workers=1)
     return folder

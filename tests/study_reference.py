@@ -20,6 +20,7 @@ from tolstat.study.points import PointEntry
 from tolstat.study.schema import files
 from tolstat.study.schema.parts import of_model
 from tolstat.study.selection import TOLERANCED
+from tolstat.study.sorting import RejectEntry
 from tolstat.study.stress_point import StressPointEntry
 from tolstat.study.tolerances.entry import Banded
 from tolstat.study.tolerances.fits import FitEntry
@@ -195,6 +196,7 @@ def tables() -> dict[str, str]:
     found = {name: key_table(made["properties"], made.get("required", ())) for name, made in with_keys.items()}
     entries = {
         "sweep": SweepEntry,
+        "reject": RejectEntry,
         "range": Range,
         "line": LineEntry,
         "point": StressPointEntry,

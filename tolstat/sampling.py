@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from tolstat.analysis import process
 from tolstat.common import draw_records
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation, nominal_errors
@@ -319,6 +320,13 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
         here = part == number
         for name, (mean, deviation) in proposal.scores.items():
             scores[name][here] = mean + deviation * scores[name][here]
+        for one in proposal.processes:
+            first = one.streams[0]
+            u, v = (_stream(study.sampling.seed, f"{of} {first}", numbers.start) for of in ("deviation", "mean"))
+            spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), one.parts)
+            middle = process.mean(ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)), spread, one.parts)
+            for name in one.streams:
+                scores[name][here] = middle + spread * scores[name][here]
     return scores, part
 
 

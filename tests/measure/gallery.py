@@ -1,7 +1,8 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5`` and ``duty_cycle.h5``, of some joints or all, and gets a picture of each, and ``tilted_pin.png``.
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5`` and ``sorting.h5``, of some joints or
+all, and gets a picture of each, and ``tilted_pin.png``.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ from tolstat.display import style
 from tolstat.joint import operating
 from tolstat.questions.bearing_life.rendering import curve
 from tolstat.questions.fatigue import parts_rendering
+from tolstat.questions.known_parts import rendering as known_rendering
+from tolstat.questions.known_parts.query import intervals
+from tolstat.questions.sorting import rendering as sorting_rendering
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -62,6 +66,26 @@ def welded_fork(folder: Path) -> None:
         figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
         parts_rendering.panel(ax, stressed, tolstat.part_failures(stressed))
         save(figure, folder / "welded_fork.png")
+
+
+def known_parts(folder: Path) -> None:
+    """Draw the three intervals of the shares exceeded most, as the page does."""
+    with tolstat.open(folder / "known_parts.h5") as store:
+        table = intervals(store.view()).head(6)
+    with style.settings():
+        figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
+        known_rendering.forest(ax, table)
+        save(figure, folder / "known_parts.png")
+
+
+def sorting(folder: Path) -> None:
+    """Draw yield and cost before and after sorting, as the page does."""
+    with tolstat.open(folder / "sorting.h5") as store:
+        table = tolstat.sorted_joints(store.view()).stages.head(3)
+    with style.settings():
+        figure, ax = plt.subplots(figsize=(6.5, 2.6), layout="constrained")
+        sorting_rendering.yields(ax, table)
+        save(figure, folder / "sorting.png")
 
 
 def overnight(folder: Path) -> None:
@@ -189,7 +213,7 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    for draw in (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle):
+    for draw in (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, sorting):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)
 

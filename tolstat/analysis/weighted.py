@@ -135,6 +135,20 @@ class Split(NamedTuple):
         """
         tail = 0.5 * (1.0 - confidence)
         ends = []
+        for (own, beside), (_, other) in zip(
+            self.far(), ((self.above, self.below), (self.below, self.above)), strict=True
+        ):
+            with np.errstate(invalid="ignore"):
+                end = _far_end(own, beside, tail, least)
+            ends.append(np.where((other.total == 0) | np.isnan(end), 1.0, end))
+        return 1.0 - ends[1], ends[0]
+
+    def far(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Effective joints on its own side and on the other, for the upper end of the share above, and below.
+
+        They are the parameters of the beta distribution that the end is a quantile of; NaN where no joint has weight.
+        """
+        found = []
         for own, other in ((self.above, self.below), (self.below, self.above)):
             # add one joint on the side that this end enlarges
             first, squares = own.total + own.added, own.squares + own.added**2
@@ -142,9 +156,8 @@ class Split(NamedTuple):
                 share = first / (first + other.total)
                 variance = ((1.0 - share) ** 2 * squares + share**2 * other.squares) / (first + other.total) ** 2
                 effective = share * (1.0 - share) / variance
-                end = _far_end(share * effective, (1.0 - share) * effective, tail, least)
-            ends.append(np.where((other.total == 0) | np.isnan(end), 1.0, end))
-        return 1.0 - ends[1], ends[0]
+                found.append((share * effective, (1.0 - share) * effective))
+        return found
 
 
 def _far_end(own: FloatArray, other: FloatArray, tail: float, least: float) -> FloatArray:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
+    from tolstat.questions.sorting.query import sorted_joints as sorted_joints
     from tolstat.questions.time_above.query import time_above as time_above
     from tolstat.questions.what_if.query import what_if as what_if
     from tolstat.store.view import View
@@ -68,6 +69,8 @@ class Question(NamedTuple):
 QUESTIONS = (
     Question("what_if", ("query.what_if",), has_section=True),
     Question("exceedance", has_section=True, has_summary=True),
+    Question("known_parts", has_section=True),
+    Question("sorting", ("query.sorted_joints",), "Decide", ("sorting",), has_section=True),
     Question("histograms", has_section=True),
     Question("capability", (), "Read", ("capability",), has_section=True, has_summary=True),
     Question(

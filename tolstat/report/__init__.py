@@ -149,7 +149,7 @@ def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> R
     if verdict is not None:
         sentence = text.sentence(verdict.sentence)
         shown = f"{sentence if width is None else textwrap.fill(sentence, width)}\n\n{shown}"
-        if verdict.answer and not view.weighted and view.count(*VALID):
+        if verdict.answer and not view.weighted and view.known is None and view.count(*VALID):
             kept = capabilities.together(capability.limits(view))
             shown += f"\n\nyield: {kept.value} {kept.words}"
     notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]

@@ -119,7 +119,12 @@ def verdict(row: Row, accepted: float) -> str:
 
 
 def ends(row: Row) -> tuple[float, float]:
-    """Interval that covers sampling, unresolved joints and, if known, the numerical error."""
+    """Interval that covers sampling, unresolved joints and, if known, the numerical error.
+
+    Where tolerances are known from measured parts it covers what these leave open, too.
+    """
+    if "both_lower" in row:
+        return row["both_lower"], row["both_upper"]
     wide = (row["total_lower"], row["total_upper"])
     return (row["outer_lower"], row["outer_upper"]) if np.isnan(wide[0]) else wide
 
@@ -134,7 +139,7 @@ def share_of(row: Row) -> str:
 
 def deciding(row: Row, accepted: float) -> str:
     """Sentence on the number of simulated joints that would decide an open verdict; empty if it is not open."""
-    if verdict(row, accepted) != "open":
+    if verdict(row, accepted) != "open" or "both_lower" in row:
         return ""
     return f"Joints that would decide it if the share stayed the same: {_needed(row, accepted)}"
 
@@ -166,6 +171,8 @@ def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
     decide = deciding(row, accepted) if view.iid and not view.weighted else ""
     notes += (decide,) if decide else ()
+    if answer == "open" and row.get("parts_lower", np.nan) <= accepted < row.get("parts_upper", np.nan):
+        notes += (f"not decided by more joints: the parts leave shares of {_open(row)} open. Measure more parts",)
     if answer == "none":
         return Headline(answer, WORDS[answer], _reason(view, [row]), notes)
     limit = _words(view, row)
@@ -198,6 +205,10 @@ def _decisive(view: View, records: Sequence[Row]) -> Row:
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
 
 
+def _open(row: Row) -> str:
+    return text.span(row["parts_lower"], row["parts_upper"])
+
+
 def _untold(view: View, records: Sequence[Row]) -> str:
     """Why the verdict is on one of several limits."""
     return f"No share of the joints that exceed at least one limit: {_reason(view, [_decisive(view, records)])}"
@@ -218,7 +229,7 @@ def _limit(view: View, row: Row) -> str:
 def _yield(view: View, records: Sequence[Row]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     notes: tuple[str, ...] = () if view.has_intervals else (without_interval(view.method),)
-    if view.weighted:
+    if view.weighted or view.known is not None:
         row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
         if np.isnan(row["estimate"]):
             known = [own for own in records if not np.isnan(own["estimate"])]
@@ -226,12 +237,12 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
                 return Headline("none", WORDS["none"], _reason(view, [row]), notes)
             notes += (_untold(view, records),)
             row = worst = exceedance.most_exceeded(view, known)
-        if _undecided([row]):
+        if _undecided([row]) or np.isnan(ends(row)[0]):
             return Headline("none", WORDS["none"], _reason(view, [row]), notes)
         interval = "total interval" if _matter([row]) else f"total interval {text.span(*ends(row))}"
-        missed = f"whatever the proposals miss, at most {text.percent(row['unsearched_upper'])}"
+        missed = f"; whatever the proposals miss, at most {text.percent(row['unsearched_upper'])}" if view.aimed else ""
         most = ", the limit exceeded most" if row is worst else ""
-        said = f"of the joints exceed {_words(view, row)}{most} ({interval}; {missed})"
+        said = f"of the joints exceed {_words(view, row)}{most} ({interval}{missed})"
         if row["load"] == ALL_LIMITS and worst["count"] and not np.isnan(worst["estimate"]):
             said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
         return Headline("", share_of(row), said, notes, worst["load"])
@@ -253,6 +264,10 @@ def _reason(view: View, records: Sequence[Row]) -> str:
     if poor:
         trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
         return f"few joints have most of the weight above {text.limit(poor[0])} (Pareto k {trust.k:.2f}, 0.7 allowed)"
+    if view.known is not None and np.isnan(ends(records[0])[0]):
+        unsupported = text.percent(records[0]["unsupported"])
+        found = f"the joints do not support {unsupported} of the processes that the measured parts leave open"
+        return f"{found}. {view.known.remedy}"
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"

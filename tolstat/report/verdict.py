@@ -73,7 +73,7 @@ def _points(view: View) -> list[Table]:
     for part in view.parts:
         point = part.store.points[part.points[0]]
         row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
-        if part.sampled and not part.weighted and part.limits and part.count(*VALID):
+        if part.sampled and not part.weighted and part.known is None and part.limits and part.count(*VALID):
             found = capabilities.together(capability.limits(part))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
@@ -115,7 +115,7 @@ def _answer(view: View, found: Headline | None) -> Card:
 def _cards(view: View, found: Headline | None) -> list[Card]:
     """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
-    if found is not None and not view.weighted and view.count(*VALID):
+    if found is not None and not view.weighted and view.known is None and view.count(*VALID):
         table = capability.limits(view)
         if found.answer:
             together = capabilities.together(table)
@@ -163,6 +163,8 @@ def _how(view: View, asked: Asked) -> list[str]:
         "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above "
         "it at its upper end; it covers the numerical error, too, where it is known.",
     ]
+    if view.known is not None:
+        paragraphs.append("Grey covers what the measured parts leave open of the process, too.")
     if len(view.points) > 1:
         paragraphs.append("A limit that names no operating point is about the largest load over all of them.")
     if asked.judges:

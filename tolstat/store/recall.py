@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -73,6 +74,15 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     with nullcontext() if path is not None else only_below(store.path.parent):
         larger = load(source, n=n, text=text, joint=joint)
     return replace(_at_point(store, larger), solver=study.solver)
+
+
+def mentions(store: Reader, keys: Collection[str], section: str) -> bool:
+    """Whether a section of a file's study, as it is written, has one of some keys; the study itself is not read."""
+    return _has(tomllib.loads(store.study_text).get(section, {}), keys)
+
+
+def _has(table: Mapping[str, Any], keys: Collection[str]) -> bool:
+    return any(key in keys or (isinstance(inner, Mapping) and _has(inner, keys)) for key, inner in table.items())
 
 
 def _at_point(store: Reader, study: Study) -> Study:

@@ -20,9 +20,10 @@ from tolstat.common.loads import ALL_LIMITS, BUSHING_LOADS, LOADS, limits_in_wor
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
-from tolstat.store import first_pass, verification, what_if, worst
+from tolstat.store import first_pass, known_parts, verification, what_if, worst
 from tolstat.store.counts import Counts
 from tolstat.store.first_pass import FirstPass
+from tolstat.store.known_parts import KnownParts
 from tolstat.store.methods import DRAWN, METHODS
 from tolstat.store.recall import recall
 from tolstat.store.result_file import BLOCK
@@ -147,6 +148,11 @@ class View:
             return None
         return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
 
+    @cached_property
+    def known(self) -> KnownParts | None:
+        """What the study knows of its processes from measured parts; None if it takes its tolerances as exact."""
+        return known_parts.of(self)
+
     @property
     def results(self) -> NDArray[np.void]:
         """Fields `LOAD_FIELDS` of the results, (n,)."""
@@ -216,7 +222,7 @@ class View:
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
             load, skip = LOADS[name], self.store.first_sample
-            drawn = None if self.weights is None else frozen(self.store.origin()["component"][skip:] == 0)
+            drawn = frozen(self.store.origin()["component"][skip:] == 0) if self.aimed else None
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
             values, _, (lower, upper) = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = SampleLoad(
@@ -291,6 +297,14 @@ class View:
     def weighted(self) -> bool:
         """Whether joints have different weights."""
         return self.method == "importance"
+
+    @property
+    def aimed(self) -> bool:
+        """Whether proposals of importance sampling leave out ways to a limit: any but those of unknown processes.
+
+        A process of unknown mean and deviation is wider than the tolerances on all sides.
+        """
+        return self.weighted and any(set(drawn) != {"parts"} for _, drawn in self.store.identity["proposal"])
 
     def check_sample(self, allow_weights: bool = True) -> None:
         """Refuse a file whose joints are no sample of a production, or (unless `allow_weights`) differ in weight.

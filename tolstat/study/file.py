@@ -16,13 +16,14 @@ from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
 from tolstat.joint.overrides import merged
-from tolstat.study import fatigue, listing, points, proposal, selection, swept
+from tolstat.study import fatigue, known, listing, points, proposal, selection, sorting, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.points import Point
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
+from tolstat.study.sorting import Gauge
 from tolstat.study.swept import KEYS, Swept
 from tolstat.study.tolerances import fits, reading
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
@@ -32,7 +33,7 @@ from tolstat.study.tolerances.reading import Nominal, Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
 
-SCATTER = ("tolerances", "correlation", "errors")
+SCATTER = ("tolerances", "correlation", "errors", "reject")
 """Sections that define the joints of most sampling methods; the first is required."""
 SECTIONS_OF = {
     "sweep": ("sweep", "errors"),
@@ -73,6 +74,7 @@ class StudyFile:
         self._faults: list[Fault] = []
         self._claims = Assignments(self.place)
         self._toleranced: dict[str, str] = {}
+        self._together: list[tuple[str, ...]] = []
         self._accepted: set[str] = set()
         allowed = list(sections)
         for key in self.data:
@@ -168,6 +170,7 @@ class StudyFile:
                 self._toleranced |= {name: TOLERANCED[name] for name in selected}
                 written.append((entry, selected))
         found = reading.read(written, Nominal(joint, self.path.parent), self.place, self._faults)
+        self._together = [tuple(entry.quantities) for entry in found.entries]
         self._accepted = {bonus.diameter for bonus in found.rejecting}
         drawn: dict[str, list[str]] = {}
         for quantity in found.distributions:
@@ -194,7 +197,8 @@ class StudyFile:
         found = []
         for number, entry in enumerate(self._list("proposal", ProposalEntry)):
             with gather(self._faults):
-                found.append(proposal.resolve(entry, list(self._toleranced), self.place, ("proposal", number)))
+                names = list(self._toleranced)
+                found.append(proposal.resolve(entry, names, self._together, self.place, ("proposal", number)))
         with gather(self._faults):
             proposal.check_shares(found, self.place)
         return tuple(found)
@@ -220,6 +224,10 @@ class StudyFile:
         with gather(self._faults):
             return swept.read(sweep, variants, nominal.joint, nominal_first, self.place)
         return None
+
+    def rejects(self) -> tuple[Gauge, ...]:
+        """``[reject]``: joints that are rejected at assembly."""
+        return sorting.read(self._entries("reject"), self.path.parent, self.place, self._faults)
 
     def limits(self, at: Sequence[Point]) -> dict[str, float]:
         """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""
@@ -284,11 +292,15 @@ class StudyFile:
             remedy = 'write "random", and run: tolstat rare STUDY --limit "cross1.F > 900 N"'
             self._fault(("sampling", "method"), "'subset' is set by tolstat rare, not in a study", remedy)
         if sampling.method == "importance" and not self.data.get("proposal"):
-            remedy = "add [[proposal]] with share, and widen or shift"
+            remedy = "add [[proposal]] with share, and widen, shift or parts"
             self._fault(("proposal",), "missing table: distributions to draw joints from beside the tolerances", remedy)
         points = math.prod(axis.points for axis in sweep)
         if points > MAX_ROWS:
             self._fault(("sweep",), f"gives {points} joints", f"give at most {MAX_ROWS}")
+
+    def check_known(self, read: Tolerances, copula: Copula, method: str) -> None:
+        """Note entries known from measured parts whose joints cannot be reweighted; call `tolerances` first."""
+        self._faults += known.faults(known.of(read.entries), method, copula.names, self._accepted, self.place)
 
     def check_one_joint(self, solver: Solver) -> None:
         """Note settings that only a campaign can have."""

@@ -13,7 +13,7 @@ no weight exceeds one over the share of the tolerances.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -21,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from tolstat.analysis import process
+from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS, Known, Sums
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import Strict, did_you_mean, dotted
 from tolstat.common.units import Number
@@ -58,11 +60,42 @@ class ProposalEntry(Strict):
             json_schema_extra={"x-table": "shift"},
         ),
     ]
+    parts: Annotated[
+        dict[str, Any],
+        Field(
+            default_factory=dict,
+            description="draws mean and deviation of the scores for each joint anew, as so many parts leave them "
+            f"open, by name or pattern of errors, from {LEAST_PARTS} to {MOST_PARTS}; those of one entry share them",
+            examples=[{"pin*.tilt_[tz]": 30}],
+            json_schema_extra={"x-table": "parts"},
+        ),
+    ]
+
+
+@dataclass(frozen=True)
+class Process:
+    """Errors whose scores have one unknown mean and deviation in each joint; see `analysis.process`.
+
+    Attributes
+    ----------
+    parts : int
+        Number of measured parts that would leave them as open.
+    streams : tuple of str
+        Columns of the errors.
+    """
+
+    parts: int
+    streams: tuple[str, ...]
+
+    @property
+    def known(self) -> Known:
+        """The same without names."""
+        return Known(self.parts, len(self.streams))
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A component of the mixture: share, and mean and deviation of the scores that are not standard normal in it.
+    """A component of the mixture: share, and how the scores are distributed that are not standard normal in it.
 
     Attributes
     ----------
@@ -70,10 +103,20 @@ class Proposal:
         Its share of the joints.
     scores : dict of str to (float, float)
         Mean and standard deviation by column of the errors.
+    processes : tuple of Process
+        Errors with a mean and deviation that are drawn for each joint; none of them is among `scores`.
     """
 
     share: float
     scores: dict[str, tuple[float, float]]
+    processes: tuple[Process, ...] = ()
+
+    def identity(self) -> list[Any]:
+        """JSON values: everything that determines the joints drawn."""
+        drawn: dict[str, Any] = {name: list(own) for name, own in self.scores.items()}
+        if self.processes:
+            drawn["parts"] = [[one.parts, list(one.streams)] for one in self.processes]
+        return [self.share, drawn]
 
     def log_ratio(self, scores: Mapping[str, Array]) -> Array:
         """Logarithm of the density under the proposal over that under the tolerances, (n,)."""
@@ -81,6 +124,9 @@ class Proposal:
         for name, (mean, deviation) in self.scores.items():
             z = scores[name]
             logs += 0.5 * z**2 - 0.5 * ((z - mean) / deviation) ** 2 - math.log(deviation)
+        for one in self.processes:
+            own = np.stack([scores[name] for name in one.streams])
+            logs += process.log_student(Sums(own.sum(axis=0), np.square(own).sum(axis=0)), one.known)
         return logs
 
 
@@ -107,7 +153,13 @@ def component(proposals: Sequence[Proposal], u: Array) -> NDArray[np.intp]:
     return np.minimum(np.searchsorted(ends, u, side="right"), len(proposals))
 
 
-def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: tuple[int | str, ...]) -> Proposal:
+def resolve(
+    entry: ProposalEntry,
+    toleranced: Sequence[str],
+    together: Sequence[Sequence[str]],
+    place: str,
+    path: tuple[int | str, ...],
+) -> Proposal:
     """Expand the patterns of an entry.
 
     Parameters
@@ -116,6 +168,8 @@ def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: t
         Entry as read from the file.
     toleranced : sequence of str
         Quantities that are drawn; of a zone the entry applies to the scores of the radii.
+    together : sequence of sequence of str
+        Those that each entry of the tolerances draws.
     place, path
         File name and key path shown in faults.
 
@@ -131,7 +185,8 @@ def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: t
     if not widen:
         with gather(faults):
             widths = dict.fromkeys(toleranced, _number(entry.widen, "widen", f"{place}: {dotted((*path, 'widen'))}"))
-    for key, table, found in (("widen", widen, widths), ("shift", entry.shift, means)):
+    parts: dict[str, float] = {}
+    for key, table, found in (("widen", widen, widths), ("shift", entry.shift, means), ("parts", entry.parts, parts)):
         for item in entries(table, *path, key):
             where = f"{place}: {dotted(item.path)}"
             with gather(faults):
@@ -145,18 +200,39 @@ def resolve(entry: ProposalEntry, toleranced: Sequence[str], place: str, path: t
         for name in toleranced
         if (means[name], widths[name]) != (0.0, 1.0)
     }
-    if not scores and not faults:
-        faults.append(Fault(f"{place}: {dotted(path)}", "does not differ from the tolerances", "add widen or shift"))
+    whole = f"{place}: {dotted(path)}"
+    if scores and parts:
+        remedy = "write a [[proposal]] for each"
+        faults.append(Fault(whole, "has parts beside widen or shift", remedy))
+    if not (scores or parts) and not faults:
+        faults.append(Fault(whole, "does not differ from the tolerances", "add widen, shift or parts"))
     if faults:
         raise InputError(faults)
-    return Proposal(entry.share, scores)
+    return Proposal(entry.share, scores, tuple(_processes(together, parts)))
+
+
+def _processes(together: Sequence[Sequence[str]], parts: Mapping[str, float]) -> Iterator[Process]:
+    """Errors of one entry of the tolerances with one number of parts are of one process."""
+    for names in together:
+        for number in dict.fromkeys(parts[name] for name in names if name in parts):
+            yield Process(int(number), tuple(streams_of(name)[0] for name in names if parts.get(name) == number))
+
+
+RANGES = {
+    "widen": (1.0 / MAX_WIDEN, MAX_WIDEN),
+    "shift": (-MAX_SHIFT, MAX_SHIFT),
+    "parts": (LEAST_PARTS, MOST_PARTS),
+}
+"""Smallest and largest number of each key."""
 
 
 def _number(value: object, key: str, where: str) -> float:
-    low, high = (1.0 / MAX_WIDEN, MAX_WIDEN) if key == "widen" else (-MAX_SHIFT, MAX_SHIFT)
-    number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
+    (low, high), kinds = RANGES[key], int if key == "parts" else (int, float)
+    number = float(value) if isinstance(value, kinds) and not isinstance(value, bool) else math.nan
     if not low <= number <= high:
-        raise InputError([Fault(where, f"{value!r} is not a valid {key}", f"give a number from {low:g} to {high:g}")])
+        whole = "whole " if key == "parts" else ""
+        remedy = f"give a {whole}number from {low:g} to {high:g}"
+        raise InputError([Fault(where, f"{value!r} is not a valid {key}", remedy)])
     return number
 
 

@@ -26,6 +26,7 @@ from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.proposal import Proposal
+from tolstat.study.sorting import Gauge
 from tolstat.study.swept import Swept
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
@@ -127,6 +128,8 @@ class Study(Case):
         Errors that ``sampling.method`` ``pick_freeze`` exchanges together; empty for other methods.
     fit : Fit, optional
         Fit by ISO 286 that gives the diameters.
+    rejects : tuple of Gauge
+        Inspections at assembly; like limits they affect no joint.
     """
 
     sampling: Sampling
@@ -144,6 +147,7 @@ class Study(Case):
     fatigue: Fatigue = field(default_factory=Fatigue)
     groups: tuple[Group, ...] = ()
     fit: Fit | None = None
+    rejects: tuple[Gauge, ...] = ()
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -258,7 +262,7 @@ class Study(Case):
         if self.axes:
             parts["axes"] = {name: axis.describe() for name, axis in self.axes.items()}
         if self.proposals:
-            parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
+            parts["proposal"] = [proposal.identity() for proposal in self.proposals]
         if self.groups:
             parts["groups"] = [[group.label, list(group.names)] for group in self.groups]
         if self.swept:
@@ -298,7 +302,7 @@ def load_case(path: str | Path) -> Case:
 
 SECTIONS = (
     *("joint", "operation", "solver", "errors", "tolerances", "correlation"),
-    *("sampling", "proposal", "sweep", "grid", "case", "variant", "limits", "fatigue", "output"),
+    *("sampling", "proposal", "sweep", "grid", "case", "variant", "reject", "limits", "fatigue", "output"),
 )
 
 
@@ -341,6 +345,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     sampling = file.model("sampling", Sampling, required=True)
     sweep = file.sweep()
     limits = file.limits(points)
+    rejects = file.rejects()
     fatigue = file.fatigue()
     output = file.model("output", Output)
     listed = None
@@ -355,6 +360,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     if sampling is not None:
         file.check_method(sampling, sweep)
         file.check_points(sampling, sweep, points)
+        file.check_known(read, copula, sampling.method)
     if output is not None:
         file.check_fatigue(output)
         file.check_limits(output, limits)
@@ -386,6 +392,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         swept=joints_swept,
         listed=listed,
         limits=limits,
+        rejects=rejects,
         fatigue=fatigue,
         groups=moved,
     )

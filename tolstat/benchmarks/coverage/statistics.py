@@ -52,6 +52,10 @@ STATISTICS = {
     "share, importance sampling": Statistic(
         "`report`, `capability`", ABOUT, "few effective joints above, without a bound; k of 0.7 and more"
     ),
+    "share, parts and joints": Statistic(
+        "`report`, with `known_from`", ABOUT, "joints that do not support 2.5 % of the likely processes"
+    ),
+    "share, parts left out": Statistic("`report`, without `known_from`", ABOUT, "as importance sampling"),
     "share, other tolerances": Statistic(
         "`reweight`, `allocate`", ABOUT, "large density ratios; few effective joints on a side"
     ),

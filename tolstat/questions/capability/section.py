@@ -24,6 +24,8 @@ def sections(view: View, asked: Asked) -> list[Section]:
         table = query.limits(view)
         blocks.append(as_block("Against each limit, and all of them together", rendering.LIMITS, table))
         blocks += [Text(text.sentence(line), small=True) for line in rendering.note(table).splitlines()]
+    if view.known is not None:
+        blocks.append(Text("For the tolerances as stated: what measured parts leave open is not in these.", small=True))
     blocks += _rare(view)
     title = "Capability and rare loads" if view.limits else "Rare loads"
     return [Section("capability", title, blocks)] if blocks else []

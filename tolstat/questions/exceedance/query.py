@@ -27,6 +27,8 @@ WITHHELD = (
     *ERROR_BUDGET,
 )
 """Shares and intervals, which are not given where the weights of joints do not support them."""
+KNOWN = ("expected", "parts_lower", "parts_upper", "unsupported")
+"""Fields of `known_share.KnownShare` that a row has where tolerances are known from measured parts."""
 MAX_LEVELS = 600
 """Maximum number of points of a curve."""
 READER_LEVELS = 240
@@ -49,6 +51,8 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
         `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
         `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
+        Where tolerances are known from measured parts also ``both_lower``, ``both_upper`` and the fields `KNOWN`, see
+        `known_share.KnownShare`: with unresolved joints and the numerical error; NaN without support.
         Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `SampleLoad.supports`.
     """
@@ -77,6 +81,10 @@ def _above_limit(view: View, load: SampleLoad, confidence: float) -> dict[str, A
     # the load with its numerical error, where that is known
     top = (error_budget.shifted(view, load) or (load, load))[1]
     row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
+    if view.known is not None:
+        known = view.known.share(load.name, confidence)
+        row |= {"both_lower": known.lower, "both_upper": known.upper}
+        row |= {name: getattr(known, name) for name in KNOWN}
     return row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan)
 
 

@@ -47,6 +47,14 @@ def _unsearched(row: Row) -> str:
     return text.percent(row["unsearched_upper"])
 
 
+def _is_known(table: pd.DataFrame) -> bool:
+    return "both_lower" in table
+
+
+def _both(row: Row) -> str:
+    return text.span(row["both_lower"], row["both_upper"])
+
+
 def above(row: Row) -> str:
     """Joints above a limit, and of how many with a valid load."""
     return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
@@ -61,6 +69,7 @@ LIMITS = (
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
     Column("with unresolved joints", _outer, shown=_has_unresolved, rank=2),
     Column("total interval", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=_has_error, rank=3),
+    Column("with measured parts", _both, shown=_is_known, rank=1),
     Column("at most, if ways are missed", _unsearched, shown=_is_weighted),
 )
 """Columns of the table `query.limits`. Joints above are counted among the valid ones, as the share is; the last two
@@ -140,9 +149,13 @@ def note(view: View) -> str:
     if view.weighted:
         text = (
             "joints counted by their weights; bands: pointwise 95 % Clopper–Pearson intervals of as many equal joints "
-            f"as would be as sure{_distrust(view)}; intervals hold if the proposals reach every way to the limit, the "
-            "last column, from the joints of the tolerances alone, whatever they miss"
+            f"as would be as sure{_distrust(view)}"
         )
+        if view.aimed:
+            text += (
+                "; intervals hold if the proposals reach every way to the limit, the "
+                "last column, from the joints of the tolerances alone, whatever they miss"
+            )
     elif view.replicates > 1:
         text = f"bands: pointwise 95 % intervals of the settled joints, {view.interval_of}"
     elif view.iid:

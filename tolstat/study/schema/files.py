@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
+from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import json_schema, loads, strict
 from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
@@ -22,6 +23,7 @@ from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.schema.names import table
 from tolstat.study.schema.parts import DRAFT, Schema, finished, for_unit, of_model, overriding, ranges, with_examples
 from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.sorting import MEASURABLE, RejectEntry
 from tolstat.study.stress_point import StressPointEntry
 from tolstat.study.swept import KEYS
 from tolstat.study.tolerances import fits
@@ -120,6 +122,15 @@ def grid() -> Schema:
     return table(made) | {"description": text}
 
 
+def reject() -> Schema:
+    """JSON schema of the inspections at assembly."""
+    made: dict[str, Schema] = {
+        name: {"x-table": _of_unit(RejectEntry.__name__, unit)} for name, unit in MEASURABLE.items()
+    }
+    text = "Joints that are rejected at assembly by a measured error or clearance; affects no result."
+    return table(made) | {"description": text}
+
+
 def limits() -> Schema:
     """JSON schema of the limits of loads."""
     text = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
@@ -135,10 +146,10 @@ def _positive(unit: str) -> Schema:
     return quantity | json_schema.sign(quantity)
 
 
-def numbers(low: float, high: float) -> Schema:
+def numbers(low: float, high: float, kind: str = "number") -> Schema:
     """JSON schema of numbers by name or pattern of the quantities that are drawn: errors, and vectors of zones."""
     drawn = [own for name in TOLERANCED for own in (vectors_of(name) if is_zone(name) else (name,))]
-    return table({name: {"type": "number", "minimum": low, "maximum": high} for name in drawn})
+    return table({name: {"type": kind, "minimum": low, "maximum": high} for name in drawn})
 
 
 SECTIONS: dict[str, Section] = {
@@ -154,6 +165,7 @@ SECTIONS: dict[str, Section] = {
     "grid": Section(grid),
     "case": Section(lambda: of_model(CaseEntry), repeated=True),
     "variant": Section(lambda: of_model(VariantEntry), repeated=True),
+    "reject": Section(reject),
     "limits": Section(limits),
     "fatigue": Section(lambda: of_model(Settings)),
     "output": Section(lambda: of_model(Output)),
@@ -173,6 +185,7 @@ def tables() -> dict[str, Schema]:
         "solver": of_model(Solver),
         "widen": {"anyOf": [{"type": "number", "minimum": 1 / MAX_WIDEN, "maximum": MAX_WIDEN}, widen]},
         "shift": numbers(-MAX_SHIFT, MAX_SHIFT),
+        "parts": numbers(LEAST_PARTS, MOST_PARTS, "integer"),
         "quantity": {"type": ["string", "number"]},
         fits.KEY: of_model(fits.FitEntry),
         "points": {"type": "object", "additionalProperties": of_model(StressPointEntry)},
@@ -184,6 +197,7 @@ def tables() -> dict[str, Schema]:
     for unit in dict.fromkeys((UNITS | KEYS).values()):
         found[_of_unit(SweepEntry.__name__, unit)] = for_unit(of_model(SweepEntry), unit)
     for unit in dict.fromkeys(UNITS.values()):
+        found[_of_unit(RejectEntry.__name__, unit)] = for_unit(of_model(RejectEntry), unit)
         found[_of_unit("quantity", unit)] = json_schema.quantity(unit, EXAMPLES[unit])
     for unit in dict.fromkeys(UNIT_OF_LOAD.values()):
         found[_of_unit("limit", unit)] = _positive(unit)

@@ -115,6 +115,14 @@ def _read_half_width(value: object, info: ValidationInfo) -> float:
 _NEARLY_ALL = np.array([1e-3, 1.0 - 1e-3])
 """Probabilities between which an error of the operating point must be zero."""
 
+
+def _not_negative(value: float) -> float:
+    if value < 0.0:
+        raise refuse("is negative", "give a standard deviation; 0 for a gauge without error")
+    return value
+
+
+NotNegative = Annotated[Value, AfterValidator(_not_negative)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
 HalfWidth = Annotated[
     float, BeforeValidator(_read_half_width), AfterValidator(units.positive), WithJsonSchema({"x-unit": "error"})
@@ -136,6 +144,14 @@ class ToleranceEntry(strict.Strict):
     @abstractmethod
     def meaning(self, site: Site) -> list[Meaning]:
         """Return what the entry says of the errors that it sets."""
+
+    def measured_parts(self, site: Site) -> int | None:
+        """Return the number of parts that mean and deviation were estimated from; None if they are taken as exact."""
+        return None
+
+    def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
+        """Return the band outside which parts are scrapped, and the gauge's deviation, SI; None if none is."""
+        return None
 
     @model_validator(mode="after")
     def _can_be_built(self, info: ValidationInfo) -> Self:
@@ -198,6 +214,12 @@ class Toleranced(NamedTuple):
     def quantities(self) -> dict[str, Distribution]:
         """Distribution of each quantity that the entry draws."""
         return {name: d for site, model in self.models for name, d in model.quantities(site).items()}
+
+    @property
+    def measured_parts(self) -> int | None:
+        """Number of parts that mean and deviation were estimated from; None if they are taken as exact."""
+        site, model = self.models[0]
+        return model.measured_parts(site)
 
 
 class HalfBand(SingleEntry):

@@ -5,18 +5,15 @@ No statistics of the errors of Cardan crosses are published: the distribution is
 
 from __future__ import annotations
 
-import csv
 import json
 import math
-from io import StringIO
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tolstat.common import strict, units
+from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
+from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import may_quote, read_input
 from tolstat.common.strict import refuse
 from tolstat.study.axes import ORIENTATIONS, columns_of
 from tolstat.study.tolerances import distributions as tolerance
@@ -24,14 +21,15 @@ from tolstat.study.tolerances.entry import (
     Banded,
     HalfBand,
     Meaning,
+    NotNegative,
     Positive,
     PositiveNumber,
-    SingleEntry,
     Site,
     ToleranceEntry,
     Truncate,
     Value,
 )
+from tolstat.study.tolerances.measured import MeasuredEntry
 from tolstat.study.tolerances.moments import mean_square, outside
 from tolstat.study.tolerances.radial import Rayleigh
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
@@ -52,9 +50,42 @@ class NormalEntry(Banded):
         Positive | None, Field(description="standard deviation, in place of `cpk`", examples=["0.05 mm"])
     ] = None
     truncate: Truncate = False
+    known_from: Annotated[
+        int | None,
+        Field(
+            strict=True,
+            ge=LEAST_PARTS,
+            le=MOST_PARTS,
+            description="number of measured parts that mean and sigma were estimated from; affects no result",
+            examples=[50],
+        ),
+    ] = None
+
+    gauge: Annotated[
+        NotNegative | None,
+        Field(
+            description="parts outside the band are scrapped, by a gauge of this standard deviation; affects no result",
+            examples=["0.01 mm"],
+        ),
+    ] = None
+
+    def measured_parts(self, site: Site) -> int | None:
+        """See `ToleranceEntry.measured_parts`."""
+        return self.known_from
+
+    def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
+        """See `ToleranceEntry.gauge_of`."""
+        return None if self.gauge is None else (*self.needed_band(site), self.gauge)
 
     def build(self, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
         """See `ToleranceEntry.build`."""
+        if self.known_from is not None and self.truncate:
+            raise refuse(
+                "known_from is of parts as they are made, truncate of parts that are sorted", "remove one of them"
+            )
+        if self.gauge is not None and self.truncate:
+            raise refuse("gauge scraps parts, with truncate none are left to scrap", "remove one of them")
+        self.gauge_of(site)
         if self.std is not None:
             return self._from_std(self.std, site)
         lower, upper = self.needed_band(site)
@@ -70,10 +101,10 @@ class NormalEntry(Banded):
         band = self.band(site)
         if self.cpk is not None:
             raise refuse("std and cpk both define the standard deviation", "remove one of them")
-        if self.truncate != (band is not None):
+        if (self.truncate or self.gauge is not None) != (band is not None):
             raise refuse(
-                "with std, a band and truncate need each other",
-                "give a band and truncate = true, or neither",
+                "with std, a band and truncate or gauge need each other",
+                "give a band and truncate = true or a gauge, or neither",
             )
         middle = site.center if band is None else 0.5 * sum(band)
         mean = middle if self.mean is None else self.mean
@@ -81,7 +112,7 @@ class NormalEntry(Banded):
             return tolerance.Normal(mean, std)
         if not band[0] < mean < band[1]:
             raise refuse("mean is outside the band", "give lower < mean < upper")
-        return tolerance.TruncatedNormal(mean, std, *band)
+        return tolerance.TruncatedNormal(mean, std, *band) if self.truncate else tolerance.Normal(mean, std)
 
 
 class UniformEntry(Banded):
@@ -211,65 +242,6 @@ class RayleighEntry(HalfBand):
         share = math.nan if band is None else outside(found, *band)
         sigma = math.sqrt(0.5 * mean_square(found))
         return [Meaning(self.number(site), columns_of(site.name), site.unit, sigma, share)]
-
-
-class MeasuredEntry(SingleEntry):
-    """Measured parts of a CSV file with a header row, drawn with equal probability."""
-
-    distribution: Literal["measured"]
-    file: Annotated[str, Field(description="path of the CSV file, from the study's folder", examples=["rattle.csv"])]
-    column: Annotated[str, Field(description="name of the column in the header row", examples=["speed_rpm"])]
-    unit: Annotated[
-        str | None, Field(description="unit of the column; needed unless the error is a pure number", examples=["rpm"])
-    ] = None
-
-    def build(self, site: Site) -> tolerance.Measured:
-        """See `ToleranceEntry.build`."""
-        values = self._column(site.folder / self.file)
-        if self.unit is None and site.unit != "1":
-            raise refuse("missing key unit", 'add the unit of the column, for example unit = "mm"')
-        factor = units.to_si(1.0 if self.unit is None else f"1 {self.unit}", site.unit)
-        return tolerance.Measured.of(factor * value for value in values)
-
-    def number(self, site: Site) -> str:
-        """See `SingleEntry.number`."""
-        return f"{self.build(site).values.size} measured parts"
-
-    def band(self, site: Site) -> None:
-        """See `SingleEntry.band`."""
-
-    def _column(self, path: Path) -> list[float]:
-        try:
-            lines = StringIO(read_input(path, "utf-8-sig"), newline="")
-            rows = csv.DictReader(line for line in lines if line.strip() and not line.startswith("#"))
-            cells = [row.get(self.column) for row in rows]
-            columns = rows.fieldnames or ()
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise refuse(
-                f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"
-            ) from error
-        if self.column not in columns:
-            remedy = strict.did_you_mean(self.column, list(columns)) if may_quote() else "give the name of a column"
-            raise refuse(f"{path} has no column {self.column!r}", remedy)
-        values = []
-        for number, cell in enumerate(cells, start=1):
-            value = _number(cell)
-            if value is None:
-                shown = repr(cell) if may_quote() else "not a finite number"
-                raise refuse(f"{path}: row {number} of {self.column!r} is {shown}", "give a finite number in each row")
-            values.append(value)
-        if len(values) < 2:
-            raise refuse(f"{path} has {len(values)} values in {self.column!r}", "give at least two measured parts")
-        return values
-
-
-def _number(cell: str | None) -> float | None:
-    try:
-        value = float(cell or "")
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
 
 
 KINDS: dict[str, type[ToleranceEntry]] = {

@@ -1,0 +1,166 @@
+"""What measured parts leave open of the process, in shares above limits; see `analysis.known_share`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tolstat.analysis import known_share, process
+from tolstat.analysis.exceedance import FloatArray, Mask
+from tolstat.analysis.known_share import Event, KnownShare, Mixture
+from tolstat.analysis.process import Known, Sums
+from tolstat.analysis.weighted import Split
+from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.tables import Status
+from tolstat.store import error_budget
+from tolstat.store.recall import mentions
+from tolstat.study import known
+from tolstat.study.axes import streams_of
+from tolstat.study.known import KnownEntry
+from tolstat.study.proposal import Proposal
+from tolstat.study.tolerances.distributions import score
+
+if TYPE_CHECKING:
+    from tolstat.store.sample_load import SampleLoad
+    from tolstat.store.view import View
+
+KEYS = ("known_from", "law")
+"""Keys of an entry of ``[tolerances]`` that is known from measured parts."""
+
+
+def of(view: View) -> KnownParts | None:
+    """Read what a file's study knows of its processes; None if it takes its tolerances as exact."""
+    if not (view.sampled and view.limits and mentions(view.store, KEYS, "tolerances")):
+        return None
+    entries = known.of(view.study.entries)
+    return KnownParts(view, entries) if entries else None
+
+
+def _refused(unsupported: float) -> KnownShare:
+    return KnownShare(np.nan, np.nan, np.nan, np.nan, np.nan, unsupported)
+
+
+@dataclass(frozen=True, eq=False)
+class KnownParts:
+    """Shares of the joints of a file above its limits, for each likely process.
+
+    Attributes
+    ----------
+    view : View
+        The file.
+    entries : tuple of KnownEntry
+        Entries of its study that are known from measured parts.
+    """
+
+    view: View
+    entries: tuple[KnownEntry, ...]
+
+    def share(self, name: str, confidence: float) -> KnownShare:
+        """Share above the limit of a load, or above at least one limit (`ALL_LIMITS`).
+
+        Numbers are NaN where so many likely processes are not supported that the upper end would be 1.
+        """
+        if not self._done.any():
+            return _refused(1.0)
+        found = known_share.intervals(*self._tallies[name], self.supported, confidence)
+        refused = found.unsupported >= 0.5 * (1.0 - confidence)
+        return _refused(found.unsupported) if refused else found
+
+    @cached_property
+    def supported(self) -> Mask:
+        """Which of the likely processes the joints support, (K,)."""
+        done = int(self._done.sum())
+        return known_share.supported(done, self._drawn, self._known, self._mixture)
+
+    @property
+    def remedy(self) -> str:
+        """Sentence on what lets a campaign support the likely processes."""
+        parts = ", ".join(f'"{entry.pattern}" = {entry.parts}' for entry in self.entries)
+        if any(own is not None for part in self._mixture for own in part.parts):
+            return f"Simulate more joints, or draw them anew with parts = {{ {parts} }} in [[proposal]]"
+        return f'Draw them with method = "importance" and [[proposal]] share = 0.8, parts = {{ {parts} }}'
+
+    @property
+    def _known(self) -> tuple[Known, ...]:
+        return tuple(Known(entry.parts, len(entry.names)) for entry in self.entries)
+
+    @property
+    def _drawn(self) -> process.Draws:
+        return process.draws(tuple(entry.parts for entry in self.entries))
+
+    @property
+    def _mixture(self) -> list[Mixture]:
+        """Parts of the distribution that joints were drawn from which differ from the tolerances in no other way."""
+        proposals = self.view.study.proposals
+        tolerances = 1.0 - sum(proposal.share for proposal in proposals)
+        found = [Mixture(tolerances, (None,) * len(self.entries))]
+        for proposal in proposals:
+            parts = [_parts_of(entry, proposal) for entry in self.entries]
+            others = len(proposal.scores) + len(proposal.processes) - sum(own is not None for own in parts)
+            if not others:
+                found.append(Mixture(proposal.share, tuple(parts)))
+        return found
+
+    @cached_property
+    def _done(self) -> Mask:
+        return np.asarray(self.view.status != Status.PENDING)
+
+    @cached_property
+    def _tallies(self) -> dict[str, tuple[Split, list[Split], list[Split]]]:
+        """Weights above each limit: of joints with a valid load; for the lower end; and for the upper end."""
+        view = self.view
+        names = [*view.limits, ALL_LIMITS]
+        events: list[Event] = []
+        places = []
+        for load in view.loads(names):
+            ends = (load, *(error_budget.shifted(view, load) or ()))
+            own = [self._plain(load), *(self._fewest(end) for end in ends), *(self._most(end) for end in ends)]
+            places.append((len(events), len(ends)))
+            events += own
+        done = self._done
+        events = [Event(event.above[done], event.counted[done]) for event in events]
+        weights = None if view.weights is None else view.weights[done]
+        found = known_share.tallies(self._sums(), self._known, self._drawn, weights, events)
+        return {
+            name: (found[k], found[k + 1 : k + 1 + m], found[k + 1 + m : k + 1 + 2 * m])
+            for name, (k, m) in zip(names, places, strict=True)
+        }
+
+    def _sums(self) -> list[Sums]:
+        """Sums of the scores of each entry's errors, in the joints that have been simulated."""
+        view = self.view
+        names = [name for entry in self.entries for name in entry.names]
+        parts = []
+        for errors in view.error_blocks(names):
+            scores = {name: score(view.study.tolerances[name], np.asarray(errors[name])) for name in names}
+            stacked = (np.stack([scores[name] for name in entry.names]) for entry in self.entries)
+            parts.append([(own.sum(axis=0), np.square(own).sum(axis=0)) for own in stacked])
+        each = zip(*parts, strict=True)
+        return [Sums(*(np.concatenate(one)[self._done] for one in zip(*entry, strict=True))) for entry in each]
+
+    def _plain(self, load: SampleLoad) -> Event:
+        assert load.limit is not None
+        return Event(load.values > load.limit, load.is_valid)
+
+    def _fewest(self, load: SampleLoad) -> Event:
+        """Event with all joints without a valid load below, and the least load of those that never repeat."""
+        assert load.limit is not None
+        return Event(load.is_valid & (_finite(load.ends[0], load.values) > load.limit), self._done)
+
+    def _most(self, load: SampleLoad) -> Event:
+        """Event with all joints without a valid load above, and the largest load of those that never repeat."""
+        assert load.limit is not None
+        return Event(~load.is_valid | (_finite(load.ends[1], load.values) > load.limit), self._done)
+
+
+def _finite(ends: FloatArray, values: FloatArray) -> FloatArray:
+    return np.where(np.isfinite(ends), ends, values)
+
+
+def _parts_of(entry: KnownEntry, proposal: Proposal) -> int | None:
+    """Number of parts of a proposal's process of exactly the errors of an entry; None if it has none."""
+    streams = {streams_of(name)[0] for name in entry.names}
+    return next((one.parts for one in proposal.processes if set(one.streams) == streams), None)

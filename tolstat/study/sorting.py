@@ -1,0 +1,122 @@
+"""Parts that are scrapped, and joints that are rejected at assembly, by what a gauge measures of them.
+
+Neither is drawn otherwise: a joint counts by the probability that its parts and itself are accepted, so that one
+campaign tells the shares before and after.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from tolstat.analysis import sorting
+from tolstat.common import strict
+from tolstat.common.errors import Fault, gather
+from tolstat.common.strict import Strict, refuse
+from tolstat.common.tables import HOLES, PINS
+from tolstat.joint import HOLE_OF_PIN, Joint
+from tolstat.study import selection
+from tolstat.study.selection import UNITS, Entry
+from tolstat.study.tolerances.entry import NotNegative, Site, Toleranced, Value
+
+MEASURABLE = {name: unit for name, unit in UNITS.items() if name.startswith(("pin", "hole"))}
+"""Errors that can be measured at assembly, and their units; of ``pin1.clearance`` the radial clearance itself."""
+CROSS, INPUT, OUTPUT = PARTS = ("cross", "input fork", "output fork")
+"""Parts of a joint. The four pins are of one part: the worst of them scraps the cross."""
+
+
+class RejectEntry(Strict):
+    """Joints that are rejected at assembly by a measured value."""
+
+    below: Annotated[Value | None, Field(description="smaller measured values are rejected", examples=["0.06 mm"])] = (
+        None
+    )
+    above: Annotated[Value | None, Field(description="larger measured values are rejected", examples=["0.14 mm"])] = (
+        None
+    )
+    gauge: Annotated[
+        NotNegative, Field(description="standard deviation of the measurement; exact by default", examples=["0.005 mm"])
+    ] = 0.0
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> Self:
+        if self.below is None and self.above is None:
+            raise refuse("rejects nothing", "add below or above")
+        if self.below is not None and self.above is not None and not self.below < self.above:
+            raise refuse("below is not smaller than above: every joint is rejected", "give below < above")
+        return self
+
+
+class Gauge(NamedTuple):
+    """What is measured, and which values are accepted.
+
+    Attributes
+    ----------
+    name : str
+        An error, or ``pin1.clearance``, the radial clearance of a pin.
+    lower, upper : float
+        Accepted values, SI.
+    deviation : float
+        Standard deviation of the gauge, SI.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    deviation: float
+
+    @property
+    def part(self) -> str:
+        """Part that the error is of."""
+        return part_of(self.name)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the errors that it measures."""
+        pin, _, key = self.name.partition(".")
+        return (self.name, f"{pin}.diameter", f"{HOLE_OF_PIN[pin]}.diameter") if key == "clearance" else (self.name,)
+
+    def accepted(self, errors: NDArray[np.void], joint: Joint) -> NDArray[np.float64]:
+        """Probability that each joint is accepted, (n,), from its errors."""
+        values = np.asarray(errors[self.name])
+        if self.name.endswith(".clearance"):
+            _, pin, hole = self.columns
+            nominal = joint.contact.D_H - joint.contact.D_P
+            values = values + 0.5 * (nominal + np.asarray(errors[hole]) - np.asarray(errors[pin]))
+        return sorting.accepted(values, self.lower, self.upper, self.deviation)
+
+
+def part_of(name: str) -> str:
+    """Part that an error or zone is of; empty for operating point and material."""
+    feature = name.partition(".")[0]
+    if feature in PINS or feature.endswith("_pins"):
+        return CROSS
+    if feature in (*HOLES[:2], "input_holes"):
+        return INPUT
+    return OUTPUT if feature in (*HOLES[2:], "output_holes") else ""
+
+
+def of_parts(entries: Sequence[Toleranced]) -> list[Gauge]:
+    """Gauges that scrap parts: those of the entries of ``[tolerances]``."""
+    each = ((site, model.gauge_of(site)) for entry in entries for site, model in entry.models)
+    return [Gauge(site.name, *found) for site, found in each if found is not None]
+
+
+def read(written: Sequence[Entry], folder: Path, place: str, faults: list[Fault]) -> tuple[Gauge, ...]:
+    """Read ``[reject]``: what is measured of assembled joints; faults are added to `faults`."""
+    found: list[Gauge] = []
+    for entry in written:
+        with gather(faults):
+            names = selection.resolve(entry, MEASURABLE, place)
+            context: Mapping[str, Any] = {"site": Site(names[0], MEASURABLE[names[0]], 0.0, folder)}
+            own = strict.validate(RejectEntry, entry.value, place, prefix=entry.path, context=dict(context))
+            lower = -math.inf if own.below is None else own.below
+            upper = math.inf if own.above is None else own.above
+            found += [Gauge(name, lower, upper, own.gauge) for name in names]
+    return tuple(found)

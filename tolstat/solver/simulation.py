@@ -276,7 +276,8 @@ def simulate_together(
         out = np.zeros(len(part), KERNEL_RESULT).view(np.recarray)
         rows, allowed = part.view(np.recarray), left[here]
         if steps is None:
-            lockstep(rows, words, allowed, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+            begun = starts(rows, options)
+            lockstep(rows, words, begun, allowed, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
             again = np.flatnonzero(out["status"] == Status.PENDING)
             found, remaining = out[again], allowed[again]
             for i, revolution in simulate_alone(part[again], options, remaining, keep, found):
@@ -289,6 +290,16 @@ def simulate_together(
         if len(blocks):
             for_kernels(blocks)[here] = own
         yield from zip(here.tolist(), samples, strict=False)
+
+
+def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
+    """Where the search for the start of each joint begins, (n, 55), see `kernel.revolution.starts`."""
+    from tolstat.kernel.mechanics.topology import N_DOF
+    from tolstat.kernel.revolution.starts import write_starts
+
+    alone, found = scratch(options), np.zeros((len(rows), N_DOF))
+    write_starts(rows, options, alone.work, alone.state, found)
+    return found
 
 
 def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int64]:

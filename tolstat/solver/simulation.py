@@ -208,9 +208,9 @@ def simulate_rows(
 
     steps = explicit_steps(params, options)
     results = np.zeros(len(params), RESULT)
-    hitting = np.flatnonzero(steps)
-    if len(hitting):
-        results[hitting], _ = simulate(hitting, options._replace(max_revs=min(options.max_revs, UNIFORM_REVS)))
+    explicit = np.flatnonzero(steps)
+    if len(explicit):
+        results[explicit], _ = simulate(explicit, options._replace(max_revs=min(options.max_revs, UNIFORM_REVS)))
     others = np.flatnonzero((steps == 0) | (results["status"] == Status.NEWTON_FAILED))
     if len(others):
         results[others], _ = simulate(others, options)
@@ -308,17 +308,23 @@ def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int
     These are joints whose torque reverses, or nearly does, unless a revolution takes too many stable steps: where
     contacts hit, error-controlled steps are hardly longer, and each costs five times as much.
     """
-    steps = np.zeros(len(params), np.int64)
-    hitting = np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
-    if not len(hitting) or not refinement.may_refine(options) or not in_lanes(refinement.settings(options)):
+    steps, these = np.zeros(len(params), np.int64), hitting(params, options)
+    if not len(these):
         return steps
     from tolstat.kernel.lanes.explicit import count_steps
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
-    own = np.zeros(len(hitting), np.int64)
-    count_steps(params[hitting].view(np.recarray), options, scratch(options).work, own)
-    steps[hitting] = np.where(own <= MOST_STEPS, own, 0)
+    own = np.zeros(len(these), np.int64)
+    count_steps(params[these].view(np.recarray), options, scratch(options).work, own)
+    steps[these] = np.where(own <= MOST_STEPS, own, 0)
     return steps
+
+
+def hitting(params: NDArray[np.void], options: Options) -> NDArray[np.intp]:
+    """Indices of the joints whose torque reverses, or nearly does, if they are to be refined."""
+    if not refinement.may_refine(options) or not in_lanes(refinement.settings(options)):
+        return np.zeros(0, np.intp)
+    return np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
 
 
 def _resolved(

@@ -1,8 +1,8 @@
 """Work arrays of one joint: allocated once per process, rewritten for every joint; no step allocates.
 
 They are the fields of one record: it passes between kernels as one pointer, and the shapes are constants to the
-compiler. What lies in arrays of one shape goes through one compiled version of a kernel: hence one array of 6 x 6 blocks. (With some thirty arrays in a NamedTuple instead, every call copied the arrays' descriptors, and a residual
-took five times as long.)
+compiler. (With some thirty arrays in a NamedTuple instead, every call copied the arrays' descriptors, and a residual
+took five times as long.) All 6 x 6 blocks lie in one array: a kernel is compiled once for each shape.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE = 9, 10, 11, 12, 13, 14
 N_STATION = 15
 
 HUB_PIN, PIN_HUB, PIN_ARM, ARM_PIN = N_LUMPS, N_LUMPS + 4, N_LUMPS + 8, N_LUMPS + 12
-"""First matrix of each kind in ``work.block``, after those of the lumps: rows of the hub, columns of pin p; and so on."""
+"""First matrix of each kind in ``work.block``, after those of the lumps: rows hub, columns pin p; and so on."""
 ARM_PSI, PSI_ARM, PIN_PSI, PSI_PIN, HUB_PSI, PSI_HUB = 0, 4, 8, 12, 16, 17
 """First vector of each kind in ``work.edge``: column psi, rows of an arm; row psi, columns of an arm; and so on."""
 

@@ -1,5 +1,7 @@
-"""Where the search for the start of each joint begins, for the lock-step, which then has no equations of motion for plain
-numbers: they are compiled here."""
+"""Where the search for the start of each joint begins, computed joint by joint.
+
+The lock-step does not compute it, so that it has no equations of motion for plain numbers to compile.
+"""
 
 from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.revolution.quasistatic import angle_time

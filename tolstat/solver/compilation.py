@@ -30,7 +30,7 @@ def _reversing() -> NDArray[np.void]:
 
 
 def _starts(options: Options) -> None:
-    simulation.starts(_outside(), options)
+    simulation.starts(np.zeros(1, PARAM).view(np.recarray), options)
 
 
 def _lockstep(options: Options) -> None:

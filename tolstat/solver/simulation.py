@@ -293,12 +293,16 @@ def simulate_together(
 
 
 def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
-    """Where the search for the start of each joint begins, (n, 55), see `kernel.revolution.starts`."""
+    """Where the search for the start of each joint begins, (n, 55), see `kernel.revolution.starts`.
+
+    The kernel is not called, and so not compiled, for joints with negative clearance alone: these end at once.
+    """
     from tolstat.kernel.mechanics.topology import N_DOF
     from tolstat.kernel.revolution.starts import write_starts
 
     alone, found = scratch(options), np.zeros((len(rows), N_DOF))
-    write_starts(rows, options, alone.work, alone.state, found)
+    if (rows["clearance"] >= 0).all(axis=1).any():
+        write_starts(rows, options, alone.work, alone.state, found)
     return found
 
 

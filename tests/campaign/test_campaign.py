@@ -129,7 +129,7 @@ def test_progress_hears_the_start_and_every_block(tmp_path: Path) -> None:
     assert heard[-1] == Counts(40, 40, 4, 4)
 
 
-def warm(calls: list[str], options: Options) -> None:
+def warm(calls: list[str], options: Options, params: np.ndarray) -> None:
     calls.append("warm")
 
 

@@ -145,7 +145,7 @@ def test_a_singular_block_is_reported(params):
     work = make_work()
     dynamics.forces(0.0, np.zeros(N_DOF), np.zeros(N_DOF), params()[0], work)
     tangent.assemble(2000.0, 4e6, params()[0], work)
-    work.lump_block[5, 0, 0] = 0.0
+    work.block[5, 0, 0] = 0.0
     assert not linsolve.factorise(work)
-    work.lump_block[5, 0, 0] = np.nan
+    work.block[5, 0, 0] = np.nan
     assert not linsolve.factorise(work)

@@ -37,7 +37,7 @@ def no_histories(*_: object) -> dict[str, HistorySpec]:
     return {}
 
 
-def warm_up(_: Options) -> None:
+def warm_up(_: Options, __: np.ndarray | None = None) -> None:
     """Stub: there is nothing to compile."""
 
 

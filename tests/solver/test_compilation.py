@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tolstat.common.tables import Options
-from tolstat.solver import compilation
+from tolstat.solver import compilation, simulation
 
 
 @pytest.fixture
@@ -34,22 +34,34 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     noted: dict[str, Callable[[Options], None]] = {name: partial(note, name) for name in compilation.KERNELS}
     monkeypatch.setattr(subprocess, "Popen", Process)
     monkeypatch.setattr(compilation, "missing", compilation.kernels)
+    monkeypatch.setattr(simulation, "in_lanes", lambda _: True)
     monkeypatch.setattr(compilation, "available_cores", lambda: 2)
     monkeypatch.setattr(compilation, "KERNELS", noted)
     return called
 
 
-def test_every_other_kernel_is_compiled_in_a_second_process(calls: list[str]) -> None:
+def test_some_kernels_are_compiled_in_a_second_process(calls: list[str]) -> None:
     compilation.warm_up()
     said, *own = calls
-    assert own[: own.index("wait")] == ["lockstep.lockstep", "explicit.count_steps", "rainflow.count_joint"]
-    assert "compile_kernels(['explicit.explicit', 'simulate.simulate_joint'], Options(" in said
+    assert own[: own.index("wait")] == ["lockstep.lockstep", "rainflow.count_joint"]
+    others = "['simulate.simulate_joint', 'starts.write_starts']"
+    assert f"compile_kernels({others}, Options(" in said
     compile(said, "said", "exec")
     assert own[own.index("wait") + 2 :] == compilation.kernels(Options())  # loaded
 
 
+def test_explicit_steps_are_compiled_for_joints_that_need_them(calls: list[str], params: Any) -> None:
+    compilation.warm_up(Options(), params())
+    assert not {"explicit.explicit", "explicit.count_steps"} & set(calls)
+    assert set(compilation.kernels(Options(), compilation._reversing())) == set(compilation.KERNELS)
+    assert compilation.halves(list(compilation.KERNELS)) == (
+        ["lockstep.lockstep", "starts.write_starts", "explicit.count_steps", "rainflow.count_joint"],
+        ["simulate.simulate_joint", "explicit.explicit"],
+    )
+
+
 def test_one_core_compiles_alone(calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compilation, "available_cores", lambda: 1)
-    compilation.warm_up(Options(max_refinements=0))
+    compilation.warm_up(Options())
     assert "wait" not in calls
     assert set(calls) == set(compilation.KERNELS) - {"explicit.explicit", "explicit.count_steps"}

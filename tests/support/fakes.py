@@ -230,7 +230,7 @@ def simulate_badly(
     return simulate(params, options, histories, n_harmonics)
 
 
-def warm_up(options: Options) -> None:
+def warm_up(options: Options, params: np.ndarray | None = None) -> None:
     """Compile nothing."""
 
 

@@ -56,8 +56,9 @@ class Stages(NamedTuple):
     simulate : callable
         (m,) table PARAM, Options, ``histories=``, ``n_harmonics=`` -> Simulation; pickled to other processes.
     warm_up : callable
-        Options -> None: compiles what `simulate` needs with them. Called before workers start, so that they need not
-        all compile; then called in each worker, to load the compiled code outside the time limit of a joint.
+        Options, some joints or None -> None: compiles what `simulate` needs with them. Called before workers start, so
+        that they need not all compile; then called in each worker, to load the compiled code outside the time limit of
+        a joint.
     origins : callable
         Study, rows of the campaign (range) -> which proposal or level gave each joint, consecutive tables; None if the
         sampling method has no such table (`draw_records.columns`).
@@ -68,7 +69,7 @@ class Stages(NamedTuple):
     perturb: Callable[..., NDArray[np.void]]
     history_specs: Callable[..., Mapping[str, HistorySpec]]
     simulate: Callable[..., Simulation]
-    warm_up: Callable[[Options], object]
+    warm_up: Callable[..., object]
     origins: Callable[..., Iterable[NDArray[np.void]] | None] = lambda *_: None
 
 
@@ -285,10 +286,10 @@ def settings_in_use(study: Study, store: Reader) -> list[Options]:
     return list(dict.fromkeys([*(settings(solver, store.fidelity) for solver in study.solvers), *retried]))
 
 
-def prepare(warm_up: Callable[[Options], object], options: Iterable[Options]) -> None:
-    """Compile what joints with any of the options need, or load it."""
+def prepare(warm_up: Callable[..., object], options: Iterable[Options], params: NDArray[np.void] | None = None) -> None:
+    """Compile what joints with any of the options need, such as `params`, or load it."""
     for one in options:
-        warm_up(one)
+        warm_up(one, params)
 
 
 def _blocks(

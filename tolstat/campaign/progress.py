@@ -76,7 +76,7 @@ def kernels() -> str:
     """Name of the stage that makes the kernels ready: says that they are compiled if they are not in the cache."""
     from tolstat.solver.compilation import is_compiled
 
-    return "loading the kernels" if is_compiled() else "compiling the kernels, about a minute, once"
+    return "loading the kernels" if is_compiled() else "compiling the kernels, about half a minute, once"
 
 
 class Display:

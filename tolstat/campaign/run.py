@@ -41,6 +41,10 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 
+SOME = 64
+"""Number of joints that tell which kernels a campaign needs."""
+
+
 class Interrupted(Exception):
     """A campaign was stopped by a signal; the file holds all finished blocks.
 
@@ -145,7 +149,7 @@ def run(
         try:
             if next(pending(store, last), None) is not None:
                 stage(kernels())
-                prepare(stages.warm_up, settings_in_use(study, store))
+                prepare(stages.warm_up, settings_in_use(study, store), _some_joints(study, store, stages))
                 store.begin_session(counts.done)
             stage(JOINTS)
             work = work_of(study, store, stages, execution)
@@ -239,6 +243,12 @@ def _rows_of(study: Study, store: Reader, stages: Stages, rows: NDArray[np.intp]
     """Return the parameters of the joints in file slots `rows`, (m,) table PARAM."""
     errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
     return perturbed(study, store.row(rows), errors, stages.perturb)
+
+
+def _some_joints(study: Study, store: Reader, stages: Stages) -> NDArray[np.void]:
+    """Return the parameters of some joints at each point: kernels that none of them needs are not compiled ahead."""
+    rows = np.unique(np.linspace(0, store.n - 1, min(store.n, SOME)).astype(np.intp))
+    return np.concatenate([_rows_of(study.at(one.point or ""), one, stages, rows) for one in store.each()])
 
 
 def choose_fidelity(study: Study, stages: Stages | None = None, execution: Execution | None = None) -> dict[str, Any]:

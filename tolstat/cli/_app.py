@@ -288,7 +288,7 @@ def announce_compilation() -> None:
     from tolstat.solver.compilation import is_compiled
 
     if not is_compiled():
-        say("compiling the kernels: about a minute, once per machine and version")
+        say("compiling the kernels: about half a minute, once per machine and version")
 
 
 def as_text(summary: dict[str, Any]) -> str:

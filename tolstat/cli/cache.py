@@ -15,7 +15,7 @@ def cache(
     """Show where compiled kernels are kept, or remove them.
 
     Prints the folders with compiled kernels, one for each version of tolstat and Numba that was used, and their sizes.
-    Kernels are compiled at the first use, about a minute; a file that is damaged is compiled anew by itself. The
+    Kernels are compiled at the first use, about half a minute; a file that is damaged is compiled anew by itself. The
     environment variable NUMBA_CACHE_DIR names another folder for them.
 
     Example: tolstat cache

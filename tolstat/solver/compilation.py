@@ -29,6 +29,10 @@ def _reversing() -> NDArray[np.void]:
     return params
 
 
+def _starts(options: Options) -> None:
+    simulation.starts(np.zeros(1, PARAM).view(np.recarray), options)
+
+
 def _lockstep(options: Options) -> None:
     found = np.zeros(1, RESULT).view(np.recarray)
     list(simulation.simulate_together(_outside(), options, np.ones(1, np.int64), False, found))
@@ -55,27 +59,35 @@ def _rainflow(options: Options) -> None:
 
 KERNELS: dict[str, Callable[[Options], None]] = {
     "lockstep.lockstep": _lockstep,
-    "explicit.explicit": _explicit,
-    "explicit.count_steps": _count_steps,
     "simulate.simulate_joint": _alone,
+    "explicit.explicit": _explicit,
+    "starts.write_starts": _starts,
+    "explicit.count_steps": _count_steps,
     "rainflow.count_joint": _rainflow,
 }
 """Name of each kernel that Python calls in its cache, and a call that compiles it; those that take longest first."""
 
+SHARES = {"lockstep.lockstep": 10, "simulate.simulate_joint": 8, "explicit.explicit": 8, "starts.write_starts": 2}
+"""How long they take to compile, as ratios; others 1."""
 
-def kernels(options: Options) -> list[str]:
-    """Names of the kernels that joints with these settings need."""
-    left_out = set() if simulation.in_lanes(options) else {"lockstep.lockstep"}
-    if not refinement.may_refine(options):
+
+def kernels(options: Options, params: NDArray[np.void] | None = None) -> list[str]:
+    """Names of the kernels that joints with these settings need.
+
+    Kernels with explicit steps are only among them where one of the joints `params` needs them; without them such a
+    joint compiles them when it is simulated.
+    """
+    left_out = set() if simulation.in_lanes(options) else {"lockstep.lockstep", "starts.write_starts"}
+    if params is None or not len(simulation.hitting(params, options)):
         left_out |= {"explicit.explicit", "explicit.count_steps"}
     return [name for name in KERNELS if name not in left_out]
 
 
-def missing(options: Options) -> list[str]:
+def missing(options: Options, params: NDArray[np.void] | None = None) -> list[str]:
     """Names of those that do not lie in the cache."""
     from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
 
-    return [name for name in kernels(options) if not any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))]
+    return [name for name in kernels(options, params) if not any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))]
 
 
 def is_compiled(options: Options | None = None) -> bool:
@@ -83,13 +95,24 @@ def is_compiled(options: Options | None = None) -> bool:
     return not missing(options or Options())
 
 
-def warm_up(options: Options | None = None) -> None:
-    """Compile the kernels that `options` need, every other one in a second process, or load them from the cache."""
+def warm_up(options: Options | None = None, params: NDArray[np.void] | None = None) -> None:
+    """Compile the kernels that joints with `options` need, such as `params`, in two processes, or load them."""
     options = options or Options()
-    uncompiled = missing(options)
-    with _compiling(uncompiled[1::2], options):
-        compile_kernels(uncompiled[::2], options)
-    compile_kernels(kernels(options), options)
+    own, others = halves(missing(options, params))
+    with _compiling(others, options):
+        compile_kernels(own, options)
+    compile_kernels(kernels(options, params), options)
+
+
+def halves(names: list[str]) -> tuple[list[str], list[str]]:
+    """Divide kernels between two processes that take about as long: each goes to the one that is done earlier."""
+    parts: tuple[list[str], list[str]] = [], []
+    busy = [0, 0]
+    for name in names:
+        earlier = int(busy[1] < busy[0])
+        parts[earlier].append(name)
+        busy[earlier] += SHARES.get(name, 1)
+    return parts
 
 
 def compile_kernels(names: list[str], options: Options) -> None:

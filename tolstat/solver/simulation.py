@@ -208,9 +208,9 @@ def simulate_rows(
 
     steps = explicit_steps(params, options)
     results = np.zeros(len(params), RESULT)
-    hitting = np.flatnonzero(steps)
-    if len(hitting):
-        results[hitting], _ = simulate(hitting, options._replace(max_revs=min(options.max_revs, UNIFORM_REVS)))
+    explicit = np.flatnonzero(steps)
+    if len(explicit):
+        results[explicit], _ = simulate(explicit, options._replace(max_revs=min(options.max_revs, UNIFORM_REVS)))
     others = np.flatnonzero((steps == 0) | (results["status"] == Status.NEWTON_FAILED))
     if len(others):
         results[others], _ = simulate(others, options)
@@ -276,7 +276,8 @@ def simulate_together(
         out = np.zeros(len(part), KERNEL_RESULT).view(np.recarray)
         rows, allowed = part.view(np.recarray), left[here]
         if steps is None:
-            lockstep(rows, words, allowed, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
+            begun = starts(rows, options)
+            lockstep(rows, words, begun, allowed, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
             again = np.flatnonzero(out["status"] == Status.PENDING)
             found, remaining = out[again], allowed[again]
             for i, revolution in simulate_alone(part[again], options, remaining, keep, found):
@@ -291,23 +292,43 @@ def simulate_together(
         yield from zip(here.tolist(), samples, strict=False)
 
 
+def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
+    """Where the search for the start of each joint begins, (n, 55), see `kernel.revolution.starts`.
+
+    The kernel is not called, and so not compiled, for joints with negative clearance alone: these end at once.
+    """
+    from tolstat.kernel.mechanics.topology import N_DOF
+    from tolstat.kernel.revolution.starts import write_starts
+
+    alone, found = scratch(options), np.zeros((len(rows), N_DOF))
+    if (rows["clearance"] >= 0).all(axis=1).any():
+        write_starts(rows, options, alone.work, alone.state, found)
+    return found
+
+
 def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int64]:
     """Least stable number of explicit steps a revolution of joints that are refined with them, (n,); 0 for others.
 
     These are joints whose torque reverses, or nearly does, unless a revolution takes too many stable steps: where
     contacts hit, error-controlled steps are hardly longer, and each costs five times as much.
     """
-    steps = np.zeros(len(params), np.int64)
-    hitting = np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
-    if not len(hitting) or not refinement.may_refine(options) or not in_lanes(refinement.settings(options)):
+    steps, these = np.zeros(len(params), np.int64), hitting(params, options)
+    if not len(these):
         return steps
     from tolstat.kernel.lanes.explicit import count_steps
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
-    own = np.zeros(len(hitting), np.int64)
-    count_steps(params[hitting].view(np.recarray), options, scratch(options).work, own)
-    steps[hitting] = np.where(own <= MOST_STEPS, own, 0)
+    own = np.zeros(len(these), np.int64)
+    count_steps(params[these].view(np.recarray), options, scratch(options).work, own)
+    steps[these] = np.where(own <= MOST_STEPS, own, 0)
     return steps
+
+
+def hitting(params: NDArray[np.void], options: Options) -> NDArray[np.intp]:
+    """Indices of the joints whose torque reverses, or nearly does, if they are to be refined."""
+    if not refinement.may_refine(options) or not in_lanes(refinement.settings(options)):
+        return np.zeros(0, np.intp)
+    return np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
 
 
 def _resolved(

@@ -45,20 +45,21 @@ class Dense:
 def dense(work: np.record) -> NDArray[np.float64]:
     """Tangent as one matrix, (55, 55): the blocks of ``work`` after assembly and before elimination."""
     from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, N_DOF, PIN, PSI
-    from tolstat.kernel.mechanics.work import PSI_PSI
+    from tolstat.kernel.mechanics.work import ARM_PIN, ARM_PSI, HUB_PIN, PIN_ARM, PIN_HUB, PSI_ARM
 
     s = np.zeros((N_DOF, N_DOF))
-    s[:6, :6] = work.lump_block[0]
+    m, e = work.block, work.edge
+    s[:6, :6] = m[0]
     for p in range(4):
         pin, arm = 6 * (PIN + p), 6 * (ARM + ARM_OF_PIN[p])
         i, j = slice(pin, pin + 6), slice(arm, arm + 6)
-        s[i, i], s[j, j] = work.lump_block[PIN + p], work.lump_block[ARM + ARM_OF_PIN[p]]
-        s[:6, i], s[i, :6] = work.hub_pin[p], work.pin_hub[p]
-        s[i, j], s[j, i] = work.pin_arm[p], work.arm_pin[p]
+        s[i, i], s[j, j] = m[PIN + p], m[ARM + ARM_OF_PIN[p]]
+        s[:6, i], s[i, :6] = m[HUB_PIN + p], m[PIN_HUB + p]
+        s[i, j], s[j, i] = m[PIN_ARM + p], m[ARM_PIN + p]
     for a in range(4):
         rows = slice(6 * (ARM + a), 6 * (ARM + a) + 6)
-        s[rows, PSI], s[PSI, rows] = work.arm_psi[a], work.psi_arm[a]
-    s[PSI, PSI] = work.core[0, PSI_PSI, 0]
+        s[rows, PSI], s[PSI, rows] = e[ARM_PSI + a], e[PSI_ARM + a]
+    s[PSI, PSI] = work.psi_psi[0]
     return s
 
 

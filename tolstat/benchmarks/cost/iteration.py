@@ -109,7 +109,8 @@ def _tally(these: Sample) -> NDArray[np.int64]:
     samples, blocks = make_samples(0, options.steps_per_rev), np.zeros((0, 0), KERNEL_RESULT).view(np.recarray)
     rows = params.view(np.recarray)
     left, scratch = np.full(len(params), UNLIMITED), simulation.scratch(options)
-    lockstep(rows, words, left, options, PATIENCE, scratch, batch, samples, blocks, out, tally)
+    starts = simulation.starts(rows, options)
+    lockstep(rows, words, starts, left, options, PATIENCE, scratch, batch, samples, blocks, out, tally)
     return tally
 
 

@@ -40,8 +40,9 @@ from tolstat.kernel.lanes.course import (
 )
 from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.lanes.rounds import begin, classify_lanes, correct, refactorise
+from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
-from tolstat.kernel.revolution.closeup import on_a_peak, switches
+from tolstat.kernel.revolution.closeup import on_a_peak, recall, switches
 from tolstat.kernel.revolution.equilibrium import CV_STATIC
 from tolstat.kernel.revolution.quasistatic import angle_time, speed_ratios
 from tolstat.kernel.revolution.resolve import Past, follows_error
@@ -55,15 +56,12 @@ from tolstat.kernel.revolution.simulate import (
     PENDING,
     QUASISTATIC,
     RAMP,
-    acceleration,
     clear,
     clear_results,
     finish,
     inside_model,
     is_finite,
-    recall,
     residual,
-    rigid_guess,
     write_counters,
     write_diagnostics,
 )
@@ -158,12 +156,12 @@ def next_closeup_step(lane, k, par, options, alone, batch, samples, out):
     samples : ndarray of SAMPLE, shape (steps_per_rev,)
         Recorded revolution of the joint.
     """
-    work, state, _, _ = alone
+    state = alone.state
     control, n, h = batch.control, options.steps_per_rev, grid_step(par, options)
     while k <= n:
         if k < n and switches(k, samples) and on_a_peak(k, samples, out):
             if control.left[lane] == 0:
-                recall(k - 1, h, par, options, work, state, samples)
+                recall(k - 1, h, state, samples)
                 put_points(lane, state, control, batch.motion)
                 control.looked[lane] = 0
             control.left[lane] = STEPS_AGAIN
@@ -179,12 +177,12 @@ def next_closeup_step(lane, k, par, options, alone, batch, samples, out):
 
 
 @njit
-def load_joint(lane, joint, rows, words, left, options, alone, batch, samples, results):
+def load_joint(lane, joint, rows, words, starts, left, options, alone, batch, samples, results):
     """Put a joint into a lane and set up its start: equilibrium from the pose where all pins just touch, or ramp.
 
     A joint outside the model ends at once.
     """
-    work, state, _, _ = alone
+    state = alone.state
     par, control, motion = rows[joint], batch.control, batch.motion
     clear_results(results[joint])
     control.joint[lane], control.phase[lane] = joint, HOLD
@@ -199,7 +197,7 @@ def load_joint(lane, joint, rows, words, left, options, alone, batch, samples, r
     control.origin[lane], control.grid[lane] = 0.0, grid_step(par, options)
     control.t[lane] = 0.0 if options.fidelity == DYNAMIC else angle_time(0, options.steps_per_rev, par)
     if options.fidelity == DYNAMIC and options.start == RAMP:
-        acceleration(0.0, state.q0, state.v0, par, options, work, state.a0)
+        copy(starts[joint], state.a0)
         put_start(lane, state, control, motion)
         start_motion(lane, par, options, control, motion)
         if control.phase[lane] == PART:
@@ -208,25 +206,25 @@ def load_joint(lane, joint, rows, words, left, options, alone, batch, samples, r
             past = Past(trail, all_past.turns[lane], all_past.extremes[lane], all_past.begun[lane], all_past.mesh[lane])
             start_cells(lane, par, options, control, motion, past)
     else:
-        rigid_guess(control.t[lane], par, work, state)
+        copy(starts[joint], state.q0)
         put_start(lane, state, control, motion)
         start_newton(lane, CV_STATIC, 0.0, control, motion)
 
 
 @njit
-def fill(lane, queued, rows, words, left, options, alone, batch, samples, results):
+def fill(lane, queued, rows, words, starts, left, options, alone, batch, samples, results):
     """Give an empty lane the next joint of the queue, if there is one; return how many have left the queue.
 
     `queued` is the number that had left it before.
     """
     while queued < len(rows) and batch.control.live[lane] == 0:
-        load_joint(lane, queued, rows, words, left, options, alone, batch, samples, results)
+        load_joint(lane, queued, rows, words, starts, left, options, alone, batch, samples, results)
         queued += 1
     return queued
 
 
 @njit
-def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks, results, tally):
+def lockstep(rows, words, starts, left, options, patience, alone, batch, samples, blocks, results, tally):
     """Simulate joints with equal numbers of contact stations; row i of the results is joint i.
 
     Parameters
@@ -235,6 +233,8 @@ def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks
         The joints, n > 0.
     words : ndarray, shape (n, words)
         The same memory as doubles.
+    starts : ndarray, shape (n, 55)
+        Where the search for each joint's start begins, see `starts.write_starts`.
     left : ndarray of int, shape (n,)
         Newton iterations still allowed to each joint; reduced by those taken. A joint without any ends as
         `NEWTON_FAILED`.
@@ -263,6 +263,7 @@ def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks
         without_refcount(results),
     )
     blocks, left, tally = without_refcount(blocks), without_refcount(left), without_refcount(tally)
+    starts = without_refcount(starts)
     alone, batch = without_refcount(alone), without_refcount(batch)
     par, work, kept = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.kept)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
@@ -272,7 +273,7 @@ def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks
     for lane in range(WIDTH):
         put_joint(lane, words[0], batch)
         empty(lane, batch)
-        queued = fill(lane, queued, rows, words, left, options, alone, batch, samples, results)
+        queued = fill(lane, queued, rows, words, starts, left, options, alone, batch, samples, results)
     while any_of(control.live > 0):
         if any_of(control.fresh > 0):
             begin(options, motion, control)
@@ -298,7 +299,7 @@ def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks
             joint, phase, status = at.joint[lane], at.phase[lane], NOT_SETTLED
             if at.iterations[lane] >= left[joint]:
                 give_up(lane, left, options, alone, batch, results)
-                queued = fill(lane, queued, rows, words, left, options, alone, batch, samples, results)
+                queued = fill(lane, queued, rows, words, starts, left, options, alone, batch, samples, results)
                 continue
             here, goes_on = samples_of(lane, batch, samples), True
             trail = Trail(pasts.modulus[lane], pasts.revolution[lane], pasts.notes[lane])
@@ -331,4 +332,4 @@ def lockstep(rows, words, left, options, patience, alone, batch, samples, blocks
                 finish_joint(lane, status, rows, left, options, alone, batch, samples, results)
             else:
                 continue
-            queued = fill(lane, queued, rows, words, left, options, alone, batch, samples, results)
+            queued = fill(lane, queued, rows, words, starts, left, options, alone, batch, samples, results)

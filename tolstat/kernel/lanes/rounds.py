@@ -5,7 +5,7 @@ lanes that begin a step, stage or angle, and lanes whose trial point is accepted
 """
 
 from tolstat.kernel.integrators import bdf2, trbdf2
-from tolstat.kernel.integrators.integrate import ROUNDOFF, SLOW, scaled_size
+from tolstat.kernel.integrators.integrate import ROUNDOFF, renewal_ratio, scaled_size
 from tolstat.kernel.integrators.state import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP
 from tolstat.kernel.lanes.batch import CHECK
 from tolstat.kernel.mechanics.topology import N_DOF
@@ -102,7 +102,7 @@ def classify_lanes(options, motion, control):
     solved = live & ((checked & (now < ENOUGH)) | (~checked & small))
     failed = live & ~solved & (checked | ~finite | (control.iteration == options.newton_max_iter))
     going = live & ~solved & ~failed
-    slow = (control.iteration > 0) & (now > SLOW * control.before)
+    slow = (control.iteration > 0) & (now > renewal_ratio(options) * control.before)
     stale = going & ((control.factorised != control.cv) | slow)
     control.before = where(going & ~stale, now, control.before)
     moving = going & ~stale
@@ -132,16 +132,9 @@ def refactorise(mask, control, par, work, kept):
     held = control.cv == CV_STATIC
     assemble(where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca), par, work)
     good = eliminate(work)
-    keep_blocks(mask, work.lump_block, kept.lump_block)
-    keep_blocks(mask, work.hub_pin, kept.hub_pin)
-    keep_blocks(mask, work.pin_hub, kept.pin_hub)
-    keep_blocks(mask, work.pin_arm, kept.pin_arm)
-    keep_blocks(mask, work.arm_pin, kept.arm_pin)
-    keep_blocks(mask, work.core, kept.core)
-    keep_rows(mask, work.arm_psi, kept.arm_psi)
-    keep_rows(mask, work.psi_arm, kept.psi_arm)
-    keep_rows(mask, work.pin_psi, kept.pin_psi)
-    keep_rows(mask, work.psi_pin, kept.psi_pin)
+    keep_blocks(mask, work.block, kept.block)
+    keep_rows(mask, work.edge, kept.edge)
+    kept.psi_psi[0] = retain(mask, work.psi_psi[0], kept.psi_psi[0])
     control.factorised = where(mask, control.cv, control.factorised)
     control.factorisations = where(mask, control.factorisations + 1, control.factorisations)
     return good

@@ -47,10 +47,11 @@ def set_bodies(q, v, par, work):
 @njit
 def place_shaft(body, angle, rate, work):
     """Write attitude and angular velocity of a shaft turned about z by `angle` (rad), at `rate` (rad/s)."""
-    put(work.pos, body, (0.0, 0.0, 0.0))
-    put(work.vel, body, (0.0, 0.0, 0.0))
-    exponential((0.0, 0.0, angle), work.rot, body)
-    put(work.spin, body, (0.0, 0.0, rate))
+    zero = angle - angle  # of the type of the angle: tuples of one type go through one compiled version
+    put(work.pos, body, (zero, zero, zero))
+    put(work.vel, body, (zero, zero, zero))
+    exponential((zero, zero, angle), work.rot, body)
+    put(work.spin, body, (zero, zero, rate))
 
 
 @njit

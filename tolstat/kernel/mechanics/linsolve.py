@@ -8,21 +8,44 @@ bushing stiffness, so the blocks are inverted without pivoting; a zero or NaN pi
 
 from tolstat.kernel.mechanics.rotation import unspin
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, HUB, N_LUMPS, PIN, PSI
-from tolstat.kernel.mechanics.work import PSI_COLUMN, PSI_PSI, PSI_ROW
+from tolstat.kernel.mechanics.work import (
+    ARM_PIN,
+    ARM_PSI,
+    HUB_PIN,
+    HUB_PSI,
+    PIN_ARM,
+    PIN_HUB,
+    PIN_PSI,
+    PSI_ARM,
+    PSI_HUB,
+    PSI_PIN,
+)
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import fma
 
 
 @njit
 def six(x, i):
-    """Entries `i` to `i` + 5 of a vector."""
+    """Entries `i` to `i` + 5 of the vector `x`, shape (55,)."""
     return (x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4], x[i + 5])
 
 
 @njit
 def put_six(x, i, a):
-    """Write `a` to entries `i` to `i` + 5 of a vector."""
+    """Write `a` to entries `i` to `i` + 5 of the vector `x`."""
     x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4], x[i + 5] = a
+
+
+@njit
+def edge(e, i):
+    """Vector `i` of `e`, shape (n, 6)."""
+    return (e[i, 0], e[i, 1], e[i, 2], e[i, 3], e[i, 4], e[i, 5])
+
+
+@njit
+def put_edge(e, i, a):
+    """Write `a` to vector `i` of `e`."""
+    e[i, 0], e[i, 1], e[i, 2], e[i, 3], e[i, 4], e[i, 5] = a
 
 
 @njit
@@ -133,17 +156,17 @@ def invert(m, b):
 
 
 @njit
-def multiply_columns(m, b, columns, c):
-    """Replace matrix `c` of `columns`, shape (n, 6, 6), by matrix `b` of `m` times it."""
+def multiply_columns(m, b, c):
+    """Replace matrix `c` of `m`, shape (n, 6, 6), by matrix `b` times it."""
     for j in range(6):
-        put_column(columns, c, j, product(m, b, column(columns, c, j)))
+        put_column(m, c, j, product(m, b, column(m, c, j)))
 
 
 @njit
-def subtract_product(out, o, left, a, right, b):
-    """Subtract matrix `a` of `left` times matrix `b` of `right` from matrix `o` of `out`; all (n, 6, 6)."""
+def subtract_product(m, o, a, b):
+    """Subtract matrix `a` of `m` times matrix `b` from matrix `o`; `m`: (n, 6, 6)."""
     for j in range(6):
-        put_column(out, o, j, plus_product(column(out, o, j), left, a, minus(column(right, b, j))))
+        put_column(m, o, j, plus_product(column(m, o, j), m, a, minus(column(m, b, j))))
 
 
 @njit
@@ -155,40 +178,40 @@ def factorise(work):
     bool
         False when a block is singular or not finite.
     """
-    d, core = work.lump_block, work.core
+    m, e = work.block, work.edge
     good = True
     for i in range(6):
-        core[0, PSI_COLUMN, i] = core[0, PSI_ROW, i] = 0.0
-    to_psi, from_psi, rest = six(core[0, PSI_COLUMN], 0), six(core[0, PSI_ROW], 0), core[0, PSI_PSI, 0]
+        e[HUB_PSI, i] = e[PSI_HUB, i] = 0.0
+    to_psi, from_psi, rest = edge(e, HUB_PSI), edge(e, PSI_HUB), work.psi_psi[0]
     for p in range(4):
         pin, a = PIN + p, ARM_OF_PIN[p]
         arm = ARM + a
-        good = good & invert(d, arm)
-        multiply_columns(d, arm, work.arm_pin, p)
-        subtract_product(d, pin, work.pin_arm, p, work.arm_pin, p)
-        good = good & invert(d, pin)
-        multiply_columns(d, pin, work.pin_hub, p)
-        subtract_product(d, HUB, work.hub_pin, p, work.pin_hub, p)
+        good = good & invert(m, arm)
+        multiply_columns(m, arm, ARM_PIN + p)
+        subtract_product(m, pin, PIN_ARM + p, ARM_PIN + p)
+        good = good & invert(m, pin)
+        multiply_columns(m, pin, PIN_HUB + p)
+        subtract_product(m, HUB, HUB_PIN + p, PIN_HUB + p)
         for i in range(6):
-            work.pin_psi[p, i] = work.psi_pin[p, i] = 0.0
+            e[PIN_PSI + p, i] = e[PSI_PIN + p, i] = 0.0
         if a >= 2:  # output fork
-            of_psi = six(work.psi_arm[a], 0)
-            by_arm = product(d, arm, six(work.arm_psi[a], 0))
-            put_six(work.arm_psi[a], 0, by_arm)
-            by_pin = product(d, pin, product(work.pin_arm, p, minus(by_arm)))
-            put_six(work.pin_psi[p], 0, by_pin)
+            of_psi = edge(e, PSI_ARM + a)
+            by_arm = product(m, arm, edge(e, ARM_PSI + a))
+            put_edge(e, ARM_PSI + a, by_arm)
+            by_pin = product(m, pin, product(m, PIN_ARM + p, minus(by_arm)))
+            put_edge(e, PIN_PSI + p, by_pin)
             for i in range(6):
-                work.psi_pin[p, i] = -dot(of_psi, column(work.arm_pin, p, i))
-            row_of_pin = six(work.psi_pin[p], 0)
+                e[PSI_PIN + p, i] = -dot(of_psi, column(m, ARM_PIN + p, i))
+            row_of_pin = edge(e, PSI_PIN + p)
             rest -= dot(of_psi, by_arm) + dot(row_of_pin, by_pin)
-            to_psi = plus_product(to_psi, work.hub_pin, p, minus(by_pin))
-            from_psi = minus_row_product(from_psi, row_of_pin, work.pin_hub, p)
-    good = good & invert(d, HUB)
-    by_hub = product(d, HUB, to_psi)
-    put_six(core[0, PSI_COLUMN], 0, by_hub)
-    put_six(core[0, PSI_ROW], 0, from_psi)
+            to_psi = plus_product(to_psi, m, HUB_PIN + p, minus(by_pin))
+            from_psi = minus_row_product(from_psi, row_of_pin, m, PIN_HUB + p)
+    good = good & invert(m, HUB)
+    by_hub = product(m, HUB, to_psi)
+    put_edge(e, HUB_PSI, by_hub)
+    put_edge(e, PSI_HUB, from_psi)
     pivot = 1 / (rest - dot(from_psi, by_hub))
-    core[0, PSI_PSI, 0] = pivot
+    work.psi_psi[0] = pivot
     return good & (abs(pivot) < 1e300)
 
 
@@ -211,32 +234,32 @@ def solve(q, work):
 
     Increments of attitude are converted to increments of the rotation vectors in `q`, shape (55,).
     """
-    x, d, core = work.solution, work.lump_block, work.core
+    x, m, e = work.solution, work.block, work.edge
     hub, rest = six(x, 0), x[PSI]
     for p in range(4):
         pin, a = 6 * (PIN + p), ARM_OF_PIN[p]
         arm = 6 * (ARM + a)
-        of_arm = product(d, ARM + a, six(x, arm))
-        of_pin = product(d, PIN + p, plus_product(six(x, pin), work.pin_arm, p, minus(of_arm)))
-        hub = plus_product(hub, work.hub_pin, p, minus(of_pin))
+        of_arm = product(m, ARM + a, six(x, arm))
+        of_pin = product(m, PIN + p, plus_product(six(x, pin), m, PIN_ARM + p, minus(of_arm)))
+        hub = plus_product(hub, m, HUB_PIN + p, minus(of_pin))
         if a >= 2:
-            rest -= dot(six(work.psi_arm[a], 0), of_arm) + dot(six(work.psi_pin[p], 0), of_pin)
+            rest -= dot(edge(e, PSI_ARM + a), of_arm) + dot(edge(e, PSI_PIN + p), of_pin)
         put_six(x, arm, of_arm)
         put_six(x, pin, of_pin)
-    hub = product(d, HUB, hub)
-    psi = core[0, PSI_PSI, 0] * (rest - dot(six(core[0, PSI_ROW], 0), hub))
+    hub = product(m, HUB, hub)
+    psi = work.psi_psi[0] * (rest - dot(edge(e, PSI_HUB), hub))
     x[PSI] = psi
-    hub = less(hub, psi, six(core[0, PSI_COLUMN], 0))
+    hub = less(hub, psi, edge(e, HUB_PSI))
     put_six(x, 0, hub)
     for p in range(4):
         pin, a = 6 * (PIN + p), ARM_OF_PIN[p]
         arm = 6 * (ARM + a)
-        of_pin = plus_product(six(x, pin), work.pin_hub, p, minus(hub))
+        of_pin = plus_product(six(x, pin), m, PIN_HUB + p, minus(hub))
         if a >= 2:
-            of_pin = less(of_pin, psi, six(work.pin_psi[p], 0))
-        of_arm = plus_product(six(x, arm), work.arm_pin, p, minus(of_pin))
+            of_pin = less(of_pin, psi, edge(e, PIN_PSI + p))
+        of_arm = plus_product(six(x, arm), m, ARM_PIN + p, minus(of_pin))
         if a >= 2:
-            of_arm = less(of_arm, psi, six(work.arm_psi[a], 0))
+            of_arm = less(of_arm, psi, edge(e, ARM_PSI + a))
         put_six(x, pin, of_pin)
         put_six(x, arm, of_arm)
     for body in range(N_LUMPS):

@@ -22,7 +22,23 @@ from tolstat.kernel.mechanics.topology import (
     QUARTERS,
 )
 from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn, turn_back
-from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, POINT, PSI_PSI, RHO, SLOPE, TANGENT, V_NORMAL, V_TANGENT
+from tolstat.kernel.mechanics.work import (
+    ARM_PIN,
+    ARM_PSI,
+    DELTA,
+    FORCE,
+    HUB_PIN,
+    NORMAL,
+    PIN_ARM,
+    PIN_HUB,
+    POINT,
+    PSI_ARM,
+    RHO,
+    SLOPE,
+    TANGENT,
+    V_NORMAL,
+    V_TANGENT,
+)
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import any_of, fma, where
 
@@ -30,14 +46,14 @@ from tolstat.kernel.simd.lane import any_of, fma, where
 @njit
 def clear(work):
     """Set all blocks of the tangent to zero."""
-    work.lump_block[:] = 0.0
-    work.hub_pin[:] = 0.0
-    work.pin_hub[:] = 0.0
-    work.pin_arm[:] = 0.0
-    work.arm_pin[:] = 0.0
-    work.arm_psi[:] = 0.0
-    work.psi_arm[:] = 0.0
-    work.core[0, PSI_PSI, 0] = 0.0
+    for b in range(work.block.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                work.block[b, i, j] = 0.0
+    for a in range(4):
+        for i in range(6):
+            work.edge[ARM_PSI + a, i] = work.edge[PSI_ARM + a, i] = 0.0
+    work.psi_psi[0] = 0.0
 
 
 @njit
@@ -113,8 +129,8 @@ def inertia_tangent(body, ca, par, work):
     """Add `ca` (1/s^2) times the mass matrix of a lump to its diagonal block."""
     mass, inertia = mass_of(body, par)
     for j in range(3):
-        work.lump_block[body, j, j] += ca * mass
-    put(work.lump_block, body, 3, 3, spread(work.rot, body, body, scale(ca, inertia)))
+        work.block[body, j, j] += ca * mass
+    put(work.block, body, 3, 3, spread(work.rot, body, body, scale(ca, inertia)))
 
 
 @njit
@@ -132,7 +148,7 @@ def bushing_tangent(i, cv, par, work):
     a = spread(work.rot, base, lump, (fma(cv, c[0], k[0]), fma(cv, c[1], k[1]), fma(cv, c[2], k[2])))
     b = spread(work.rot, base, lump, (fma(cv, c[3], k[3]), fma(cv, c[4], k[4]), fma(cv, c[5], k[5])))
     by_lump, by_base = turning(a, lever), turning(a, base_lever)
-    block = work.lump_block
+    block, edge = work.block, work.edge
     put(block, lump, 0, 0, a)
     put(block, lump, 0, 3, by_lump)
     put(block, lump, 3, 0, transposed(by_lump))
@@ -144,22 +160,22 @@ def bushing_tangent(i, cv, par, work):
         put(block, HUB, 0, 3, by_base)
         put(block, HUB, 3, 0, transposed(by_base))
         put(block, HUB, 3, 3, plus(b, crossed(base_lever, by_base)))
-        take(work.pin_hub, pin, 0, 0, a)
-        take(work.pin_hub, pin, 0, 3, by_base)
-        take(work.pin_hub, pin, 3, 0, transposed(by_lump))
-        take(work.pin_hub, pin, 3, 3, between)
-        take(work.hub_pin, pin, 0, 0, a)
-        take(work.hub_pin, pin, 0, 3, by_lump)
-        take(work.hub_pin, pin, 3, 0, transposed(by_base))
-        take(work.hub_pin, pin, 3, 3, transposed(between))
+        take(block, PIN_HUB + pin, 0, 0, a)
+        take(block, PIN_HUB + pin, 0, 3, by_base)
+        take(block, PIN_HUB + pin, 3, 0, transposed(by_lump))
+        take(block, PIN_HUB + pin, 3, 3, between)
+        take(block, HUB_PIN + pin, 0, 0, a)
+        take(block, HUB_PIN + pin, 0, 3, by_lump)
+        take(block, HUB_PIN + pin, 3, 0, transposed(by_base))
+        take(block, HUB_PIN + pin, 3, 3, transposed(between))
     elif base == OUTPUT_SHAFT:  # the only unknown of the shaft is its rotation about z
         arm = lump - ARM
         for n in range(3):
-            work.arm_psi[arm, n] -= by_base[2][n]
-            work.psi_arm[arm, n] -= by_base[2][n]
-            work.arm_psi[arm, 3 + n] -= between[2][n]
-            work.psi_arm[arm, 3 + n] -= between[2][n]
-        work.core[0, PSI_PSI, 0] += b[2][2] + cross(base_lever, by_base[2])[2]
+            edge[ARM_PSI + arm, n] -= by_base[2][n]
+            edge[PSI_ARM + arm, n] -= by_base[2][n]
+            edge[ARM_PSI + arm, 3 + n] -= between[2][n]
+            edge[PSI_ARM + arm, 3 + n] -= between[2][n]
+        work.psi_psi[0] += b[2][2] + cross(base_lever, by_base[2])[2]
 
 
 @njit
@@ -183,15 +199,14 @@ def _directions(pin, j, work):
 @njit
 def _add_dyads(pin, n, by_n, m, by_m, work):
     """Add `n` `by_n`^T + `m` `by_m`^T to the four blocks of a pin and its arm; (12,): the pin's six, the arm's six."""
-    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
+    body, arm, there, back = PIN + pin, ARM + ARM_OF_PIN[pin], PIN_ARM + pin, ARM_PIN + pin
+    block = work.block
     for i in range(6):
         for j in range(6):
-            here, there = work.lump_block[body, i, j], work.pin_arm[pin, i, j]
-            work.lump_block[body, i, j] = fma(m[i], by_m[j], fma(n[i], by_n[j], here))
-            work.pin_arm[pin, i, j] = fma(m[i], by_m[6 + j], fma(n[i], by_n[6 + j], there))
-            here, there = work.arm_pin[pin, i, j], work.lump_block[arm, i, j]
-            work.arm_pin[pin, i, j] = fma(m[6 + i], by_m[j], fma(n[6 + i], by_n[j], here))
-            work.lump_block[arm, i, j] = fma(m[6 + i], by_m[6 + j], fma(n[6 + i], by_n[6 + j], there))
+            block[body, i, j] = fma(m[i], by_m[j], fma(n[i], by_n[j], block[body, i, j]))
+            block[there, i, j] = fma(m[i], by_m[6 + j], fma(n[i], by_n[6 + j], block[there, i, j]))
+            block[back, i, j] = fma(m[6 + i], by_m[j], fma(n[6 + i], by_n[j], block[back, i, j]))
+            block[arm, i, j] = fma(m[6 + i], by_m[6 + j], fma(n[6 + i], by_n[6 + j], block[arm, i, j]))
 
 
 @njit
@@ -241,4 +256,4 @@ def assemble(cv, ca, par, work):
         bushing_tangent(i, cv, par, work)
     for pin in range(4):
         contact_tangent(pin, cv, par, work)
-    work.core[0, PSI_PSI, 0] += ca * par.Js
+    work.psi_psi[0] += ca * par.Js

@@ -2,7 +2,7 @@
 
 They are the fields of one record: it passes between kernels as one pointer, and the shapes are constants to the
 compiler. (With some thirty arrays in a NamedTuple instead, every call copied the arrays' descriptors, and a residual
-took five times as long.)
+took five times as long.) All 6 x 6 blocks lie in one array: a kernel is compiled once for each shape.
 """
 
 import numpy as np
@@ -15,8 +15,10 @@ POINT, NORMAL, TANGENT = 0, 3, 6
 RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE = 9, 10, 11, 12, 13, 14
 N_STATION = 15
 
-# rows of work.core
-PSI_COLUMN, PSI_ROW, PSI_PSI = 0, 1, 2
+HUB_PIN, PIN_HUB, PIN_ARM, ARM_PIN = N_LUMPS, N_LUMPS + 4, N_LUMPS + 8, N_LUMPS + 12
+"""First matrix of each kind in ``work.block``, after those of the lumps: rows hub, columns pin p; and so on."""
+ARM_PSI, PSI_ARM, PIN_PSI, PSI_PIN, HUB_PSI, PSI_HUB = 0, 4, 8, 12, 16, 17
+"""First vector of each kind in ``work.edge``: column psi, rows of an arm; row psi, columns of an arm; and so on."""
 
 FIELDS = {
     "frame_w": (3, 3),  # angular velocity of I, C, F in their own axes
@@ -33,16 +35,9 @@ FIELDS = {
     "contact": (4, 3),  # normal force at the outer and inner end station of each pin, resultant of all its stations
     "mode": (4,),  # contact mode of each pin
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
-    "lump_block": (N_LUMPS, 6, 6),  # blocks of the tangent, factorised in place
-    "hub_pin": (4, 6, 6),  # rows of the hub, columns of pin p
-    "pin_hub": (4, 6, 6),
-    "pin_arm": (4, 6, 6),  # rows of pin p, columns of its arm
-    "arm_pin": (4, 6, 6),
-    "arm_psi": (4, 6),  # column psi in the rows of each arm
-    "psi_arm": (4, 6),  # row psi
-    "pin_psi": (4, 6),  # fill-in
-    "psi_pin": (4, 6),  # fill-in
-    "core": (1, 3, 6),  # psi: column in the rows of the hub, row, diagonal; after elimination their factors
+    "block": (N_LUMPS + 16, 6, 6),  # matrices of the tangent, see `HUB_PIN` to `ARM_PIN`; factorised in place
+    "edge": (18, 6),  # its column and row psi, see `ARM_PSI` to `PSI_HUB`; those of pins and hub are fill-in
+    "psi_psi": (1,),  # its last diagonal entry
     "vectors": (2, 12),  # d(displacements of a station along n and m) / d(pin, arm)
     "by_n": (12,),  # scratch of contact_tangent: d(forces of that station along n and m) / d(pin, arm)
     "by_m": (12,),

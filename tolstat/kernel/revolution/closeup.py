@@ -8,8 +8,10 @@ among the largest and smallest loads; the recorded samples stay as they are.
 
 import math
 
+from tolstat.kernel.integrators.integrate import BDF2
 from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD, UNLIMITED
 from tolstat.kernel.mechanics.loads import FORCES, INTERPOLATED, N_AVERAGED, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.revolution.settle import peak, record
 from tolstat.kernel.simd.jit import njit, njit_inner
 
@@ -76,6 +78,22 @@ def count_in(j, fine, out):
             out.largest[i] = max(out.largest[i], load)
 
 
+@njit
+def recall(s, h, state, samples):
+    """Restore recorded sample `s` as the last accepted point; `h` is the step of the output grid, s.
+
+    Accelerations are those of BDF2's formula for equal steps; other methods need those of the equations of motion.
+    """
+    here, before, first = samples[s], samples[s - 1], samples[s - 2]
+    for i in range(state.q0.size):
+        state.q0[i], state.v0[i] = here.q[i], here.v[i]
+        state.q1[i], state.v1[i] = before.q[i], before.v[i]
+        state.a0[i] = (3 * here.v[i] - 4 * before.v[i] + first.v[i]) / (2 * h)
+        state.a1[i] = state.aux[i] = state.a0[i]
+    state.memory[:] = 0.0
+    state.memory[H_OLD], state.counters[ATTEMPTS_LEFT] = h, UNLIMITED
+
+
 def build_closeup(advance, acceleration):
     """Bind a stepping scheme and the equations of motion.
 
@@ -88,25 +106,11 @@ def build_closeup(advance, acceleration):
 
     Returns
     -------
-    recall : jitted function (s, h, par, options, work, state, samples) -> None
-        Restores recorded sample `s` as the last accepted point; `h` is the step of the output grid, s.
     look_closer : jitted function (par, options, work, state, samples, fine, out) -> None
         Integrates the steps around switches on peaks of the recorded revolution again, each in
         ``options.peak_substeps`` parts, and extends the extremes in `out`, a row of KERNEL_RESULT. The work is added to
         ``state.counters``.
     """
-
-    @njit_inner
-    def recall(s, h, par, options, work, state, samples):
-        here, before = samples[s], samples[s - 1]
-        for i in range(state.q0.size):
-            state.q0[i], state.v0[i] = here.q[i], here.v[i]
-            state.q1[i], state.v1[i] = before.q[i], before.v[i]
-        acceleration((samples.size + s) * h, state.q0, state.v0, par, options, work, state.a0)
-        for i in range(state.q0.size):
-            state.a1[i] = state.aux[i] = state.a0[i]
-        state.memory[:] = 0.0
-        state.memory[H_OLD], state.counters[ATTEMPTS_LEFT] = h, UNLIMITED
 
     @njit_inner
     def look_closer(par, options, work, state, samples, fine, out):
@@ -117,7 +121,11 @@ def build_closeup(advance, acceleration):
         for k in range(n + 1):
             if k < n and switches(k, samples) and on_a_peak(k, samples, out):
                 if left == 0:
-                    recall(k - 1, h, par, options, work, state, samples)
+                    recall(k - 1, h, state, samples)
+                    if options.method != BDF2:
+                        acceleration((n + k - 1) * h, state.q0, state.v0, par, options, work, state.a0)
+                        copy(state.a0, state.a1)
+                        copy(state.a0, state.aux)
                     j = 0
                 left = STEPS
             if left == 0:
@@ -131,4 +139,4 @@ def build_closeup(advance, acceleration):
                 count_in(j, fine, out)
                 j += 1
 
-    return recall, look_closer
+    return look_closer

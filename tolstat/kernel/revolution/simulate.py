@@ -79,7 +79,7 @@ substeps, advance = integrate.build_advance(newton)
 static_newton = integrate.build_newton(residual, factorise_static, solve, small=near)
 hold, relax, equilibrium = build_equilibrium(residual, newton, static_newton, integrate.scaled_size, rigid_guess)
 revolution = build_quasistatic(hold, relax, record)
-recall, look_closer = build_closeup(advance, acceleration)
+look_closer = build_closeup(advance, acceleration)
 reset = integrate.reset
 
 

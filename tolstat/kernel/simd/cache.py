@@ -68,7 +68,7 @@ class CheckedFiles:
             return None
         content = opened(key, data)
         if content is None:
-            tell(f"compiled code in {self.folder} is damaged: it is compiled anew, which takes about a minute")
+            tell(f"compiled code in {self.folder} is damaged: it is compiled anew, which takes about half a minute")
         return content
 
     def save(self, key, content):

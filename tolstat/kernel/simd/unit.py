@@ -13,8 +13,9 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import AnnotateTypes, NativeLowering
-from numba.core.types import Dispatcher
+from numba.core.typed_passes import AnnotateTypes, NativeLowering, NopythonRewrites
+from numba.core.types import Dispatcher, unliteral
+from numba.core.untyped_passes import InlineClosureLikes
 
 NEEDED = ("_get_module_for_linking", "_optimize_final_module", "_finalize_final_module", "_raise_if_finalized")
 if not all(hasattr(JITCodeLibrary, name) for name in NEEDED):
@@ -94,12 +95,17 @@ class AnnouncePart(LoweringPass):
         return False
 
 
+UNUSED = (InlineClosureLikes, NopythonRewrites)
+"""Passes that no kernel needs: for closures, and for arithmetic on whole arrays."""
+
+
 class Whole(Compiler):
     """Compiler of a kernel that Python calls."""
 
     def define_pipelines(self):
         """Numba's pipeline, lowering into a `Unit`."""
         (passes,) = super().define_pipelines()
+        passes.passes = [one for one in passes.passes if one[0] not in UNUSED]
         passes.add_pass_after(IntoUnit, AnnotateTypes)
         passes.finalize()
         return [passes]
@@ -126,6 +132,10 @@ class Callee(CPUDispatcher):
     def add_overload(self, cres):
         """Keep the overload for type inference; it has no entry point for Python."""
         self.overloads[tuple(cres.signature.args)] = cres
+
+    def get_call_template(self, args, kws):
+        """Resolve a call; a constant integer does not get a version of its own, since LLVM takes calls in anyway."""
+        return super().get_call_template([unliteral(a) for a in args], {name: unliteral(a) for name, a in kws.items()})
 
 
 class Kernel(CPUDispatcher):

@@ -71,7 +71,10 @@ def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(loa
     for values in load.rvs((seeds, n), random_state=np.random.default_rng(9)):
         found = capability.capability(values, np.ones(n), limit)
         plain = capability.cpk_interval((limit - values.mean()) / (3.0 * values.std(ddof=1)), n)
-        for name, (low, high) in (("own", (found.cpk_normal_lower, found.cpk_normal_upper)), ("of a normal load", plain)):
+        for name, (low, high) in (
+            ("own", (found.cpk_normal_lower, found.cpk_normal_upper)),
+            ("of a normal load", plain),
+        ):
             missed[name][0] += low > truth
             missed[name][1] += high < truth
     assert max(missed["own"]) <= seeds * (0.025 + 2.5 * np.sqrt(0.025 * 0.975 / seeds))
@@ -80,7 +83,9 @@ def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(loa
 
 def test_no_index_of_a_long_tail_and_no_interval_of_few_joints():
     rng = np.random.default_rng(10)
-    long, few = (capability.capability(own, np.ones(own.size), 4.0) for own in (rng.lognormal(size=2000), rng.random(900)))
+    long, few = (
+        capability.capability(own, np.ones(own.size), 4.0) for own in (rng.lognormal(size=2000), rng.random(900))
+    )
     assert np.isnan([long.cpk_normal, long.cpk_normal_lower]).all()
     assert np.isfinite(few.cpk_normal)
     assert np.isnan([few.cpk_normal_lower, few.cpk_normal_upper]).all()

@@ -2,8 +2,9 @@
 
 A load has an upper limit only. So there is no Cp, which compares a two-sided band with the scatter, and Cpk equals
 Cpu = (limit - mean) / (3 sigma). Cpu determines the share of the joints above the limit only if the load is normal,
-which loads of joints with clearance are not. Its interval holds for other loads too, unless their tail is long. The quantile index, (limit - median) / (q(99.865 %) - median)
-(ISO 22514-2), is defined for any distribution. Yield and ppm assume no distribution.
+which loads of joints with clearance are not. Its interval holds for other loads too, unless their tail is long. The
+quantile index, (limit - median) / (q(99.865 %) - median) (ISO 22514-2), is defined for any distribution. Yield and ppm
+assume no distribution.
 """
 
 from __future__ import annotations

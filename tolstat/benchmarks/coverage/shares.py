@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -221,12 +222,16 @@ def _delivered(share: float, n: int) -> Experiment:
     return Experiment((Asked("next delivery", case, n), Asked("next delivery, from a share", case, n)), once)
 
 
+@cache
+def _scheme(width: float, most: int) -> sequential.Scheme:
+    return sequential.scheme(width, sequential.looks(width, most))
+
+
 def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
     """A campaign that looks at its interval until it is narrow."""
-    scheme = sequential.scheme(width, sequential.looks(width, most))
 
     def once(rng: Rng) -> list[Found]:
-        above, joints, number = 0, 0, 0
+        scheme, above, joints, number = _scheme(width, most), 0, 0, 0
         for number, look in enumerate(scheme.looks):
             above, joints = above + int(rng.binomial(look - joints, share)), look
             if scheme.narrow(number, above):

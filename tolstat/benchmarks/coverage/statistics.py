@@ -51,8 +51,11 @@ STATISTICS = {
     "load that never repeats": Statistic("`report`: total interval", ABOUT, "fewer than 16 revolutions"),
     "rare share, subsets": Statistic("`rare`", ABOUT, "limits that are not reached: an upper end only"),
     "share, importance sampling": Statistic(
-        "`report`, `capability`", ABOUT, "few effective joints above, without a bound; k of 0.7 and more"
+        "`report`, `capability`",
+        "95 %, if the proposals reach every way to the limit",
+        "few effective joints above, without a bound; k of 0.7 and more",
     ),
+    "share, whatever proposals miss": Statistic("`report`: the verdict", "upper end: at least 97.5 %", "never"),
     "share, other tolerances": Statistic(
         "`reweight`, `allocate`", ABOUT, "large density ratios; few effective joints on a side"
     ),

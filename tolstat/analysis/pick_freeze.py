@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
-from tolstat.analysis.sensitivity import normal_half
+from tolstat.analysis.sensitivity import WIDER, normal_half
 from tolstat.common.shown import shown
 
 FEWEST = 50
 """Minimum number of points for an index."""
-WIDER = 1.15
-"""Factor on the standard errors, which are too small for few points and for loads with long tails (measured)."""
 
 
 @shown
@@ -65,7 +63,7 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     confidence : float
         Confidence level of the intervals. Indices are ratios of two means over the points: intervals are Fieller's
         (1954), whose upper end is further away where the variance comes from few points. Their standard errors are
-        taken `WIDER` times as large.
+        taken `sensitivity.WIDER` times as large.
 
     Returns
     -------

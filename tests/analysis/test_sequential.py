@@ -58,20 +58,20 @@ def test_the_distribution_at_the_stop_is_that_of_counted_paths():
 
 def test_the_interval_at_the_stop_covers_every_share(scheme):
     """Between two ends of intervals one miss grows with the share, the other falls: both ends bound it."""
-    shares = scheme.critical_shares(most=800)
+    shares = scheme.critical_shares(most=400)
     found = [scheme.performance(float(p)) for p in shares]
     assert min(one.coverage for one in found) >= 0.95
     assert all(a.too_low + b.too_high <= 0.0505 for a, b in itertools.pairwise(found))
     assert max(max(one.too_high, one.too_low) for one in found) <= 0.035
 
 
-@pytest.mark.parametrize("p", [0.003, 0.02, 0.1, 0.3, 0.5])
+@pytest.mark.parametrize("p", [0.003, 0.02, 0.078, 0.1, 0.3, 0.5])
 def test_it_costs_little_more_than_a_fixed_plan_and_its_estimate_has_no_bias(scheme, p):
     found = scheme.performance(p)
     assert found.unbiased == pytest.approx(0.0, abs=1e-10)
     assert found.coverage > 0.95
     joints = sequential.fixed(p, WIDTH)
-    if p * joints >= 20:
+    if p * joints >= sequential.LEAST_BESIDE:  # with 10.1 above at a share of 0.078, where it costs most
         assert found.joints < 1.25 * joints
 
 
@@ -90,7 +90,7 @@ def test_drawn_campaigns_agree_and_without_correction_they_miss_too_often(scheme
     assert missed[scheme.confidence] == pytest.approx(1.0 - known.coverage, abs=0.009)
     assert bias[scheme.confidence] == pytest.approx(known.plain, abs=0.012)
     plain = Scheme(WIDTH, scheme.looks, 0.95)
-    assert min(plain.performance(float(p)).coverage for p in plain.critical_shares()) < 0.945
+    assert min(plain.performance(float(p)).coverage for p in plain.critical_shares()) < 0.9495
 
 
 def test_a_stop_has_ten_joints_on_each_side():
@@ -104,12 +104,12 @@ def test_a_stop_has_ten_joints_on_each_side():
 def test_looks_grow_slowly_and_those_taken_stay():
     planned = sequential.looks(0.002, 100_000)
     assert planned[0] == 1843
-    assert all(b / a < 1.151 for a, b in itertools.pairwise(planned))
+    assert all(b / a < 1.051 for a, b in itertools.pairwise(planned))
     assert sequential.looks(0.1, 20) == [20]
-    before = sequential.looks(0.1, 300)
+    before = sequential.looks(0.1, 301)
     longer = sequential.looks(0.1, 1000, taken=before)
     assert set(before) <= set(longer)
-    assert 300 not in sequential.looks(0.1, 1000)
+    assert 301 not in sequential.looks(0.1, 1000)
 
 
 def test_looks_between_are_waited_for_only_where_a_stop_is_plausible(scheme):

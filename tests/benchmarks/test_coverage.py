@@ -36,6 +36,13 @@ def test_misses_are_counted_by_side_and_refusals_apart():
     assert lower < covered == 1.0 - (row.above + row.below) / row.given < upper
 
 
+def test_what_is_done_is_kept_after_every_chunk_of_seeds():
+    kept = []
+    found = run.measure(120, among=(coin(0.2, 0.05),), keep=kept.append)
+    assert [part.rows[0].seeds for part in kept] == [50, 100, 120]
+    assert kept[-1] == found
+
+
 def test_a_side_that_misses_too_often_is_found_and_chance_is_not():
     judged = [run.measure(200, among=(coin(*sides),)) for sides in ((0.2, 0.0), (0.0, 0.15), (0.025, 0.025))]
     assert [len(found.failed) for found in judged] == [1, 1, 0]
@@ -94,12 +101,12 @@ def test_a_statistic_that_is_not_there_is_refused():
 
 def test_the_command_fails_where_an_interval_misses(monkeypatch):
     found = run.Coverage([Row(Asked("share", "made up", 10), 100, 100, 20, 0, np.nan)])
-    monkeypatch.setattr(run, "measure", lambda *_: found)
+    monkeypatch.setattr(run, "measure", lambda *_, **__: found)
     done = CliRunner().invoke(app, ["bench", "coverage"])
     assert done.exit_code == 1
     assert "made up" in done.stderr
     known = run.Coverage([found.rows[0]._replace(asked=Asked("share", "made up", 10, known="a coin"))])
-    monkeypatch.setattr(run, "measure", lambda *_: known)
+    monkeypatch.setattr(run, "measure", lambda *_, **__: known)
     done = CliRunner().invoke(app, ["bench", "coverage"])
     assert done.exit_code == 0
     assert "(a coin)" in done.stdout

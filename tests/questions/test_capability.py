@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.special import nctdtr
-from scipy.stats import lognorm, norm
+from scipy.stats import lognorm, norm, t
 
 from tests.support.views import view
 from tolstat.analysis import capability, exceedance, extreme
@@ -63,6 +63,34 @@ def test_interval_of_quantiles_covers_for_a_skew_load():
     assert max(c.normal_p for c in found) < 1e-6
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("load", [norm(), lognorm(0.25), t(6)])
+def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(load):
+    n, limit, seeds = 1000, float(load.ppf(0.999)), 200
+    truth, missed = (limit - load.mean()) / (3.0 * load.std()), {"own": [0, 0], "of a normal load": [0, 0]}
+    for values in load.rvs((seeds, n), random_state=np.random.default_rng(9)):
+        found = capability.capability(values, np.ones(n), limit)
+        plain = capability.cpk_interval((limit - values.mean()) / (3.0 * values.std(ddof=1)), n)
+        for name, (low, high) in (
+            ("own", (found.cpk_normal_lower, found.cpk_normal_upper)),
+            ("of a normal load", plain),
+        ):
+            missed[name][0] += low > truth
+            missed[name][1] += high < truth
+    assert max(missed["own"]) <= seeds * (0.025 + 2.5 * np.sqrt(0.025 * 0.975 / seeds))
+    assert max(missed["of a normal load"]) > 0.05 * seeds or load.kwds == load.args == ()
+
+
+def test_no_index_of_a_long_tail_and_no_interval_of_few_joints():
+    rng = np.random.default_rng(10)
+    long, few = (
+        capability.capability(own, np.ones(own.size), 4.0) for own in (rng.lognormal(size=2000), rng.random(900))
+    )
+    assert np.isnan([long.cpk_normal, long.cpk_normal_lower]).all()
+    assert np.isfinite(few.cpk_normal)
+    assert np.isnan([few.cpk_normal_lower, few.cpk_normal_upper]).all()
+
+
 def test_both_indices_agree_for_a_normal_load():
     loads = np.random.default_rng(3).normal(500.0, 20.0, 200_000)
     found = capability.capability(loads, np.ones(loads.size), 580.0)
@@ -91,6 +119,8 @@ def test_unresolved_joints_lower_the_yield():
 def test_dependent_samples_have_no_interval():
     found = capability.capability(np.arange(50.0), np.ones(50), 60.0, iid=False)
     assert np.isfinite([found.cpk, found.cpk_normal]).all()
+    many = capability.capability(np.arange(2000.0), np.ones(2000), 2100.0, iid=False)
+    assert (np.isfinite(many.cpk_normal), np.isnan(many.cpk_normal_lower)) == (True, True)
     ends = (*found.good[1:], found.cpk_lower, found.cpk_upper, found.cpk_normal_lower, found.cpk_normal_upper)
     assert np.isnan(ends).all()
 
@@ -132,7 +162,7 @@ def test_yields_have_the_total_interval_of_the_limits_table_with_the_numerical_e
 def test_indices_that_must_not_be_used_are_not_given():
     table = query.limits(view(limits={"cross1.F": 700.0}, n=2001))
     assert (table["normal_p"] < query.NOT_NORMAL).all()
-    assert table["cpk_normal"].isna().all()
+    assert "'Cpk by sigma' tells no share above" in rendering.note(table)
     assert table["cpk"].notna().all()
     many = query.limits(view(limits={"cross1.F": 700.0}, failed=60))
     assert many[["cpk", "cpk_lower", "cpk_normal"]].isna().all(axis=None)

@@ -2,8 +2,9 @@
 
 A load has an upper limit only. So there is no Cp, which compares a two-sided band with the scatter, and Cpk equals
 Cpu = (limit - mean) / (3 sigma). Cpu determines the share of the joints above the limit only if the load is normal,
-which loads of joints with clearance are not. The quantile index, (limit - median) / (q(99.865 %) - median)
-(ISO 22514-2), is defined for any distribution. Yield and ppm assume no distribution.
+which loads of joints with clearance are not. Its interval holds for other loads too, unless their tail is long. The
+quantile index, (limit - median) / (q(99.865 %) - median) (ISO 22514-2), is defined for any distribution. Yield and ppm
+assume no distribution.
 """
 
 from __future__ import annotations
@@ -19,6 +20,13 @@ from tolstat.common.shown import shown
 
 REFERENCE = 0.9986501019683699
 """Share of a normal distribution below mean + 3 sigma."""
+FEWEST_MOMENTS = 1000
+"""Minimum number of joints for an interval of the index of mean and standard deviation."""
+LONGEST_TAIL = 3.0
+"""(q(95 %) - median) / (q(75 %) - median) from which on such an interval does not hold; 2.44 for a normal load. A rule
+by quantiles: samples that pass a test of skewness or kurtosis by luck are those whose interval misses."""
+WIDER = 1.3
+"""Factor on the width of such an interval: the kurtosis of few joints is too small (measured)."""
 
 
 @shown
@@ -31,10 +39,12 @@ class Capability:
     above : Exceedance
         Share of the joints above the limit; yield and ppm are read from it.
     cpk_normal, cpk_normal_lower, cpk_normal_upper : float
-        (limit - mean) / (3 sigma) of the valid joints and its exact interval for a normal load.
+        (limit - mean) / (3 sigma) of the valid joints and its interval, which assumes no normal load: it covers with at
+        least the given confidence. The interval is NaN for fewer than `FEWEST_MOMENTS` joints; for so many joints with
+        a tail longer than `LONGEST_TAIL`, all three are.
     normal_p : float
-        p-value of the normality test by skewness and kurtosis (D'Agostino and Pearson 1973); where it is small, do not
-        use `cpk_normal`. NaN for fewer than 20 joints.
+        p-value of the normality test by skewness and kurtosis (D'Agostino and Pearson 1973); where it is small,
+        `cpk_normal` does not determine the share above the limit. NaN for fewer than 20 joints.
     cpk, cpk_lower, cpk_upper : float
         Quantile index of the valid joints. Its interval is conservative: it covers with at least the given confidence.
         With fewer joints than `needed` the lower end is at most 0.
@@ -151,11 +161,25 @@ def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floa
 
 
 def _normal(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
-    index = (limit - valid.mean()) / (3.0 * valid.std(ddof=1))
+    """Index of mean and standard deviation; interval of a normal load, widened for skewness and kurtosis.
+
+    The factor is the ratio of standard errors from the central moments (delta method), at least 1, times `WIDER`.
+    """
+    mean, n = valid.mean(), valid.size
+    index = float((limit - mean) / (3.0 * valid.std(ddof=1)))
+    if n < FEWEST_MOMENTS:
+        return index, np.nan, np.nan
+    middle, upper, high = np.quantile(valid, (0.5, 0.75, 0.95))
+    if high - middle > LONGEST_TAIL * (upper - middle):
+        return np.nan, np.nan, np.nan
     if not iid:
-        return float(index), np.nan, np.nan
-    lower, upper = cpk_interval(index, valid.size, confidence)
-    return float(index), float(lower), float(upper)
+        return index, np.nan, np.nan
+    scores, z = (valid - mean) / valid.std(), 3.0 * index
+    skewness, kurtosis = (scores**3).mean(), (scores**4).mean()
+    factor = (1.0 + z * skewness + 0.25 * z**2 * (kurtosis - 1.0)) / (1.0 + 0.5 * z**2)
+    wider = WIDER * np.sqrt(max(1.0, factor))
+    lower, upper = (float(end) for end in cpk_interval(index, n, confidence))
+    return index, index - wider * (index - lower), index + wider * (upper - index)
 
 
 def _normality(valid: FloatArray) -> float:

@@ -64,9 +64,9 @@ def most_likely(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
     x = np.sort(np.asarray(excesses, dtype=float), axis=-1)
     n = x.shape[-1]
     quartile, largest = x[..., int(n / 4 + 0.5) - 1, None], x[..., -1, None]
-    part = np.linspace(0.0, 1.0, 40)
+    part = np.linspace(0.0, 1.0, 12)
     # from the end of the tail at the largest excess to one far beyond: equal steps of a root, as in `fit`
-    b = 1.0 / largest + (1.0 - np.sqrt(1.0 / np.linspace(1e-3, 0.999, 40)[::-1])) / (3.0 * quartile)
+    b = 1.0 / largest + (1.0 - np.sqrt(1.0 / np.linspace(1e-3, 0.999, 20)[::-1])) / (3.0 * quartile)
     for _ in range(4):
         b = np.where(np.abs(b) * largest < STRAIGHT, -STRAIGHT / largest, b)
         k = np.stack([np.log1p(-b[..., j, None] * x).mean(axis=-1) for j in range(b.shape[-1])], axis=-1)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
-from tolstat.analysis.sensitivity import normal_half
+from tolstat.analysis.sensitivity import WIDER, normal_half
 from tolstat.common.shown import shown
 
 FEWEST = 50
@@ -61,9 +61,9 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     ab : array_like, shape (n, d)
         Load of the joints AB_i.
     confidence : float
-        Confidence level of the intervals: normal, with standard errors from the indices' influence functions over the
-        points, since indices are ratios of means and so nearly normal (the percentiles of a bootstrap of 500 points of
-        Ishigami's function cover 1 % less).
+        Confidence level of the intervals. Indices are ratios of two means over the points: intervals are Fieller's
+        (1954), whose upper end is further away where the variance comes from few points. Their standard errors are
+        taken `sensitivity.WIDER` times as large.
 
     Returns
     -------
@@ -73,7 +73,8 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     Raises
     ------
     ValueError
-        When the lengths differ, the load does not scatter, or an index has fewer than `FEWEST` points.
+        When the lengths differ, the load does not scatter, an index has fewer than `FEWEST` points, or so few points
+        make up the variance that its own interval contains zero: decompose the logarithm of such a load.
 
     Examples
     --------
@@ -165,10 +166,20 @@ def _recovered(
 
 
 def _index(terms: FloatArray, square: FloatArray, half: float) -> Index:
-    """Ratio of the mean of `terms`, (n, d), NaN where missing, to the mean of `square`, (n,), with its interval."""
+    """Ratio of the mean of `terms`, (n, d), NaN where missing, to the mean of `square`, (n,), with its interval.
+
+    The interval contains each ratio r for which the mean of terms - r square is within `half` standard errors of zero.
+    """
     valid = np.isfinite(terms)
     counts = valid.sum(axis=0)
-    estimate = np.where(valid, terms, 0.0).sum(axis=0) / counts / square.mean()
-    influence = np.where(valid, terms - estimate * square[:, None], 0.0) / square.mean()
-    error = np.sqrt((influence**2).sum(axis=0)) / counts
-    return Index(estimate, estimate - half * error, estimate + half * error)
+    mean, variance = np.where(valid, terms, 0.0).sum(axis=0) / counts, square.mean()
+    away, spread = np.where(valid, terms - mean, 0.0), np.where(valid, (square - variance)[:, None], 0.0)
+    factor = (WIDER * half / counts) ** 2
+    # the condition is a - 2 b r + c r^2 <= 0
+    c = variance**2 - factor * (spread**2).sum(axis=0)
+    b = mean * variance - factor * (away * spread).sum(axis=0)
+    a = mean**2 - factor * (away**2).sum(axis=0)
+    if (c <= 0).any():
+        raise ValueError("few points make up the variance of the load: decompose its logarithm")
+    root = np.sqrt(np.maximum(b**2 - a * c, 0.0))
+    return Index(mean / variance, (b - root) / c, (b + root) / c)

@@ -3,11 +3,13 @@
 Such a joint is watched for some revolutions. The largest loads of each revolution (block maxima) predict the
 largest of ``solver.duration`` revolutions: values above a threshold follow a generalised Pareto distribution
 (Pickands 1975), fitted by probability-weighted moments (Hosking and Wallis 1987). Heavy tails are excluded from the
-fit: a driven joint with losses has bounded loads.
+fit: a driven joint with losses has bounded loads. Few revolutions do not tell how far the bound is: unless they show
+that the tail is not exponential, the upper end is that of an exponential one if it is larger.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +33,10 @@ DRAWS, SEED = 400, 5
 """Number of bootstrap samples, and the seed: one joint's interval is the same wherever it is computed."""
 CONFIDENCE = 0.95
 """Probability that the interval contains the largest load."""
+SHOWN_BOUNDED = 0.0005
+"""Probability that an exponential tail is taken for a bounded one."""
+PIVOTS = 40_000
+"""Number of draws from which the constants of an exponential tail are computed."""
 STEP_ERROR = 0.01
 """Relative error of a load that the time steps may cause: no interval is narrower on either side."""
 
@@ -126,13 +132,14 @@ def largest(values: FloatArray, duration: int) -> Interval:
     -------
     Interval
         Median, and ends between which the largest lies with `CONFIDENCE`; the uncertainty of the fit is included by
-        fits to samples of the fitted distribution (parametric bootstrap).
+        fits to samples of the fitted distribution (parametric bootstrap). Upper end: see above.
     """
     n, m = values.shape
     count = max(3, round(TAIL_SHARE * n))
     ordered = np.sort(values, axis=0)
     threshold = ordered[n - count - 1]
-    scale, shape = _pareto(ordered[n - count :] - threshold)
+    excesses = ordered[n - count :] - threshold
+    scale, shape = _pareto(excesses)
     rng = np.random.default_rng(SEED)
     again = np.sort(_quantile(rng.random((DRAWS, count, m)), scale, shape), axis=1)
     scales, shapes = _pareto(again.swapaxes(0, 1))
@@ -140,8 +147,26 @@ def largest(values: FloatArray, duration: int) -> Interval:
     drawn = threshold + _quantile(rng.random((DRAWS, m)) ** (1 / above), scales, shapes)
     tail = 0.5 * (1 - CONFIDENCE)
     lower, median, upper = np.quantile(drawn, [tail, 0.5, 1 - tail], axis=0)
+    shown, times = _of_exponential_tails(n, count, duration)
+    exponential = threshold + times * excesses.mean(axis=0)
+    upper = np.where(shape < shown, upper, np.maximum(upper, exponential))
     off = STEP_ERROR * np.abs(median)
     return Interval(median, lower - off, upper + off)
+
+
+@lru_cache
+def _of_exponential_tails(n: int, count: int, duration: int) -> tuple[float, float]:
+    """Shape below which a tail is shown to be bounded, and upper end of the largest load, for `n` revolutions.
+
+    Both are quantiles of numbers whose distribution is the same for every exponential tail: the shape that is fitted to
+    `count` excesses, and the largest excess of `duration` further revolutions over the mean of these.
+    """
+    rng = np.random.default_rng(SEED)
+    excesses = np.sort(rng.standard_exponential((count, PIVOTS)), axis=0)
+    above = np.maximum(1, rng.binomial(duration, rng.beta(count + 1, n - count, PIVOTS)))
+    largest = -np.log1p(-(rng.random(PIVOTS) ** (1 / above)))
+    shown = np.quantile(_pareto(excesses)[1], SHOWN_BOUNDED)
+    return float(shown), float(np.quantile(largest / excesses.mean(axis=0), 0.5 * (1 + CONFIDENCE)))
 
 
 def _pareto(excesses: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -101,6 +101,7 @@ def measure(
     workers: int = 1,
     say: Callable[[str], None] = lambda words: None,
     among: tuple[Experiment, ...] | None = None,
+    keep: Callable[[Coverage], None] = lambda found: None,
 ) -> Coverage:
     """Run experiments.
 
@@ -116,6 +117,8 @@ def measure(
         Receives sentences on the progress.
     among : tuple of Experiment, optional
         Other experiments than all.
+    keep : callable
+        Receives what was measured so far, after every `CHUNK` seeds.
 
     Returns
     -------
@@ -134,17 +137,30 @@ def measure(
         )
     jobs = [(k, range(first, min(first + CHUNK, seeds))) for first in range(0, seeds, CHUNK) for k in numbers]
     parts: dict[int, list[FloatArray]] = {k: [] for k in numbers}
+
+    def collect(done: Iterator[FloatArray]) -> Coverage:
+        found = Coverage([])
+        for number, ((k, own), judged) in enumerate(zip(jobs, done, strict=True), start=1):
+            parts[k].append(judged)
+            if number % len(numbers) == 0:
+                found = _counted({k: every[k] for k in numbers}, parts, only)
+                keep(found)
+                say(f"{own.stop} of {seeds} seeds")
+        return found
+
     if workers == 1 or among is not None:
-        done: Iterator[FloatArray] = (every[k].run(own) for k, own in jobs)
-        _collect(parts, jobs, done, say)
-    else:
-        context = multiprocessing.get_context("spawn")
-        with one_thread_each(), ProcessPoolExecutor(workers, mp_context=context) as pool:
-            _collect(parts, jobs, pool.map(_job, jobs, chunksize=4), say)
+        return collect(every[k].run(own) for k, own in jobs)
+    context = multiprocessing.get_context("spawn")
+    with one_thread_each(), ProcessPoolExecutor(workers, mp_context=context) as pool:
+        return collect(pool.map(_job, jobs, chunksize=4))
+
+
+def _counted(of: dict[int, Experiment], parts: dict[int, list[FloatArray]], only: str) -> Coverage:
+    """Rows of the seeds that are done, in the order of `STATISTICS`."""
     rows = []
-    for k in numbers:
+    for k, one in of.items():
         judged = np.concatenate(parts[k])
-        rows += [Row.of(asked, judged[:, i]) for i, asked in enumerate(every[k].asked) if only in asked.statistic]
+        rows += [Row.of(asked, judged[:, i]) for i, asked in enumerate(one.asked) if only in asked.statistic]
     order = list(STATISTICS)
     return Coverage(sorted(rows, key=lambda row: order.index(row.asked.statistic)))
 
@@ -152,17 +168,3 @@ def measure(
 def _job(job: tuple[int, range]) -> FloatArray:
     """Some seeds of an experiment, by its number: functions do not travel between processes."""
     return experiments()[job[0]].run(job[1])
-
-
-def _collect(
-    parts: dict[int, list[FloatArray]],
-    jobs: list[tuple[int, range]],
-    done: Iterator[FloatArray],
-    say: Callable[[str], None],
-) -> None:
-    told = 0
-    for number, ((k, _), found) in enumerate(zip(jobs, done, strict=True), start=1):
-        parts[k].append(found)
-        if 10 * number // len(jobs) > told:
-            told = 10 * number // len(jobs)
-            say(f"{10 * told} % of the seeds")

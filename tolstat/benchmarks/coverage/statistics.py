@@ -24,6 +24,7 @@ class Statistic(NamedTuple):
 
 
 LEAST, ABOUT = "at least 95 %", "95 %"
+EXCHANGED = "fewer than 50 pairs; few pairs that make up the variance"
 CONTROL = "normal approximation, wrong on purpose"
 """Statistic that no command shows: an interval that misses. A bench that passes it shows nothing."""
 
@@ -38,7 +39,7 @@ STATISTICS = {
     "yield and ppm": Statistic("`capability`", LEAST),
     "next delivery": Statistic("`report`, `capability`", LEAST),
     "next delivery, from a share": Statistic("`reweight`, `fatigue`, `rare`", LEAST, "as the share"),
-    "Cpk, normal": Statistic("`capability`", ABOUT, "loads that are not normal (p < 0.01)"),
+    "Cpk, normal": Statistic("`capability`", LEAST, "fewer than 1000 joints; a long tail"),
     "Cpk from quantiles": Statistic("`capability`", LEAST, "few joints: the lower end is at most 0"),
     "share at a stop": Statistic("`run --until`", LEAST, "Sobol' points, Latin hypercubes"),
     "share, replicates": Statistic("`report`, `capability`", ABOUT, "one replicate"),
@@ -50,8 +51,11 @@ STATISTICS = {
     "load that never repeats": Statistic("`report`: total interval", ABOUT, "fewer than 16 revolutions"),
     "rare share, subsets": Statistic("`rare`", ABOUT, "limits that are not reached: an upper end only"),
     "share, importance sampling": Statistic(
-        "`report`, `capability`", ABOUT, "few effective joints above, without a bound; k of 0.7 and more"
+        "`report`, `capability`",
+        "95 %, if the proposals reach every way to the limit",
+        "few effective joints above, without a bound; k of 0.7 and more",
     ),
+    "share, whatever proposals miss": Statistic("`report`: the verdict", "upper end: at least 97.5 %", "never"),
     "share, parts and joints": Statistic(
         "`report`, with `known_from`", ABOUT, "joints that do not support 2.5 % of the likely processes"
     ),
@@ -71,8 +75,8 @@ STATISTICS = {
     "index alone": Statistic("`causes`", ABOUT, "fewer than 50 joints"),
     "index in all": Statistic("`causes`: bounds", LEAST, "fewer than 50 joints"),
     "index over the revolution": Statistic("`causes --against-angle`", ABOUT, "fewer than 50 joints"),
-    "index alone, exchanged": Statistic("`causes --run`, `--pick-freeze`", ABOUT, "fewer than 50 pairs"),
-    "index in all, exchanged": Statistic("`causes --run`, `--pick-freeze`", ABOUT, "fewer than 50 pairs"),
+    "index alone, exchanged": Statistic("`causes --run`, `--pick-freeze`", ABOUT, EXCHANGED),
+    "index in all, exchanged": Statistic("`causes --run`, `--pick-freeze`", ABOUT, EXCHANGED),
     "index of the event": Statistic("`causes --run`", ABOUT, "no joint, or every joint, above the limit"),
     "rank regression": Statistic("`causes`", ABOUT, "fewer than 40 joints more than errors"),
     "errors above a limit": Statistic("`causes`: tail", ABOUT, "fewer than 10 joints on a side of the limit"),

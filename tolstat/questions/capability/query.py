@@ -16,7 +16,7 @@ from tolstat.store import error_budget
 from tolstat.store.view import View
 
 NOT_NORMAL = 0.01
-"""p-value of the test of normality below which no index of a normal load is given."""
+"""p-value of the test of normality below which the index of a normal load tells no share above the limit."""
 
 
 def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
@@ -39,7 +39,7 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
         and, if known, the numerical error; ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``,
         ``needed``; ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the
         delivery. The last row, `ALL_LIMITS`, is for the largest ratio of load to limit of each joint. ``cpk_normal`` is
-        NaN where the load is not normal (``normal_p`` below `NOT_NORMAL`), both indices where unresolved joints matter
+        NaN where the load has a long tail (`capability.LONGEST_TAIL`), both indices where unresolved joints matter
         (`analysis.exceedance.unresolved_matter`).
     """
     rows = []
@@ -57,8 +57,6 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
         row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
         if exceedance.unresolved_matter(c.above.count, c.above.n, c.above.n_failed + c.above.n_unsettled):
             row |= dict.fromkeys(names, np.nan)
-        if c.normal_p < NOT_NORMAL:
-            row |= dict.fromkeys(names[3:], np.nan)
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -30,7 +30,7 @@ LIMITS = (
     Column("above in delivery", text.delivery, rank=3),
     Column("Cpk", lambda row: text.formed(row["cpk"], ".2f")),
     Column("interval of Cpk", lambda row: _with_ends(row, "cpk", ".2f")),
-    Column("Cpk if normal", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),
+    Column("Cpk by sigma", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),
 )
 """Columns of the table `query.limits`; the total interval is that of the yield."""
 
@@ -104,7 +104,7 @@ def note(table: pd.DataFrame) -> str:
     if (table["cpk_lower"] == 0).any():
         lines.append(f"lower ends of Cpk need {table['needed'].iloc[0]} valid joints")
     if (table["normal_p"] < NOT_NORMAL).any():
-        lines.append(f"no 'Cpk if normal' where a load is not normal (p < {NOT_NORMAL:g})")
+        lines.append(f"'Cpk by sigma' tells no share above of a load that is not normal (p < {NOT_NORMAL:g})")
     if table["ppm_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only; run replicates of other seeds")
     return "\n".join(lines)

@@ -193,7 +193,8 @@ def _of_design(view: View, load: SampleLoad, confidence: float, log: bool) -> Ca
     try:
         found = pick_freeze.indices(points[:, 0], points[:, 1], points[:, 2:], confidence)
     except ValueError as error:
-        raise StoreError(str(Fault(path, str(error), f"run {pick_freeze.FEWEST} points or more"))) from error
+        remedy = f"run {pick_freeze.FEWEST} points or more; decompose the logarithm of a load with a long tail"
+        raise StoreError(str(Fault(path, str(error), remedy))) from error
     level = _tail_level(load)
     return Causes(
         load=load.name,

@@ -8,7 +8,7 @@ as many strata as joints, and with `pick_freeze` the number of joints per point 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,15 +254,32 @@ def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
     if study.proposals:
         scores, part = _proposed(study, list(u), numbers)
         u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
-    _fill_from(samples, study, u)
+    _fill_from(samples, study, u, _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {})
 
 
-def _fill_from(samples: Table, study: Study, u: dict[str, Array]) -> None:
-    """Set the errors that scatter, from independent probabilities `u` of their columns."""
+def _of_lots(study: Study, u: dict[str, Array], numbers: range) -> dict[str, Array]:
+    """Probabilities of the errors with lots, of samples of which several are of one lot."""
+    size = study.sampling.joints_per_lot
+    first, last = numbers.start // size, -(-numbers.stop // size)
+    own = np.arange(numbers.start, numbers.stop) // size - first
+    found = {}
+    for name, lot in study.lots.items():
+        drawn = _stream(study.sampling.seed, f"lot {lot.score}", first).random(last - first)
+        z_lot, z_part = ndtri(np.maximum(drawn, 2.0**-54))[own], ndtri(u[name])
+        found[name] = _probability(np.sqrt(lot.share) * z_lot + np.sqrt(1.0 - lot.share) * z_part)
+    return found
+
+
+def _fill_from(samples: Table, study: Study, u: dict[str, Array], of_lots: Mapping[str, Array] | None = None) -> None:
+    """Set the errors that scatter, from independent probabilities `u` of their columns.
+
+    Errors in `of_lots` have these probabilities instead, which `_of_lots` has correlated.
+    """
     names = study.copula.names
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))
         u |= {name: correlated[:, i] for i, name in enumerate(names)}
+    u |= of_lots or {}
     vectors: dict[str, dict[str, Array]] = {}
     for name, distribution in study.tolerances.items():
         if not axes.is_zone(name):

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
     from tolstat.questions.fatigue.query import load_cycles as load_cycles
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
+    from tolstat.questions.lots.query import lots_of as lots_of
     from tolstat.questions.multifidelity.query import two_fidelities as two_fidelities
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
@@ -70,6 +71,7 @@ QUESTIONS = (
     Question("exceedance", has_section=True, has_summary=True),
     Question("histograms", has_section=True),
     Question("capability", (), "Read", ("capability",), has_section=True, has_summary=True),
+    Question("lots", ("query.lots_of",), "Read", ("lots",), has_section=True, has_summary=True),
     Question(
         "causes",
         ("query.causes_of", "angles.against_angle", "pairs.pairs_of", "tail.worst_joints"),

@@ -31,6 +31,7 @@ from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.fits import Fit
+from tolstat.study.tolerances.lots import Lot
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,7 +106,9 @@ class Study(Case):
     axes : dict of str to Axis
         Features and pairs with zones: how the errors follow from what is drawn.
     copula : Copula
-        Correlation of the errors.
+        Correlation of the errors of a joint.
+    lots : dict of str to Lot
+        How errors depend on the lot of their joint.
     proposals : tuple of Proposal
         Distributions of importance sampling beside the tolerances; empty unless ``sampling.method`` is ``importance``.
     sampling : Sampling
@@ -136,6 +139,7 @@ class Study(Case):
     entries: tuple[Toleranced, ...] = ()
     axes: Mapping[str, Axis] = field(default_factory=dict)
     copula: Copula = field(default_factory=Copula)
+    lots: Mapping[str, Lot] = field(default_factory=dict)
     proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
     swept: Swept | None = None
@@ -257,6 +261,8 @@ class Study(Case):
         }
         if self.axes:
             parts["axes"] = {name: axis.describe() for name, axis in self.axes.items()}
+        if self.lots:
+            parts["lots"] = {name: list(lot) for name, lot in self.lots.items()}
         if self.proposals:
             parts["proposal"] = [[p.share, {name: list(s) for name, s in p.scores.items()}] for p in self.proposals]
         if self.groups:
@@ -336,7 +342,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     solver = file.model("solver", Solver)
     errors = file.errors()
     read = file.tolerances(joint, fit)
-    copula = file.correlation()
+    copula = file.correlation(read.lots)
     proposals = file.proposals()
     sampling = file.model("sampling", Sampling, required=True)
     sweep = file.sweep()
@@ -353,7 +359,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     if sampling is not None and sampling.method == "sweep" and joint and operation and solver:
         joints_swept = file.swept(listing.Nominal(joint, operation, solver), sweep, sampling.nominal_first)
     if sampling is not None:
-        file.check_method(sampling, sweep)
+        file.check_method(sampling, sweep, read.lots)
         file.check_points(sampling, sweep, points)
     if output is not None:
         file.check_fatigue(output)
@@ -381,6 +387,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         axes=read.axes,
         fit=fit,
         copula=copula,
+        lots=read.lots,
         proposals=proposals,
         sweep=sweep,
         swept=joints_swept,

@@ -1,7 +1,7 @@
 """Joints of one lot depend on one another: intervals over lots, and what the next delivery may hold.
 
-Lots are independent of each other, joints of one lot are not. Intervals of shares come of the lots' shares (Student's t on
-the logit of the mean), and predictions of the beta-binomial law: the share of a lot is a beta variate.
+Lots are independent of each other, joints of one lot are not. Intervals of shares come from the lots' shares (Student's
+t on the logit of their mean), and predictions from the beta-binomial law: the share of a lot is a beta variate.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis import exceedance
+from tolstat.analysis import exceedance, prediction
 from tolstat.analysis.exceedance import FloatArray, Sample, Table
 from tolstat.analysis.quantile import Quantile
 from tolstat.analysis.quantile import of_sample as quantile_of_sample
@@ -23,9 +23,9 @@ FEW = 20
 """Number of joints on a side of a level below which an interval contains that of independent joints, too."""
 MOST_LEVELS = 2000
 """Number of loads at which the interval of a quantile is looked for; its ends are rounded outwards to one of these."""
-GRID, REACH = 41, 6.0
+GRID, REACH = 33, 5.0
 """Points of each parameter of the posterior distribution, and its half width in standard errors of the mean share."""
-NEGLIGIBLE = 1e-7
+NEGLIGIBLE = 1e-5
 """Posterior probability below which a point of the grid is left out."""
 
 
@@ -109,8 +109,8 @@ def curve_of(
     Returns
     -------
     ndarray of exceedance.CURVE, shape (m,)
-        As from `exceedance.curve`. With fewer than `FEW` joints on a side of a level an interval contains that of as many
-        independent joints (Clopper and Pearson), too. NaN for fewer than `LEAST` lots.
+        As from `exceedance.curve`. With fewer than `FEW` joints on a side of a level an interval contains that of as
+        many independent joints (Clopper and Pearson), too. NaN for fewer than `LEAST` lots.
     """
     table = exceedance.curve_of(whole, levels, confidence)
     parts = [part for part in parts if part.n]
@@ -156,14 +156,17 @@ class Law(NamedTuple):
         Parameters of the beta distributions.
     weight : ndarray, shape (m,)
         Their probabilities; the sum is 1.
+    counts : tuple of int
+        Joints above the limit, and joints, that this is known from.
     """
 
     a: FloatArray
     b: FloatArray
     weight: FloatArray
+    counts: tuple[int, int]
 
-    def delivery(self, number: int, lots: int = 1) -> FloatArray:
-        """Probability of each number of joints above the limit in the next delivery, (number + 1,).
+    def delivery(self, number: int, lots: int = 1) -> Delivery:
+        """Predict the next delivery.
 
         Parameters
         ----------
@@ -173,31 +176,49 @@ class Law(NamedTuple):
             New lots that they come from, equally many of each but for one.
         """
         small, more = divmod(number, lots)
-        spectrum = 1.0 + 0.0j
+        spectrum = np.ones((self.weight.size, (number + 1) // 2 + 1), dtype=complex)
         for size, count in ((small, lots - more), (small + 1, more)):
             if count and size:
                 padded = np.zeros((self.weight.size, number + 1))
                 padded[:, : size + 1] = np.exp(_log_pmf(np.arange(size + 1), size, self.a[:, None], self.b[:, None]))
                 spectrum = spectrum * np.fft.rfft(padded) ** count
         pmf = np.fft.irfft(self.weight @ spectrum, number + 1).clip(0.0)
-        return np.asarray(pmf / pmf.sum())
+        return Delivery(np.asarray(pmf / pmf.sum()), self.counts)
 
-    def ends(self, number: int, lots: int = 1, confidence: float = 0.95) -> tuple[float, float]:
-        """Prediction interval of the number above the limit in the next delivery; parameters as in `delivery`."""
-        below = np.cumsum(self.delivery(number, lots))
-        tail = 0.5 * (1.0 - confidence)
-        return float(np.searchsorted(below, tail)), float(min(np.searchsorted(below, 1.0 - tail), number))
 
-    def more_than(self, share: float, number: int, lots: int = 1) -> float:
-        """Probability that more than a share of the next delivery is above the limit."""
-        allowed = int(np.floor(share * number * (1.0 + 1e-12)))
-        return float(self.delivery(number, lots)[allowed + 1 :].sum())
+class Delivery(NamedTuple):
+    """Prediction of the number of joints above a limit in the next delivery.
+
+    Attributes
+    ----------
+    probability : ndarray, shape (number + 1,)
+        Probability of each number.
+    counts : tuple of int
+        As in `Law`.
+    """
+
+    probability: FloatArray
+    counts: tuple[int, int]
+
+    def ends(self, confidence: float = 0.95) -> tuple[float, float]:
+        """Prediction interval of the number, ends included; it contains that of independent joints (Thatcher 1964)."""
+        above, joints = self.counts
+        number, tail = self.probability.size - 1, 0.5 * (1.0 - confidence)
+        low, high = prediction.of_counts(above, above, joints, number, confidence)
+        below = np.cumsum(self.probability)
+        least, most = (float(np.searchsorted(below, share)) for share in (tail, 1.0 - tail))
+        return min(least, low), min(max(most, high), float(number))
+
+    def more_than(self, share: float) -> float:
+        """Probability that more than a share of the delivery is above the limit."""
+        allowed = int(np.floor(share * (self.probability.size - 1) * (1.0 + 1e-12)))
+        return float(self.probability[allowed + 1 :].sum())
 
 
 def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     """Posterior distribution of the law of the lots' shares.
 
-    The prior distribution of the mean is Jeffreys' of a share; that of the correlation of two joints of a lot is uniform.
+    The prior distribution of the mean is Jeffreys' of a share, that of the correlation of two joints of a lot uniform.
 
     Parameters
     ----------
@@ -226,7 +247,7 @@ def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     weight = np.exp(log - log.max())
     weight /= weight.sum()
     kept = weight > NEGLIGIBLE
-    return Law(a[kept], b[kept], weight[kept] / weight[kept].sum())
+    return Law(a[kept], b[kept], weight[kept] / weight[kept].sum(), (int(k.sum()), int(n.sum())))
 
 
 def _log_pmf(k: ArrayLike, n: ArrayLike, a: FloatArray, b: FloatArray) -> FloatArray:

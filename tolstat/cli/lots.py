@@ -45,8 +45,8 @@ def lots(
 ) -> None:
     """Print which share of the joints of a lot, and of the next delivery, exceeds each limit.
 
-    Parts of one lot deviate together, as the key lot of an entry of [tolerances] says. Simulates 50 lots of 20 joints of
-    STUDY into FILE. To resume after an interruption, run the same command again.
+    Parts of one lot deviate together, as the key lot of an entry of [tolerances] says. Simulates 50 lots of 20 joints
+    of STUDY into FILE. To resume after an interruption, run the same command again.
 
     Prints for each limit, and for all limits together, the share of the joints above it, with a 95 % interval over the
     lots, the worst lot, and a prediction interval for the next delivery; with --wide or --json also the median lot and
@@ -67,17 +67,18 @@ def lots(
         path = out or Path(f"{source.stem}_lots.h5")
         run.simulate(query.study_of(source, number, joints), path, execution=Execution("processes", workers))
     elif number or joints or out:
-        raise InputError([Fault(str(source), "holds its lots already", "give a study, or remove --lots, --joints, --out")])
+        remedy = "give a study, or remove --lots, --joints and --out"
+        raise InputError([Fault(str(source), "holds its lots already", remedy)])
     else:
         path = source
     with progress("lots"), Reader.open(path) as store:
         view = store.view().at(point or "")
         found, unknown = query.lots_of(view, delivery, from_lots, accepted), error_budget.unknown(view)
     if as_json:
-        shares = text.records(found.shares)
-        typer.echo(as_text({"joints_per_lot": found.joints_per_lot, "limits": text.records(found.table), "lots": shares}))
+        tables = {"limits": text.records(found.table), "lots": text.records(found.shares)}
+        typer.echo(as_text({"joints_per_lot": found.joints_per_lot} | tables))
         return
-    print_table(rendering.columns(found), found.table, wide)
+    print_table(rendering.COLUMNS, found.table, wide)
     say(rendering.note(found, accepted))
     if unknown:
         say(unknown)

@@ -178,7 +178,7 @@ class Sampling(Strict):
         whole(
             1,
             MAX_SAMPLES,
-            "number of joints of a lot, for errors with `lot`; 1: each joint is its own lot, so that all are independent",
+            "joints of a lot, for errors with `lot`; with 1 each joint is its own lot, and all are independent",
             20,
         ),
     ] = 1

@@ -1,1 +1,1 @@
-"""Lots: which share of the joints of a lot, and of the next delivery, is above a limit?"""
+"""Which share of the joints of a lot, and of the next delivery, is above a limit."""

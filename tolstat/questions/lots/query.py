@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -10,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance, lots
-from tolstat.analysis.lots import Law
+from tolstat.analysis import exceedance, lots, prediction
+from tolstat.analysis.lots import Delivery, Law
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
@@ -37,24 +36,21 @@ class Lots(NamedTuple):
         Joints of a lot; a slice, or joints that are pending, may leave fewer.
     table : DataFrame
         One row per limit, the last for all limits together: ``load``, ``unit``, ``limit``, ``lots``, ``n`` (joints),
-        ``n_failed``, ``n_unsettled``, ``count`` (above); ``estimate``, share of the joints above, with its total interval
-        ``lower``, ``upper`` over lots; ``correlation`` of two joints of a lot; ``without``, share of the lots with no
-        joint above; ``median``, ``high`` (90 %) and ``worst`` of the lots' shares; ``delivery``, ``from_lots``,
+        ``n_failed``, ``n_unsettled``, ``count`` (above); ``estimate``, share of the joints above, with its total
+        interval ``lower``, ``upper`` over lots; ``correlation`` of two joints of a lot; ``without``, share of the lots
+        with no joint above; ``median``, ``high`` (90 %) and ``worst`` of the lots' shares; ``delivery``, ``from_lots``,
         ``next_lower``, ``next_upper``: joints above the limit in the next delivery; ``bad``: probability that more than
         the accepted share of the next delivery is above, NaN without one.
     shares : DataFrame
         One row per lot: ``lot``, its number; ``n``, joints; and by load the number of joints above the limit.
     law : Law
-        What is known of the lots' shares above the limit of `load`.
-    load : str
-        The load of the last row of `table`.
+        What is known of the lots' shares above all limits together.
     """
 
     joints_per_lot: int
     table: pd.DataFrame
     shares: pd.DataFrame
     law: Law
-    load: str
 
 
 def study_of(path: Path, number: int | None = None, joints: int | None = None) -> Study:
@@ -111,16 +107,16 @@ def lots_of(
     ...     found = tolstat.lots_of(store.view(), delivery=500)
     """
     check(view)
-    rows, every, laws = [], {}, dict[bytes, Law]()
+    rows, every, known = [], {}, dict[bytes, Delivery]()
     for own in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
         every[own.name] = counted(own)
-        rows.append(_row(view, own, laws, (delivery, from_lots, accepted, confidence)))
+        rows.append(_row(view, own, known, (delivery, from_lots, accepted, confidence)))
     above, n = every[ALL_LIMITS]
     assert view.lots is not None
     done = [part.n > 0 for part in view.load(ALL_LIMITS).of_lots]
     shares = {"lot": np.unique(view.lots)[done], "n": n} | {name: own[0] for name, own in every.items()}
     size = int(view.store.sampling["joints_per_lot"])
-    return Lots(size, pd.DataFrame(rows), pd.DataFrame(shares), _law(laws, above, n), ALL_LIMITS)
+    return Lots(size, pd.DataFrame(rows), pd.DataFrame(shares), lots.law_of(above, n))
 
 
 def check(view: View) -> None:
@@ -160,35 +156,31 @@ def counted(
 
 
 def _row(
-    view: View, load: SampleLoad, laws: dict[bytes, Law], asked: tuple[int, int, float, float]
-) -> Mapping[str, object]:
+    view: View, load: SampleLoad, known: dict[bytes, Delivery], asked: tuple[int, int, float, float]
+) -> dict[str, object]:
     assert load.limit is not None
     delivery, from_lots, accepted, confidence = asked
+
+    def predicted(counts: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Delivery:
+        key = b"".join(own.tobytes() for own in counts)  # equal counts have one prediction
+        if key not in known:
+            known[key] = lots.law_of(*counts).delivery(delivery, from_lots)
+        return known[key]
+
     pair = error_budget.shifted(view, load)
     above = load.above(load.limit, confidence)
     low, high = error_budget.total_interval(load, pair, load.limit, confidence)
     count, n = counted(load)
-    share, apart = count / n, lots.interval(count, n, confidence)
-    least, most = counted(pair[0] if pair else load, "least"), counted(pair[1] if pair else load, "most")
-    ends = (_law(laws, *own).ends(delivery, from_lots, confidence) for own in (least, most))
-    (lower, _), (_, upper) = ends
-    bad = np.nan if np.isnan(accepted) else _law(laws, *most).more_than(accepted, delivery, from_lots)
-    return {
-        **{"load": load.name, "unit": load.unit, "limit": load.limit, "lots": len(n)},
-        **{key: getattr(above, key) for key in ("n", "n_failed", "n_unsettled", "count", "estimate")},
-        **{"lower": low, "upper": high, "correlation": float(apart.correlation)},
-        **{"without": float(np.mean(count == 0)), "median": float(np.median(share))},
-        **{"high": float(np.quantile(share, 0.9, method="inverted_cdf")), "worst": float(share.max())},
-        **{"delivery": delivery, "from_lots": from_lots, "next_lower": lower, "next_upper": upper, "bad": bad},
-    }
-
-
-def _law(laws: dict[bytes, Law], above: NDArray[np.intp], joints: NDArray[np.intp]) -> Law:
-    """Law of the lots' shares; equal counts have the same one."""
-    key = above.tobytes() + joints.tobytes()
-    if key not in laws:
-        laws[key] = lots.law_of(above, joints)
-    return laws[key]
+    share = count / n
+    least = predicted(counted(pair[0] if pair else load, "least"))
+    most = predicted(counted(pair[1] if pair else load, "most"))
+    row: dict[str, object] = {"load": load.name, "unit": load.unit, "limit": load.limit, "lots": len(n)}
+    row |= {key: getattr(above, key) for key in ("n", "n_failed", "n_unsettled", "count", "estimate")}
+    row |= {"lower": low, "upper": high, "correlation": float(lots.interval(count, n).correlation)}
+    row |= {"without": float(np.mean(count == 0)), "median": float(np.median(share))}
+    row |= {"high": float(np.quantile(share, 0.9, method="inverted_cdf")), "worst": float(share.max())}
+    row |= prediction.columns((least.ends(confidence)[0], most.ends(confidence)[1]), delivery)
+    return row | {"from_lots": from_lots, "bad": np.nan if np.isnan(accepted) else most.more_than(accepted)}
 
 
 def summary(view: View, confidence: float) -> dict[str, Any]:

@@ -25,16 +25,10 @@ COLUMNS = (
     Column("worst lot", lambda row: text.percent(row["worst"]), rank=1),
     Column("correlation", lambda row: text.formed(row["correlation"], ".2f"), rank=5),
     Column("above in delivery", text.delivery),
+    Column("bad deliveries", lambda row: text.percent(row["bad"]), shown=lambda table: not table["bad"].isna().all()),
 )
-"""Columns of the table of `query.lots_of`."""
-BAD = Column("bad deliveries", lambda row: text.percent(row["bad"]))
-"""Column with an accepted share."""
+"""Columns of the table of `query.lots_of`; bad deliveries with an accepted share."""
 OBSERVED, EXPECTED, ALONE = "lots simulated", "expected of a new lot", "if joints did not depend on their lot"
-
-
-def columns(found: Lots) -> tuple[Column, ...]:
-    """Columns of the table: `COLUMNS`, and `BAD` with an accepted share."""
-    return COLUMNS if found.table["bad"].isna().all() else (*COLUMNS, BAD)
 
 
 def note(found: Lots, accepted: float = np.nan) -> str:
@@ -56,11 +50,11 @@ def draw(ax: Axes, found: Lots) -> None:
     from scipy.stats import binom
 
     own, size = found.shares, found.joints_per_lot
-    share = np.sort((own[found.load] / own["n"]).to_numpy())
+    share = np.sort((own[ALL_LIMITS] / own["n"]).to_numpy())
     top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
     at = np.arange(top + 1)
-    mean = float(own[found.load].sum() / own["n"].sum())
-    expected = np.cumsum(found.law.delivery(size))[at]
+    mean = float(own[ALL_LIMITS].sum() / own["n"].sum())
+    expected = np.cumsum(found.law.delivery(size).probability)[at]
     alone = binom.cdf(at, size, mean)
     x = np.append(at / size, (top + 1) / size)
     for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):

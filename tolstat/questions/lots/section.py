@@ -24,7 +24,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
     except StoreError as error:
         return [Section("lots", "Lots", [Text(f"No lots: {str(error).splitlines()[0].partition(': ')[2]}.")])]
     blocks: list[Block] = [Panels([panel(found)])]
-    blocks.append(as_block("Lots against each limit, and all of them together", rendering.columns(found), found.table))
+    blocks.append(as_block("Lots against each limit, and all of them together", rendering.COLUMNS, found.table))
     blocks += [Text(text.sentence(line), small=True) for line in rendering.note(found, asked.accepted).splitlines()]
     return [Section("lots", "Lots, and the next delivery", blocks)]
 

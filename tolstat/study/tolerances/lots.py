@@ -1,7 +1,8 @@
 """Lots: parts that are made together deviate together. The key ``lot`` of an entry of ``[tolerances]``.
 
-The normal score of an error is ``sqrt(share) z_lot + sqrt(1 - share) z_part``, so that its distribution stays that of the
-entry. `sampling` draws the scores; how many joints a lot has is ``sampling.joints_per_lot``.
+The normal score of an error is ``sqrt(share) z_lot + sqrt(1 - share) z_part``, so that its distribution stays that of
+the entry. `sampling` draws the scores; how many joints a lot has is ``sampling.joints_per_lot``. Where each joint is
+its own lot, the score of the lot only correlates errors of the joint that share it, as `correlated` does.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ from tolstat.study.points import PointEntry
 from tolstat.study.schema import files
 from tolstat.study.schema.parts import of_model
 from tolstat.study.selection import TOLERANCED
+from tolstat.study.selective import SelectiveEntry
 from tolstat.study.stress_point import StressPointEntry
 from tolstat.study.tolerances.entry import Banded, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
@@ -212,6 +213,7 @@ def tables() -> dict[str, str]:
             "joint file": "\n\n".join(joint_tables()),
             "band": key_table(_own(Banded, SingleEntry)),
             "lot": model_table(LotEntry),
+            "selective": model_table(SelectiveEntry),
             "distributions": "\n\n".join(distributions()),
             "zones": zones(),
             "error names": errors(),

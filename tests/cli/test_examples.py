@@ -26,10 +26,6 @@ SHORT = {
     "rare": ("--n", "100", "--repeats", "1"),
     "bench coverage": ("--seeds", "20"),
 }
-    "lots": ("--lots", "30", "--joints", "2"),
-    "rare": ("--n", "100", "--repeats", "1"),
-    "bench coverage": ("--seeds", "20"),
-}
 """Options with which an example takes seconds."""
 
 

@@ -140,6 +140,7 @@ def _perturb(joint, operation, errors):
 STAGES = fakes.stages()._replace(draw=sampling.draw_blocks, perturb=_perturb)
 
 
+@pytest.mark.slow
 def test_from_toml_to_page_with_the_same_bytes_however_it_is_run(tmp_path):
     plan = query.study_of(_study(tmp_path), 30, 4)
     whole, merged, stopped = (tmp_path / f"{name}.h5" for name in ("whole", "merged", "stopped"))

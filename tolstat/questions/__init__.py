@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from tolstat.questions.multifidelity.query import two_fidelities as two_fidelities
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
+    from tolstat.questions.selective.query import assembled as assembled
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
@@ -104,6 +105,7 @@ QUESTIONS = (
     Question("allocate", ("query.allocated",), "Decide", ("allocate",)),
     Question("compare", ("query.compared",), "Decide", ("compare",)),
     Question("rare", ("query.rare_event",), "Decide", ("rare",)),
+    Question("selective", ("query.assembled",), "Decide", ("selective",), has_section=True),
     Question("multifidelity", ("query.two_fidelities",), "Decide", ("multifidelity",)),
 )
 

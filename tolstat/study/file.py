@@ -16,7 +16,7 @@ from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
 from tolstat.joint.overrides import merged
-from tolstat.study import fatigue, listing, points, proposal, selection, swept
+from tolstat.study import fatigue, listing, points, proposal, selection, selective, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
@@ -266,7 +266,7 @@ class StudyFile:
             remedy = "write one [operation], or sweep other errors"
             self._fault(("sweep", name), "is given by several [[operation]] already", remedy)
 
-    def check_method(self, sampling: Sampling, sweep: tuple[SweepAxis, ...], lots: Mapping[str, Lot]) -> None:
+    def check_method(self, sampling: Sampling, sweep: tuple[SweepAxis, ...], read: Tolerances, copula: Copula) -> None:
         """Note sections that the sampling method needs or does not use."""
         used = SECTIONS_OF.get(sampling.method, SCATTER)
         needed = used[0]
@@ -279,9 +279,13 @@ class StudyFile:
             if section not in used and section in self.data:
                 remedy = "remove it, or set another sampling.method"
                 self._fault((section,), f"has no effect with {sampling.method!r}", remedy)
-        if sampling.joints_per_lot > 1 and not lots:
+        if sampling.joints_per_lot > 1 and not read.lots:
             remedy = "write lot = { share = 0.3 } in an entry of [tolerances], or remove the key"
             self._fault(("sampling", "joints_per_lot"), "has no effect: no tolerance has a lot", remedy)
+        if sampling.is_matched and sampling.selective is not None:
+            depending = {*copula.names, *read.lots, *self._accepted}
+            found = selective.faults(sampling.selective, read.entries, read.distributions, depending, self.place)
+            self._faults += found
         if sampling.method == "cases" and self.data.get("limits"):
             self._fault(("limits",), "has no effect with 'cases'", "remove it: listed joints have no exceedance")
         if sampling.method == "subset":

@@ -197,10 +197,11 @@ class Study(Case):
         return of.table if of else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
     def has_bonus(self, name: str) -> bool:
-        """Whether `name` is a position with a bonus by maximum material, or the diameter of such a feature."""
+        """Whether `name` is a position with a bonus, or the diameter of such a feature or of one matched by classes."""
         feature, _, key = name.partition(".")
         axis = self.axes.get(feature)
-        return axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
+        bonus = axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
+        return bonus or (self.sampling.is_matched and key == "diameter")
 
     @property
     def samples(self) -> int:
@@ -359,7 +360,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     if sampling is not None and sampling.method == "sweep" and joint and operation and solver:
         joints_swept = file.swept(listing.Nominal(joint, operation, solver), sweep, sampling.nominal_first)
     if sampling is not None:
-        file.check_method(sampling, sweep, read.lots)
+        file.check_method(sampling, sweep, read, copula)
         file.check_points(sampling, sweep, points)
     if output is not None:
         file.check_fatigue(output)

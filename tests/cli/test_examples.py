@@ -22,6 +22,7 @@ STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
 FEW = {"codes": 'codes = ["LSODA"]', "methods": 'methods = ["bdf2"]', "fidelities": 'fidelities = ["quasistatic"]'}
 """One integrator of each side in ``studies/precision.toml``."""
 SHORT = {
+    "selective": ("--n", "40"),
     "lots": ("--lots", "30", "--joints", "2"),
     "rare": ("--n", "100", "--repeats", "1"),
     "bench coverage": ("--seeds", "20"),

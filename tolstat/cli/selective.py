@@ -20,6 +20,7 @@ def selective(
             "--classes", metavar="K", min=1, max=20, help="Number of classes; repeatable; default: 1, 2, 3 and 5."
         ),
     ] = None,
+    n: Annotated[int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints of each.")] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for result files and figure; default: the current one.")
     ] = Path(),
@@ -46,7 +47,7 @@ def selective(
     from tolstat.questions.selective import query, rendering
     from tolstat.store import Reader
 
-    plans = [query.study_of(study_file, number) for number in sorted(set(classes or query.CLASSES))]
+    plans = [query.study_of(study_file, number, n) for number in sorted(set(classes or query.CLASSES))]
     make_folder(out)
     paths = []
     for plan in plans:

@@ -284,8 +284,8 @@ class StudyFile:
             self._fault(("sampling", "joints_per_lot"), "has no effect: no tolerance has a lot", remedy)
         if sampling.is_matched and sampling.selective is not None:
             depending = {*copula.names, *read.lots, *self._accepted}
-            found = selective.faults(sampling.selective, read.entries, read.distributions, depending, self.place)
-            self._faults += found
+            faults = selective.faults(sampling.selective, read.entries, read.distributions, depending, self.place)
+            self._faults += faults
         if sampling.method == "cases" and self.data.get("limits"):
             self._fault(("limits",), "has no effect with 'cases'", "remove it: listed joints have no exceedance")
         if sampling.method == "subset":

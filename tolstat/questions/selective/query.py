@@ -41,8 +41,8 @@ class Assembled(NamedTuple):
     table: pd.DataFrame
 
 
-def study_of(path: Path, classes: int) -> Study:
-    """Read a study with ``sampling.selective``, and set its number of classes.
+def study_of(path: Path, classes: int, n: int | None = None) -> Study:
+    """Read a study with ``sampling.selective``, and set its number of classes and, if given, of joints.
 
     Raises
     ------
@@ -53,8 +53,8 @@ def study_of(path: Path, classes: int) -> Study:
     if plan.sampling.selective is None:
         remedy = 'add selective = { classes = 3, gauge = "2 um" } to [sampling]'
         raise InputError([plan.fault("sampling", "missing key selective", remedy)])
-    keys = {("sampling", "selective"): {"classes": classes}}
-    return load(path, text=with_keys(plan.text, keys, str(path)))
+    text = with_keys(plan.text, {("sampling", "selective"): {"classes": classes}}, str(path))
+    return load(path, n, text)
 
 
 def classes_of(view: View) -> Matching | None:

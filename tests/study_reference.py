@@ -20,13 +20,15 @@ from tolstat.study.points import PointEntry
 from tolstat.study.schema import files
 from tolstat.study.schema.parts import of_model
 from tolstat.study.selection import TOLERANCED
+from tolstat.study.selective import SelectiveEntry
 from tolstat.study.sorting import RejectEntry
 from tolstat.study.stress_point import StressPointEntry
-from tolstat.study.tolerances.entry import Banded
+from tolstat.study.tolerances.entry import Banded, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
+from tolstat.study.tolerances.lots import LotEntry
 
-BAND = tuple(Banded.model_fields)
+BAND = tuple(key for key in Banded.model_fields if key not in SingleEntry.model_fields)
 ZONES = tuple(key for key in ZONE_KINDS if key != "offset_radial")
 BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 
@@ -131,7 +133,8 @@ def distributions() -> Iterator[str]:
             of.setdefault(word, (model, []))[1].append(name)
     for word, (model, names) in of.items():
         made = of_model(model)
-        own = {key: v for key, v in made["properties"].items() if key not in (*BAND, "distribution")}
+        told = {*BAND, *SingleEntry.model_fields, "distribution"}
+        own = {key: v for key, v in made["properties"].items() if key not in told}
         band = [f"`{key}`" for key in BAND if key in made["properties"]]
         text = f"#### `{word}`\n\n{made['description']}"
         if len(names) < len(TOLERANCED) / 2:
@@ -210,7 +213,9 @@ def tables() -> dict[str, str]:
             "sections": sections(),
             "points": key_table(_own(PointEntry, Operation), ("name",)),
             "joint file": "\n\n".join(joint_tables()),
-            "band": key_table(of_model(Banded)["properties"]),
+            "band": key_table(_own(Banded, SingleEntry)),
+            "lot": model_table(LotEntry),
+            "selective": model_table(SelectiveEntry),
             "distributions": "\n\n".join(distributions()),
             "zones": zones(),
             "error names": errors(),

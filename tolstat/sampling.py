@@ -8,7 +8,7 @@ as many strata as joints, and with `pick_freeze` the number of joints per point 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,13 @@ from scipy.special import ndtr, ndtri
 
 from tolstat.analysis import process
 from tolstat.common import draw_records
+from tolstat.common.errors import InputError
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation, nominal_errors
 from tolstat.study import Study, axes
 from tolstat.study.design import Design, sobol
 from tolstat.study.proposal import component, weights
+from tolstat.study.selective import matching
 from tolstat.study.tolerances.distributions import score
 from tolstat.study.tolerances.radial import plane_scores
 
@@ -132,7 +134,15 @@ def from_scores(study: Study, scores: Array) -> Table:
     Returns
     -------
     ndarray, (n,), dtype ERROR
+
+    Raises
+    ------
+    InputError
+        When pins and holes are matched by classes: their diameters depend on each other.
     """
+    if study.sampling.is_matched:
+        remedy = "remove sampling.selective, or change the study and run it as another campaign"
+        raise InputError([study.fault("sampling.selective", "matches diameters: joints have no free scores", remedy)])
     table = nominal_errors(len(scores))
     for name, value in study.errors.items():
         table[name] = value
@@ -255,25 +265,47 @@ def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
     if study.proposals:
         scores, part = _proposed(study, list(u), numbers)
         u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
-    _fill_from(samples, study, u)
+    own = _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {}
+    if study.sampling.is_matched and study.sampling.selective is not None:
+        u_class = _stream(study.sampling.seed, "selective", numbers.start).random(len(numbers))
+        classes = matching(study.sampling.selective, study.entries, study.tolerances)
+        own |= classes.probabilities(u_class, u)
+    _fill_from(samples, study, u, own)
 
 
-def _fill_from(samples: Table, study: Study, u: dict[str, Array]) -> None:
-    """Set the errors that scatter, from independent probabilities `u` of their columns."""
+def _of_lots(study: Study, u: dict[str, Array], numbers: range) -> dict[str, Array]:
+    """Probabilities of the errors with lots, of samples of which several are of one lot."""
+    size = study.sampling.joints_per_lot
+    first, last = numbers.start // size, -(-numbers.stop // size)
+    own = np.arange(numbers.start, numbers.stop) // size - first
+    found = {}
+    for name, lot in study.lots.items():
+        drawn = _stream(study.sampling.seed, f"lot {lot.score}", first).random(last - first)
+        z_lot, z_part = ndtri(np.maximum(drawn, 2.0**-54))[own], ndtri(u[name])
+        found[name] = _probability(np.sqrt(lot.share) * z_lot + np.sqrt(1.0 - lot.share) * z_part)
+    return found
+
+
+def _fill_from(samples: Table, study: Study, u: dict[str, Array], own: Mapping[str, Array] | None = None) -> None:
+    """Set the errors that scatter, from independent probabilities `u` of their columns.
+
+    Errors in `own` have these probabilities instead: of those that depend on other joints or on the class.
+    """
     names = study.copula.names
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))
         u |= {name: correlated[:, i] for i, name in enumerate(names)}
+    u |= own or {}
     vectors: dict[str, dict[str, Array]] = {}
     for name, distribution in study.tolerances.items():
         if not axes.is_zone(name):
             samples[name] = distribution.ppf(u[name])
             continue
-        own = axes.streams_of(name)
-        drawn = distribution.ppf(u[own[0]])
+        of = axes.streams_of(name)
+        drawn = distribution.ppf(u[of[0]])
         feature, _, key = name.partition(".")
         vectors.setdefault(feature, {})[key] = (
-            axes.of_component(name, drawn) if len(own) == 1 else _in_direction(drawn, 2 * np.pi * u[own[1]])
+            axes.of_component(name, drawn) if len(of) == 1 else _in_direction(drawn, 2 * np.pi * u[of[1]])
         )
     for feature, parts in vectors.items():
         study.axes[feature].fill(samples, parts)

@@ -1,7 +1,7 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5`` and ``sorting.h5``, of some joints or
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``sorting.h5`` and ``lots.h5``, of some joints or
 all, and gets a picture of each, and ``tilted_pin.png``.
 """
 
@@ -25,6 +25,7 @@ from tolstat.questions.bearing_life.rendering import curve
 from tolstat.questions.fatigue import parts_rendering
 from tolstat.questions.known_parts import rendering as known_rendering
 from tolstat.questions.known_parts.query import intervals
+from tolstat.questions.lots import rendering as lots_rendering
 from tolstat.questions.sorting import rendering as sorting_rendering
 
 mpl.use("Agg")
@@ -155,6 +156,16 @@ def duty_cycle(folder: Path) -> None:
     save(figure, folder / "duty_cycle.png")
 
 
+def lots(folder: Path) -> None:
+    """Draw the shares of the lots, as the page does."""
+    with tolstat.open(folder / "lots.h5") as store:
+        found = tolstat.lots_of(store.view())
+    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
+    lots_rendering.draw(ax, found)
+    ax.grid(alpha=0.3)
+    save(figure, folder / "lots.png")
+
+
 def kind(status: np.ndarray) -> np.ndarray:
     """Name of the colour of each joint."""
     names = np.full(len(status), "other", dtype="U10")
@@ -213,7 +224,8 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    for draw in (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, sorting):
+    drawn = (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, sorting, lots)
+    for draw in drawn:
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)
 

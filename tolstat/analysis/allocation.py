@@ -205,8 +205,11 @@ def joints_needed(share: float, ess: float, target: float, confidence: float = 0
     return float(factors[enough[0]]) if enough.size and share < target else np.inf
 
 
-def halves(n: int, most: int) -> Sequence[NDArray[np.intp]]:
-    """Split n joints: every second one, at most `most`, for the search; all others for the check."""
+def halves(n: int, most: int, lots: NDArray[np.intp] | None = None) -> Sequence[NDArray[np.intp]]:
+    """Split n joints: every second one, at most `most`, for the search; all others for the check.
+
+    With the lot of each joint, (n,), every second lot as a whole.
+    """
     rows = np.arange(n)
-    chosen = rows[::2][:most]
+    chosen = rows[(rows if lots is None else lots) % 2 == 0][:most]
     return chosen, np.setdiff1d(rows, chosen, assume_unique=True)

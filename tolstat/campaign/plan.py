@@ -235,7 +235,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     slower = min(_loop() for _ in range(LOOPS)) / LOOP_S
     stages = {"start": slower * START_S, "joints": each * study.rows / workers, "check": check}
     stages["report"] = slower * (REPORT_S + REPORT_S_PER_JOINT * study.rows)
-    iid = study.sampling.method == "random"
+    iid = study.sampling.method == "random" and study.sampling.joints_per_lot == 1
     valid = slice(study.first_sample, None)
     status = worst.together(list(results.values()))["status"]
     simulation = next(iter(timed.values()))[0]

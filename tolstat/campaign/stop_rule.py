@@ -117,6 +117,9 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
         own = study.sampling.method
         found = f"sampling.method is {own!r}: its interval needs independent samples of equal weight"
         raise InputError([Fault("--until", found, 'write sampling.method = "random" in the study')])
+    if study.sampling.joints_per_lot > 1:
+        found = "joints share lots: the interval of a stop needs independent samples"
+        raise InputError([Fault("--until", found, "remove sampling.joints_per_lot, or --until")])
     for load in map(load_of, rule.limit.loads):
         if not selected_results.holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"

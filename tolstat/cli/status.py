@@ -147,7 +147,7 @@ def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDA
     weights = store.origin()["weight"][samples] if method == "importance" else None
     limit, unit = store.limits[name], load_of(name).unit
     own, lower, upper = values[:, samples]
-    iid = method in ("random", "importance")
+    iid = method in ("random", "importance") and "joints_per_lot" not in store.sampling
     load = SampleLoad(
         name, unit, limit, float("nan"), own, (lower, upper), states[samples], weights, iid, store.heaviest
     )

@@ -27,9 +27,11 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
     from tolstat.questions.fatigue.query import load_cycles as load_cycles
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
+    from tolstat.questions.lots.query import lots_of as lots_of
     from tolstat.questions.multifidelity.query import two_fidelities as two_fidelities
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
+    from tolstat.questions.selective.query import assembled as assembled
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
@@ -73,6 +75,7 @@ QUESTIONS = (
     Question("sorting", ("query.sorted_joints",), "Decide", ("sorting",), has_section=True),
     Question("histograms", has_section=True),
     Question("capability", (), "Read", ("capability",), has_section=True, has_summary=True),
+    Question("lots", ("query.lots_of",), "Read", ("lots",), has_section=True, has_summary=True),
     Question(
         "causes",
         ("query.causes_of", "angles.against_angle", "pairs.pairs_of", "tail.worst_joints"),
@@ -105,6 +108,7 @@ QUESTIONS = (
     Question("allocate", ("query.allocated",), "Decide", ("allocate",)),
     Question("compare", ("query.compared",), "Decide", ("compare",)),
     Question("rare", ("query.rare_event",), "Decide", ("rare",)),
+    Question("selective", ("query.assembled",), "Decide", ("selective",), has_section=True),
     Question("multifidelity", ("query.two_fidelities",), "Decide", ("multifidelity",)),
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -9,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import exceedance, prediction, quantile, replicates, weighted
+from tolstat.analysis import exceedance, lots, prediction, quantile, replicates, weighted
 from tolstat.analysis.exceedance import Exceedance, FloatArray, Mask
 from tolstat.analysis.quantile import Quantile
 from tolstat.common.shown import table
@@ -58,6 +59,8 @@ class SampleLoad:
         Number of independent replicates, consecutive blocks of the joints; 1 without them.
     scale : float
         Value of one in `unit` as a load, SI: 1 but for ratios of load to limit.
+    lots : ndarray of int, shape (n,), optional
+        Lot of each joint, where several are of one.
     parts : tuple of SampleLoad
         Loads of which this is the largest; empty for a single one. See `largest_of`.
     """
@@ -75,6 +78,7 @@ class SampleLoad:
     replicates: int = 1
     drawn: Mask | None = None
     scale: float = 1.0
+    lots: NDArray[np.intp] | None = None
     parts: tuple[SampleLoad, ...] = ()
 
     def __repr__(self) -> str:
@@ -104,7 +108,16 @@ class SampleLoad:
     @cached_property
     def _parts(self) -> list[exceedance.Sample]:
         """Loads of each replicate."""
-        blocks = np.split(np.arange(self.values.size), self.replicates)
+        return self._sorted(np.split(np.arange(self.values.size), self.replicates))
+
+    @cached_property
+    def of_lots(self) -> list[exceedance.Sample]:
+        """Loads of each lot."""
+        assert self.lots is not None
+        changes = np.flatnonzero(np.diff(self.lots)) + 1  # joints of a lot are consecutive
+        return self._sorted(np.split(np.arange(self.values.size), changes))
+
+    def _sorted(self, blocks: Sequence[NDArray[np.intp]]) -> list[exceedance.Sample]:
         ends = self.ends
         return [exceedance.sort_out(self.values[b], self.status[b], (ends[0][b], ends[1][b])) for b in blocks]
 
@@ -133,6 +146,8 @@ class SampleLoad:
         """Share of the joints above each level, (m,) table `exceedance.CURVE`; see `exceedance.curve`."""
         if self.replicates > 1:
             return replicates.curve_of(self.sample, self._parts, levels, confidence)
+        if self.lots is not None:
+            return lots.curve_of(self.sample, self.of_lots, levels, confidence)
         if self.weights is None:
             return exceedance.curve_of(self.sample, levels, confidence, self.iid)
         return weighted.curve_of(self._weighted, levels, confidence)
@@ -145,6 +160,8 @@ class SampleLoad:
         """Load that a share of the joints stays at or below; see `quantile.quantile`."""
         if self.replicates > 1:
             return replicates.quantile_of(self.sample, self._parts, share, confidence)
+        if self.lots is not None:
+            return lots.quantile_of(self.sample, self.of_lots, share, confidence)
         if self.weights is None:
             return quantile.of_sample(self.sample, share, confidence, self.iid)
         return weighted.quantile_of(self._weighted, share, confidence)
@@ -171,8 +188,10 @@ class SampleLoad:
         """Prediction interval for the number above a level among further joints; see `analysis.prediction`.
 
         Joints without a valid load count below the level for its lower end, above it for its upper end. NaN without an
-        interval.
+        interval, and where joints share lots, see `questions.lots`.
         """
+        if self.lots is not None:
+            return np.nan, np.nan
         if self.weights is None and self.replicates == 1:
             found = self.above(level, confidence)
             if np.isnan(found.lower):
@@ -204,5 +223,6 @@ class SampleLoad:
             replicates=1,
             weights=None if self.weights is None else self.weights[samples],
             drawn=None if self.drawn is None else self.drawn[samples],
+            lots=None if self.lots is None else self.lots[samples],
             parts=tuple(part.only(samples) for part in self.parts),
         )

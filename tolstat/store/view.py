@@ -227,7 +227,7 @@ class View:
             values, _, (lower, upper) = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = SampleLoad(
                 name, load.unit, self.limits.get(name), nominal, frozen(values), (frozen(lower), frozen(upper)),
-                self.status, self.weights, self.iid, self.store.heaviest, self.replicates, drawn,
+                self.status, self.weights, self.iid, self.store.heaviest, self.replicates, drawn, lots=self.lots,
             )  # fmt: skip
         return self._loads[name]
 
@@ -270,7 +270,13 @@ class View:
     @property
     def iid(self) -> bool:
         """Whether the joints are independent samples."""
-        return self.method in ("random", "importance")
+        return self.method in ("random", "importance") and self.lots is None
+
+    @cached_property
+    def lots(self) -> NDArray[np.intp] | None:
+        """Lot of each joint, (n,), numbered in the campaign; None where each joint is its own lot."""
+        size = int(self.store.sampling.get("joints_per_lot", 1))
+        return frozen(np.asarray(self.campaign_samples) // size) if size > 1 else None
 
     @cached_property
     def replicates(self) -> int:
@@ -280,12 +286,14 @@ class View:
 
     @property
     def has_intervals(self) -> bool:
-        """Whether shares and quantiles have intervals: of independent joints, or over replicates."""
-        return self.iid or self.replicates > 1
+        """Whether shares and quantiles have intervals: of independent joints, over replicates, or over lots."""
+        return self.iid or self.replicates > 1 or self.lots is not None
 
     @property
     def interval_of(self) -> str:
         """Name of the intervals of shares, in words."""
+        if self.lots is not None:
+            return "Student's t over lots, on the logit"
         return f"Student's t over {self.replicates} replicates" if self.replicates > 1 else "Clopper–Pearson's"
 
     @property

@@ -16,7 +16,7 @@ from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
 from tolstat.joint.overrides import merged
-from tolstat.study import fatigue, known, listing, points, proposal, selection, sorting, swept
+from tolstat.study import fatigue, known, listing, points, proposal, selection, selective, sorting, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
@@ -29,6 +29,7 @@ from tolstat.study.tolerances import fits, reading
 from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.fits import Fit
+from tolstat.study.tolerances.lots import Lot, correlated
 from tolstat.study.tolerances.reading import Nominal, Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
@@ -178,13 +179,13 @@ class StudyFile:
         self._toleranced = {q: unit for name, unit in self._toleranced.items() for q in drawn.get(name, [name])}
         return found
 
-    def correlation(self) -> Copula:
-        """``[[correlation]]``: correlation of errors with a tolerance; call `tolerances` first."""
+    def correlation(self, lots: Mapping[str, Lot]) -> Copula:
+        """``[[correlation]]``, and that of errors that share the score of their lot; call `tolerances` first."""
         before = len(self._faults)
         entries = self._list("correlation", Correlation)
         if len(self._faults) == before:
             with gather(self._faults):
-                copula = assemble(entries, self._toleranced, self.place)
+                copula = correlated(assemble(entries, self._toleranced, self.place), lots, self.place)
                 for name in sorted(self._accepted & set(copula.names)):
                     remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
                     found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
@@ -273,7 +274,7 @@ class StudyFile:
             remedy = "write one [operation], or sweep other errors"
             self._fault(("sweep", name), "is given by several [[operation]] already", remedy)
 
-    def check_method(self, sampling: Sampling, sweep: tuple[SweepAxis, ...]) -> None:
+    def check_method(self, sampling: Sampling, sweep: tuple[SweepAxis, ...], read: Tolerances, copula: Copula) -> None:
         """Note sections that the sampling method needs or does not use."""
         used = SECTIONS_OF.get(sampling.method, SCATTER)
         needed = used[0]
@@ -286,6 +287,13 @@ class StudyFile:
             if section not in used and section in self.data:
                 remedy = "remove it, or set another sampling.method"
                 self._fault((section,), f"has no effect with {sampling.method!r}", remedy)
+        if sampling.joints_per_lot > 1 and not read.lots:
+            remedy = "write lot = { share = 0.3 } in an entry of [tolerances], or remove the key"
+            self._fault(("sampling", "joints_per_lot"), "has no effect: no tolerance has a lot", remedy)
+        if sampling.is_matched and sampling.selective is not None:
+            depending = {*copula.names, *read.lots, *self._accepted}
+            faults = selective.faults(sampling.selective, read.entries, read.distributions, depending, self.place)
+            self._faults += faults
         if sampling.method == "cases" and self.data.get("limits"):
             self._fault(("limits",), "has no effect with 'cases'", "remove it: listed joints have no exceedance")
         if sampling.method == "subset":

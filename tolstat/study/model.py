@@ -7,12 +7,14 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from tolstat.analysis.lots import LEAST
 from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
 from tolstat.common.loads import Limit
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Fidelity, Method, Options, Start
 from tolstat.study import selection
+from tolstat.study.selective import SelectiveEntry
 from tolstat.study.tolerances.entry import Value
 
 _DEFAULTS = Options()
@@ -172,17 +174,37 @@ class Sampling(Strict):
         ),
     ] = 1
 
+    joints_per_lot: Annotated[
+        int,
+        whole(
+            1,
+            MAX_SAMPLES,
+            "joints of a lot, for errors with `lot`; with 1 each joint is its own lot, and all are independent",
+            20,
+        ),
+    ] = 1
+
+    selective: Annotated[
+        SelectiveEntry | None,
+        key("pins and holes are measured, sorted in classes, and matched class to class", {"classes": 3}),
+    ] = None
+
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out `groups` unless the method is ``pick_freeze``, and `replicates` unless there are several.
 
-        Identities of other methods do not have them.
+        Identities of other methods do not have them, nor `joints_per_lot` where each joint is its own lot, nor
+        `selective` of one class.
         """
         data: dict[str, Any] = write(self)
         if self.method != "pick_freeze":
             data.pop("groups", None)
         if self.replicates == 1:
             data.pop("replicates", None)
+        if self.joints_per_lot == 1:
+            data.pop("joints_per_lot", None)
+        if not self.is_matched:
+            data.pop("selective", None)
         return data
 
     @model_validator(mode="before")
@@ -205,6 +227,10 @@ class Sampling(Strict):
         if self.n is not None and self.n % self.replicates:
             least = self.replicates * -(-self.n // self.replicates)
             raise refuse(f"n = {self.n} is no multiple of replicates = {self.replicates}", f"give n = {least}")
+        if self.is_matched and self.method != "random":
+            raise refuse(f"selective is given with {self.method!r}", 'remove it, or write method = "random"')
+        if self.joints_per_lot > 1:
+            self._check_lots()
         if self.method != "pick_freeze" and "groups" in self.model_fields_set:
             raise refuse(f"groups is given with {self.method!r}", 'remove it, or write method = "pick_freeze"')
         if self.method == "cases" and self.nominal_first:
@@ -212,6 +238,19 @@ class Sampling(Strict):
                 "nominal_first is given with 'cases'", "remove it: each group has its own joint without errors"
             )
         return self
+
+    @property
+    def is_matched(self) -> bool:
+        """Whether pins and holes are sorted in several classes."""
+        return self.selective is not None and self.selective.classes > 1
+
+    def _check_lots(self) -> None:
+        if self.method != "random":
+            raise refuse(f"joints_per_lot is given with {self.method!r}", 'remove it, or write method = "random"')
+        least = LEAST * self.joints_per_lot
+        if (self.n or 0) < least:
+            found = f"{self.n} joints, {self.joints_per_lot} a lot, are fewer than {LEAST} lots"
+            raise refuse(found, f"give n = {least} or more, or a smaller joints_per_lot")
 
     @property
     def first_sample(self) -> int:

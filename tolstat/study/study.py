@@ -32,6 +32,7 @@ from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.fits import Fit
+from tolstat.study.tolerances.lots import Lot
 
 
 @dataclass(frozen=True, repr=False)
@@ -106,7 +107,9 @@ class Study(Case):
     axes : dict of str to Axis
         Features and pairs with zones: how the errors follow from what is drawn.
     copula : Copula
-        Correlation of the errors.
+        Correlation of the errors of a joint.
+    lots : dict of str to Lot
+        How errors depend on the lot of their joint.
     proposals : tuple of Proposal
         Distributions of importance sampling beside the tolerances; empty unless ``sampling.method`` is ``importance``.
     sampling : Sampling
@@ -139,6 +142,7 @@ class Study(Case):
     entries: tuple[Toleranced, ...] = ()
     axes: Mapping[str, Axis] = field(default_factory=dict)
     copula: Copula = field(default_factory=Copula)
+    lots: Mapping[str, Lot] = field(default_factory=dict)
     proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
     swept: Swept | None = None
@@ -197,10 +201,11 @@ class Study(Case):
         return of.table if of else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
     def has_bonus(self, name: str) -> bool:
-        """Whether `name` is a position with a bonus by maximum material, or the diameter of such a feature."""
+        """Whether `name` is a position with a bonus, or the diameter of such a feature or of one matched by classes."""
         feature, _, key = name.partition(".")
         axis = self.axes.get(feature)
-        return axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
+        bonus = axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
+        return bonus or (self.sampling.is_matched and key == "diameter")
 
     @property
     def samples(self) -> int:
@@ -261,6 +266,8 @@ class Study(Case):
         }
         if self.axes:
             parts["axes"] = {name: axis.describe() for name, axis in self.axes.items()}
+        if self.lots:
+            parts["lots"] = {name: list(lot) for name, lot in self.lots.items()}
         if self.proposals:
             parts["proposal"] = [proposal.identity() for proposal in self.proposals]
         if self.groups:
@@ -340,7 +347,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     solver = file.model("solver", Solver)
     errors = file.errors()
     read = file.tolerances(joint, fit)
-    copula = file.correlation()
+    copula = file.correlation(read.lots)
     proposals = file.proposals()
     sampling = file.model("sampling", Sampling, required=True)
     sweep = file.sweep()
@@ -358,7 +365,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     if sampling is not None and sampling.method == "sweep" and joint and operation and solver:
         joints_swept = file.swept(listing.Nominal(joint, operation, solver), sweep, sampling.nominal_first)
     if sampling is not None:
-        file.check_method(sampling, sweep)
+        file.check_method(sampling, sweep, read, copula)
         file.check_points(sampling, sweep, points)
         file.check_known(read, copula, sampling.method)
     if output is not None:
@@ -387,6 +394,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         axes=read.axes,
         fit=fit,
         copula=copula,
+        lots=read.lots,
         proposals=proposals,
         sweep=sweep,
         swept=joints_swept,

@@ -39,6 +39,9 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
     if not study.tolerances:
         remedy = 'give a study with [tolerances] and sampling.method = "random"'
         faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
+    if study.sampling.is_matched:
+        found = "matches diameters by classes, which a subset simulation does not draw"
+        faults.append(study.fault("sampling.selective", found, "remove it"))
     for load in (LOADS[name] for name in sampling["levels"]):
         if not selected_results.holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"

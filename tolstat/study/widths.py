@@ -198,7 +198,7 @@ def applied(study: Study, distributions: Mapping[str, Distribution]) -> Study:
     The sampling is ``random`` whatever the study's: joint i is independent of the others, and has the same scores with
     any distributions.
     """
-    sampling = study.sampling.model_copy(update={"method": "random"})
+    sampling = study.sampling.model_copy(update={"method": "random", "joints_per_lot": 1})
     tolerances = study.tolerances | dict(distributions)
     return replace(study, sampling=sampling, tolerances=tolerances, proposals=(), groups=())
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.analysis import exceedance
-from tolstat.benchmarks.coverage import causes, pairs, parts, rare, shares, weights
+from tolstat.benchmarks.coverage import causes, lots, pairs, parts, rare, shares, weights
 from tolstat.benchmarks.coverage.laws import laws
 from tolstat.benchmarks.coverage.statistics import CONTROL, STATISTICS
 from tolstat.benchmarks.coverage.trial import Asked, Experiment, FloatArray, Found, Row
@@ -72,6 +72,7 @@ def experiments() -> tuple[Experiment, ...]:
     """Every experiment, the wrong estimator last."""
     return (
         *shares.experiments(),
+        *lots.experiments(),
         *weights.experiments(),
         *parts.experiments(),
         *rare.experiments(),

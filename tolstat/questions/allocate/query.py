@@ -170,7 +170,7 @@ def allocated(
     request = _read_request(view, limits, cost_file, keep)
     done = np.flatnonzero(view.status != Status.PENDING)
     above = np.column_stack([_above(view, statement) for statement in request.statements])[done]
-    searched, checked = allocation.halves(len(done), MAX_SEARCHED)
+    searched, checked = allocation.halves(len(done), MAX_SEARCHED, None if view.lots is None else view.lots[done])
     if len(checked) < 4 * reweight.LEAST_ESS:
         found = f"has {len(done)} joints simulated"
         raise StoreError(str(Fault(str(view.path), found, f"run {8 * reweight.LEAST_ESS} joints or more")))

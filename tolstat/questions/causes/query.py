@@ -147,7 +147,7 @@ def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> C
     first = sensitivity.first_order(x, response, confidence, view.iid)
     ranks = regression.ranks(x, y, confidence, view.iid)
     parts: dict[str, NamedTuple] = {"first": first, "srrc": ranks}
-    if not study.copula.names:
+    if not study.copula.names and not study.sampling.is_matched:
         parts["total"] = sensitivity.total(x, response, confidence, view.iid)
     level = _tail_level(load)
     above = values > level

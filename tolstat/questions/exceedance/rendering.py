@@ -156,7 +156,7 @@ def note(view: View) -> str:
                 "; intervals hold if the proposals reach every way to the limit, the "
                 "last column, from the joints of the tolerances alone, whatever they miss"
             )
-    elif view.replicates > 1:
+    elif view.replicates > 1 or view.lots is not None:
         text = f"bands: pointwise 95 % intervals of the settled joints, {view.interval_of}"
     elif view.iid:
         text = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"

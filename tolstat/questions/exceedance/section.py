@@ -134,7 +134,7 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
 def _quantiles(view: View) -> Table:
     """Quantiles of every load with their intervals, and its tolerance limit."""
     table = rendering.by_load(query.quantiles(view))
-    kind = "over replicates" if view.replicates > 1 else "of order statistics"
+    kind = "over lots" if view.lots is not None else "over replicates" if view.replicates > 1 else "of order statistics"
     title = f"Quantiles with 95 % intervals {kind}, and one-sided tolerance limits (Wilks)"
     columns = rendering.quantile_columns(query.tolerance_limits(view))
     return as_block(title if view.has_intervals else "Quantiles", columns, table)

@@ -185,6 +185,9 @@ def _plans(study: Study, low: str, high: str, folder: Path, pilot: int) -> tuple
     if study.sampling.method != "random":
         found = f"is {study.sampling.method!r}: the intervals hold for independent samples only"
         faults.append(study.fault("sampling.method", found, 'use "random"'))
+    if study.sampling.joints_per_lot > 1:
+        found = "makes joints depend on one another: the intervals hold for independent samples only"
+        faults.append(study.fault("sampling.joints_per_lot", found, "remove it"))
     if faults:
         raise InputError(faults)
     output = study.output.model_copy(update={"histories": "none"})

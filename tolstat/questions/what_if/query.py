@@ -198,7 +198,7 @@ def level_of(load: SampleLoad) -> float:
 
 def own_joints(view: View) -> int:
     """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
-    if view.method != "random":
+    if view.method != "random" or not view.iid:
         return 0
     waiting = np.flatnonzero(view.status == Status.PENDING)
     return int(waiting[0]) if waiting.size else view.n

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,6 +15,41 @@ from tolstat.study.tolerances.distributions import Array, Distribution
 
 END, CELLS = 9.0, 3600
 """Range of scores, and number of cells of the table, in which the accepted share is constant."""
+FAR = 40.0
+"""Score beyond the smallest and the largest that double precision has a probability for."""
+
+
+def scores_among(every: Distribution, accepted: Callable[[Array], Array]) -> tuple[Array, Array, float]:
+    """Distribution among some parts, of which a share is accepted that depends on the value.
+
+    Parameters
+    ----------
+    every : Distribution
+        Distribution among all parts.
+    accepted : callable
+        Share of the parts of each value that are accepted, elementwise.
+
+    Returns
+    -------
+    z : ndarray, (CELLS + 1,)
+        Scores among all parts.
+    own : ndarray, (CELLS + 1,)
+        Scores among the accepted parts of the same values.
+    share : float
+        Share of accepted parts.
+    """
+    from scipy.special import ndtr, ndtri
+
+    z = np.linspace(-END, END, CELLS + 1)
+    weight = accepted(every.ppf(ndtr(0.5 * (z[1:] + z[:-1]))))
+    below, above = np.diff(ndtr(z)), -np.diff(ndtr(-z))  # each half from its own tail
+    mass = weight * np.where(z[1:] <= 0.0, below, above)
+    low, high = np.append(0.0, np.cumsum(mass)), np.append(np.cumsum(mass[::-1])[::-1], 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.where(low <= high, ndtri(low / low[-1]), -ndtri(high / low[-1]))
+    own = np.clip(own, -FAR, FAR)  # where no part is accepted on one side
+    own[[0, -1]] = np.minimum(own[1] - 1.0, -END), np.maximum(own[-2] + 1.0, END)
+    return z, own, float(low[-1])
 
 
 @dataclass(frozen=True)
@@ -33,18 +69,7 @@ class Accepted(Distribution):
 
     @cached_property
     def _table(self) -> tuple[Array, Array, float]:
-        """Scores among all parts, scores among the accepted parts of the same values, and share of accepted parts."""
-        from scipy.special import ndtr, ndtri
-
-        z = np.linspace(-END, END, CELLS + 1)
-        weight = self.bonus.accepted(self.every.ppf(ndtr(0.5 * (z[1:] + z[:-1]))))
-        below, above = np.diff(ndtr(z)), -np.diff(ndtr(-z))  # each half from its own tail
-        mass = weight * np.where(z[1:] <= 0.0, below, above)
-        low, high = np.append(0.0, np.cumsum(mass)), np.append(np.cumsum(mass[::-1])[::-1], 0.0)
-        with np.errstate(divide="ignore"):
-            own = np.where(low <= high, ndtri(low / low[-1]), -ndtri(high / low[-1]))
-        own[[0, -1]] = np.minimum(own[1] - 1.0, -END), np.maximum(own[-2] + 1.0, END)
-        return z, own, float(low[-1])
+        return scores_among(self.every, self.bonus.accepted)
 
     @property
     def share(self) -> float:

@@ -21,6 +21,7 @@ from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.distributions import Distribution
+from tolstat.study.tolerances.lots import LotEntry
 from tolstat.study.tolerances.moments import outside, standard_deviation
 
 
@@ -161,6 +162,10 @@ class ToleranceEntry(strict.Strict):
 
 class SingleEntry(ToleranceEntry):
     """Entry for one error: one model for each distribution."""
+
+    lot: Annotated[
+        LotEntry | None, Field(description="parts of one lot deviate together", examples=[{"share": 0.3}])
+    ] = None
 
     @abstractmethod
     def build(self, site: Site) -> Distribution:

@@ -213,6 +213,8 @@ class RayleighEntry(HalfBand):
 
     def build(self, site: Site) -> Rayleigh:
         """See `ToleranceEntry.build`."""
+        if self.lot is not None:
+            raise refuse("a radius and direction have no lot", "give offset_t and offset_z tolerances with lots")
         radius = self.half_width(site)
         if self.sigma is None and radius is None:
             raise refuse("no band", "add plus_minus, or iso2768 and nominal, or sigma")

@@ -16,6 +16,7 @@ from tolstat.study.tolerances.accepted import Accepted
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Diameter, SingleEntry, Site, Toleranced, ToleranceEntry
 from tolstat.study.tolerances.kinds import entry
+from tolstat.study.tolerances.lots import Lot, of_entries
 from tolstat.study.tolerances.zones import axes_of
 
 
@@ -55,6 +56,11 @@ class Tolerances(NamedTuple):
         for bonus in self.rejecting:
             found[bonus.diameter] = Accepted(found[bonus.diameter], bonus)
         return found
+
+    @property
+    def lots(self) -> dict[str, Lot]:
+        """Lot of each error that has one."""
+        return of_entries(self.entries)
 
     @property
     def rejecting(self) -> list[Bonus]:

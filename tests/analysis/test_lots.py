@@ -1,0 +1,100 @@
+"""Intervals over lots, and the prediction for the next delivery."""
+
+import numpy as np
+import pytest
+from scipy.stats import beta, betabinom, norm
+from scipy.stats import t as student
+
+from tolstat.analysis import exceedance, lots, prediction
+from tolstat.common.tables import Status
+
+RNG = np.random.default_rng(5)
+
+
+def of_beta(share, correlation, number, joints, rng=RNG):
+    size = (1.0 - correlation) / correlation
+    return rng.binomial(joints, rng.beta(share * size, (1.0 - share) * size, number))
+
+
+def test_interval_is_students_t_on_the_logit_of_the_mean():
+    above = np.tile([0, 2, 5], 12)
+    found = lots.interval(above, np.full(36, 20))
+    shares = above / 20
+    p, error = shares.mean(), shares.std(ddof=1) / 6.0
+    half = student.ppf(0.975, 35) * error / (p * (1 - p))
+    for end, sign in ((found.lower, -1), (found.upper, 1)):
+        assert np.log(end / (1 - end)) == pytest.approx(np.log(p / (1 - p)) + sign * half, rel=1e-12)
+
+
+def test_fewer_than_thirty_lots_have_no_interval_and_lots_without_a_bad_joint_have_an_upper_end():
+    assert np.isnan(lots.interval([1] * 29, [20] * 29).upper)
+    found = lots.interval([0] * 50, [20] * 50)
+    assert (found.lower, found.upper) == (0.0, pytest.approx(1.0 - 0.025 ** (1 / 50)))
+    found = lots.interval([20] * 50, [20] * 50)
+    assert (found.lower, found.upper) == (pytest.approx(0.025 ** (1 / 50)), 1.0)
+
+
+def test_correlation_is_one_for_lots_of_one_kind_and_zero_where_lots_are_alike():
+    assert lots.interval([0, 20] * 20, [20] * 40).correlation == 1.0
+    assert abs(lots.interval(RNG.binomial(20, 0.3, 4000), [20] * 4000).correlation) < 0.01
+    sizes = RNG.integers(5, 30, 8000)
+    found = lots.interval(RNG.binomial(sizes, RNG.beta(1.0, 3.0, 8000)), sizes)
+    assert found.correlation == pytest.approx(0.2, abs=0.02)  # 1 / (a + b + 1)
+
+
+def test_interval_covers_where_that_of_independent_joints_does_not():
+    seeds, share = 2000, 0.1
+    above = np.array([of_beta(share, 0.2, 50, 20) for _ in range(seeds)]).T
+    found = lots.interval(above, np.full(50, 20))
+    covered = np.mean((found.lower <= share) & (share <= found.upper))
+    assert 0.925 < covered < 0.975
+    low, high = exceedance.clopper_pearson(above.sum(axis=0), 1000)
+    assert np.mean((low <= share) & (share <= high)) < 0.8
+
+
+def test_curve_counts_joints_without_a_load_both_ways_and_parts_of_lots():
+    loads = np.sqrt(0.3) * RNG.standard_normal((40, 1)) + np.sqrt(0.7) * RNG.standard_normal((40, 20))
+    lot, values = np.repeat(np.arange(40), 20)[7:], loads.ravel()[7:]  # a slice cuts the first lot
+    status = np.full(values.size, int(Status.OK))
+    status[:30] = Status.NEWTON_FAILED
+    parts = [exceedance.sort_out(values[lot == k], status[lot == k]) for k in range(40)]
+    row = lots.curve_of(exceedance.sort_out(values, status), parts, [1.0])[0]
+    assert row["estimate"] == np.mean(values[30:] > 1.0)
+    assert row["outer_lower"] < row["lower"] < row["estimate"] < row["upper"] < row["outer_upper"]
+    n = np.array([part.n for part in parts])
+    most = np.bincount(lot, (values > 1.0) | (status == Status.NEWTON_FAILED))
+    assert row["outer_upper"] == pytest.approx(float(lots.interval(most, n).upper))
+
+
+def test_quantile_inverts_the_curve():
+    loads = RNG.standard_normal((50, 20))
+    parts = [exceedance.sort_out(own, np.ones(20)) for own in loads]
+    whole = exceedance.sort_out(loads.ravel(), np.ones(1000))
+    found = lots.quantile_of(whole, parts, 0.9)
+    assert found.lower < found.estimate < found.upper
+    ends = lots.curve_of(whole, parts, [found.lower, found.upper])
+    assert ends["lower"][0] < 0.1 <= lots.curve_of(whole, parts, [np.nextafter(found.lower, -9.0)])["lower"][0]
+    assert ends["upper"][1] <= 0.1
+    assert abs(found.estimate - norm.ppf(0.9)) < 0.2
+
+
+def test_prediction_of_many_lots_is_the_law_itself_and_deliveries_of_several_lots_scatter_less():
+    law = lots.law_of(of_beta(0.2, 0.25, 5000, 20), np.full(5000, 20))
+    exact = betabinom(60, 0.6, 2.4)
+    assert np.abs(law.delivery(60).probability - exact.pmf(np.arange(61))).max() < 0.004
+    assert law.delivery(60).more_than(0.5) == pytest.approx(exact.sf(30), abs=0.01)
+    assert law.delivery(2000).more_than(0.5) == pytest.approx(beta(0.6, 2.4).sf(0.5), abs=0.01)
+    several = law.delivery(61, 4).probability  # lots of 15, 15, 15 and 16 joints
+    parts = [betabinom(size, 0.6, 2.4).pmf(np.arange(size + 1)) for size in (15, 15, 15, 16)]
+    sums = np.convolve(np.convolve(parts[0], parts[1]), np.convolve(parts[2], parts[3]))
+    assert np.abs(several - sums).max() < 0.004
+    one, four = law.delivery(60).ends(), law.delivery(60, 4).ends()
+    assert one[0] <= four[0] < four[1] < one[1]
+
+
+def test_prediction_of_few_lots_is_wider_and_none_bad_leaves_room():
+    few, many = (lots.law_of([0, 2, 4, 1, 0] * times, [20] * 5 * times) for times in (6, 200))
+    assert few.delivery(500).ends()[1] > many.delivery(500).ends()[1]
+    none = lots.law_of([0] * 50, [20] * 50).delivery(500)
+    assert none.ends()[0] == 0.0
+    assert none.ends()[1] == prediction.of_counts(0, 0, 1000, 500)[1] > 0.0

@@ -1,0 +1,108 @@
+"""Selective assembly from TOML to page: yields by number of classes, unmatched parts, figure, same bytes."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import tolstat
+from tests.support import fakes, synthetic
+from tolstat import sampling
+from tolstat.campaign.extend import merge
+from tolstat.common.errors import InputError, StoreError
+from tolstat.display.asked import Asked
+from tolstat.display.table import as_text
+from tolstat.questions.selective import query, rendering, section
+
+STUDY = (
+    synthetic.HEAD
+    + """[tolerances]
+"pin*.diameter" = { lower = "-0.030 mm", upper = "0 mm", distribution = "normal" }
+"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "normal" }
+[sampling]
+n = 150
+seed = 3
+selective = { classes = 2, gauge = "2 um" }
+[limits]
+"cross*.F" = "0.9 N"
+"""
+)
+
+
+def _perturb(joint, operation, errors):
+    """Parameters of fake joints, whose loads depend on the clearance of pin 1."""
+    params = fakes.perturb(joint, operation, errors)
+    params["R"] = (errors["hole4.diameter"] - errors["pin1.diameter"] - 30e-6) / 1e-5
+    return params
+
+
+STAGES = fakes.stages()._replace(draw=sampling.draw_blocks, perturb=_perturb)
+RUN = partial(tolstat.run, workers=1, stages=STAGES, check=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("selective")
+    (made / "small.toml").write_text(STUDY, encoding="utf-8")
+    for classes in (1, 3):
+        RUN(query.study_of(made / "small.toml", classes), made / f"k{classes}.h5")
+    return made
+
+
+def test_table_has_yield_and_unmatched_parts_by_number_of_classes(folder):
+    with tolstat.open(folder / "k1.h5") as plain, tolstat.open(folder / "k3.h5") as of_three:
+        views = [of_three.view(), plain.view()]
+        found = tolstat.assembled(views)
+        classes, load = query.classes_of(views[0]), views[0].load("all limits")
+    one, three = found.table.to_dict("records")
+    assert (one["classes"], one["unmatched"], three["classes"]) == (1, 0.0, 3)
+    assert three["unmatched"] == classes.unmatched == 1.0 - classes.shares.min(axis=0).sum() > 0.3
+    assert three["good"] == 1.0 - np.mean(load.values > 1.0)
+    assert three["good_lower"] < three["good"] < three["good_upper"]
+    assert three["of_all"] == (1.0 - three["unmatched"]) * three["good"]
+    assert three["clearance"] < one["clearance"]
+    assert "of all crosses" in as_text(rendering.COLUMNS, found.table)
+    ax = Figure().add_subplot()
+    rendering.draw(ax, found)
+    assert [line.get_ydata()[1] for line in ax.lines] == [100.0 * three[key] for key in ("good", "unmatched", "of_all")]
+
+
+def test_page_has_the_classes_and_other_campaigns_have_no_section(folder):
+    with tolstat.open(folder / "k3.h5") as store:
+        (found,) = section.sections(store.view(), Asked(folder / "k3.h5"))
+    said, table = found.blocks[0].text, found.blocks[1]
+    assert "of the crosses and forks have no partner" in said
+    assert [row[0] for row in table.rows] == ["1", "2", "3"]
+    with tolstat.open(folder / "k1.h5") as store:
+        assert section.sections(store.view(), Asked(folder / "k1.h5")) == []
+
+
+@pytest.mark.slow
+def test_same_bytes_in_slices_in_blocks_and_stopped(folder, tmp_path):
+    plan = query.study_of(folder / "small.toml", 3)
+    parts = [tmp_path / "a.h5", tmp_path / "b.h5"]
+    for part, rows in zip(parts, (range(64), range(64, 151)), strict=True):
+        RUN(plan, part, block=50, rows=rows)
+    merge(parts, tmp_path / "merged.h5")
+    RUN(plan, tmp_path / "stopped.h5", until_row=30)
+    RUN(plan, tmp_path / "stopped.h5", block=70)
+    found = []
+    for path in (folder / "k3.h5", tmp_path / "merged.h5", tmp_path / "stopped.h5"):
+        with tolstat.open(path) as store:
+            found.append((store.errors().tobytes(), store.results().tobytes()))
+    assert found[0] == found[1] == found[2]
+
+
+def test_diameters_that_are_matched_are_neither_reweighted_nor_drawn_from_scores(folder, tmp_path):
+    with tolstat.open(folder / "k3.h5") as store, pytest.raises(InputError, match="matched by classes"):
+        tolstat.reweighted(store.view(), ["pin*.diameter.cpk=1.3"])
+    plain = tmp_path / "plain.toml"
+    plain.write_text(STUDY.replace("selective", "# selective"), encoding="utf-8")
+    with pytest.raises(InputError, match="missing key selective"):
+        query.study_of(plain, 2)
+    bare = tmp_path / "bare.toml"
+    bare.write_text(STUDY.partition("[limits]")[0], encoding="utf-8")
+    RUN(tolstat.load(bare), tmp_path / "bare.h5")
+    with tolstat.open(tmp_path / "bare.h5") as store, pytest.raises(StoreError, match="without"):
+        tolstat.assembled([store.view()])

@@ -1,0 +1,1 @@
+"""What sorting pins and holes in classes gains, and how many parts remain without a partner."""

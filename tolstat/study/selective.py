@@ -1,0 +1,324 @@
+"""Selective assembly: pins and holes are measured, sorted in classes, and matched class to class.
+
+A cross is one part with four pins, a fork one with two holes. A part is in the class of its worst measured diameter:
+that of the largest pin, of the smallest hole. Classes are numbered from small to large diameters; crosses of class c go
+with forks of class c. Of the parts of a class as many are matched as the rarest of the three kinds has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from tolstat.common import units
+from tolstat.common.errors import Fault
+from tolstat.common.strict import Strict, refuse
+from tolstat.common.tables import PINS
+from tolstat.study.tolerances.accepted import scores_among
+from tolstat.study.tolerances.distributions import Array, Distribution, score
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from tolstat.study.tolerances.entry import Toleranced
+
+MAX_CLASSES = 20
+STEPS = 40
+"""Bisections of an edge between classes of equally many parts."""
+ROUNDING = 1e-8
+"""Unmatched share below which it is the rounding of classes of equally many parts."""
+LEAST = 1e-300
+"""Smallest probability of a diameter."""
+
+
+def _not_negative(value: float) -> float:
+    if value < 0.0:
+        raise refuse("{input} is negative", "give the standard deviation of the gauge, or 0")
+    return value
+
+
+class SelectiveEntry(Strict):
+    """Pins and holes are sorted by their measured diameters, and crosses and forks of equal class matched."""
+
+    classes: Annotated[
+        int, Field(strict=True, ge=1, le=MAX_CLASSES, description="number of classes; 1: not sorted", examples=[3])
+    ]
+    gauge: Annotated[
+        units.Length,
+        AfterValidator(_not_negative),
+        Field(description="standard deviation of the error with which a diameter is measured", examples=["2 um"]),
+    ] = 0.0
+    split: Annotated[
+        Literal["width", "count"],
+        Field(
+            description="`width`: classes are equal parts of the tolerance bands, those at the ends are open; `count`: "
+            "each class has as many crosses, and as many forks, as any other",
+            examples=["count"],
+        ),
+    ] = "width"
+
+
+class Kind(NamedTuple):
+    """A kind of parts.
+
+    Attributes
+    ----------
+    name : str
+        In words.
+    errors : tuple of str
+        Diameters that are measured.
+    worst : int
+        1 where the largest diameter decides, -1 where the smallest does.
+    """
+
+    name: str
+    errors: tuple[str, ...]
+    worst: int
+
+
+KINDS = (
+    Kind("cross", tuple(f"{pin}.diameter" for pin in PINS), 1),
+    Kind("input fork", ("hole1.diameter", "hole2.diameter"), -1),
+    Kind("output fork", ("hole3.diameter", "hole4.diameter"), -1),
+)
+DIAMETERS = tuple(name for kind in KINDS for name in kind.errors)
+
+
+class _Diameters(NamedTuple):
+    """Diameters of a kind: all of its features have one distribution and one band."""
+
+    distribution: Distribution
+    band: tuple[float, float] | None
+
+
+class Range(NamedTuple):
+    """Parts whose measured diameter is between two values.
+
+    Attributes
+    ----------
+    distribution : Distribution
+        Of the diameter of all parts, deviation in m.
+    gauge : float
+        Standard deviation of the gauge error, m.
+    low, high : float
+        Values between which the measured deviation is, m; may be infinite.
+    """
+
+    distribution: Distribution
+    gauge: float
+    low: float
+    high: float
+
+    @property
+    def share(self) -> float:
+        """Share of the parts."""
+        if self.gauge:
+            return _among(self)[2]
+        low, high = self._ends
+        return high - low
+
+    def scores(self, u: Array) -> Array:
+        """Score, among all parts, of the diameter that is exceeded with probability 1 - u in the range; both (n,)."""
+        from scipy.special import ndtri
+
+        if self.gauge:
+            z, own, _ = _among(self)
+            return np.asarray(np.interp(ndtri(u), own, z))
+        low, high = self._ends
+        return np.asarray(ndtri(np.clip(low + u * (high - low), LEAST, 1.0 - 2.0**-53)))
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        """Probabilities that a diameter without gauge error is below each end."""
+        from scipy.special import ndtr
+
+        low, high = ndtr(score(self.distribution, np.clip([self.low, self.high], -1.0, 1.0))).tolist()
+        return (low if self.low > -np.inf else 0.0), (high if self.high < np.inf else 1.0)
+
+
+@lru_cache(maxsize=512)
+def _among(of: Range) -> tuple[Array, Array, float]:
+    from scipy.special import ndtr
+
+    def inside(deviation: Array) -> Array:
+        d = np.clip(deviation, -1.0, 1.0)  # beyond the largest score an unbounded one is infinite
+        return np.asarray(ndtr((of.high - d) / of.gauge) - ndtr((of.low - d) / of.gauge))
+
+    return scores_among(of.distribution, inside)
+
+
+class Matching(NamedTuple):
+    """Classes, and the parts in them.
+
+    Attributes
+    ----------
+    edges : ndarray, shape (kinds, classes + 1)
+        Edges of the classes of each of `KINDS`, measured deviations, m; infinite at both ends.
+    shares : ndarray, shape (kinds, classes)
+        Share of the parts of a kind that are in a class.
+    matched : ndarray, shape (classes,)
+        Share of the parts that are in a class and matched: the least of `shares`.
+    near, within : tuple of tuple of Range
+        By kind and class: diameters on the harmless side of the class, and inside it.
+    """
+
+    edges: Array
+    shares: Array
+    matched: Array
+    near: tuple[tuple[Range, ...], ...]
+    within: tuple[tuple[Range, ...], ...]
+
+    @property
+    def unmatched(self) -> float:
+        """Share of the parts that remain without a partner of their class."""
+        share = float(1.0 - self.matched.sum())
+        return share if share > ROUNDING else 0.0
+
+    def probabilities(self, u_class: Array, u: Mapping[str, Array]) -> dict[str, Array]:
+        """Probabilities of the diameters of assembled joints.
+
+        Parameters
+        ----------
+        u_class : ndarray, shape (n,)
+            Probabilities from which the class of each joint follows.
+        u : mapping of str to ndarray, shape (n,)
+            Independent probabilities of `DIAMETERS`.
+
+        Returns
+        -------
+        dict of str to ndarray, (n,)
+            Probabilities of the same diameters in their distributions among all parts.
+        """
+        from scipy.special import ndtr
+
+        upto = np.cumsum(self.matched) / self.matched.sum()
+        number = np.searchsorted(upto[:-1], u_class, side="right")
+        found: dict[str, Array] = {}
+        for kind, near, within in zip(KINDS, self.near, self.within, strict=True):
+            for c in np.unique(number):
+                here = np.flatnonzero(number == c)
+                drawn = _in_class([u[name][here] for name in kind.errors], near[c], within[c])
+                for name, z in zip(kind.errors, drawn, strict=True):
+                    found.setdefault(name, np.empty(len(number)))[here] = z
+        return {name: np.clip(ndtr(z), np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg) for name, z in found.items()}
+
+
+def _in_class(u: list[Array], near: Range, within: Range) -> list[Array]:
+    """Scores of the diameters of parts whose worst measured diameter is inside a class.
+
+    One diameter after the other, each from its own probability: of those before either one was inside the class, and
+    the next is anywhere but beyond it; or all were on the harmless side, and one of the others must be inside.
+    """
+    low, inside = near.share, within.share
+    either = Range(near.distribution, near.gauge, min(near.low, within.low), max(near.high, within.high))
+    found, decided = [], np.zeros(len(u[0]), dtype=bool)
+    for k, own in enumerate(u):
+        left = len(u) - k
+        q = inside * (low + inside) ** (left - 1) / ((low + inside) ** left - low**left)
+        hit = ~decided & (own >= 1.0 - q)
+        z = np.empty(len(own))
+        for of, here, v in (
+            (either, decided, own),
+            (within, hit, (own - (1.0 - q)) / q),
+            (near, ~decided & ~hit, own / max(1.0 - q, LEAST)),
+        ):
+            if here.any():
+                z[here] = of.scores(np.clip(v[here], 2.0**-54, 1.0 - 2.0**-53))
+        decided |= hit
+        found.append(z)
+    return found
+
+
+def matching(settings: SelectiveEntry, entries: Iterable[Toleranced], found: Mapping[str, Distribution]) -> Matching:
+    """Classes of a study's diameters.
+
+    Parameters
+    ----------
+    settings : SelectiveEntry
+        ``sampling.selective``.
+    entries : iterable of Toleranced
+        Entries of the study, for the bands of the diameters.
+    found : mapping of str to Distribution
+        Distribution of each quantity.
+    """
+    bands = _bands(entries)
+    first = [kind.errors[0] for kind in KINDS]
+    diameters = tuple(_Diameters(found[name], bands.get(name)) for name in first)
+    return _matching(settings.classes, settings.gauge, settings.split, diameters)
+
+
+@lru_cache(maxsize=32)
+def _matching(classes: int, gauge: float, split: str, diameters: tuple[_Diameters, ...]) -> Matching:
+    edges = np.array([_edges(classes, gauge, split, *own) for own in zip(KINDS, diameters, strict=True)])
+    near, within, shares = [], [], np.empty((len(KINDS), classes))
+    for number, (kind, own) in enumerate(zip(KINDS, diameters, strict=True)):
+        pairs = list(zip(edges[number][:-1].tolist(), edges[number][1:].tolist(), strict=True))
+        within.append(tuple(Range(own.distribution, gauge, low, high) for low, high in pairs))
+        harmless = [(-np.inf, low) if kind.worst > 0 else (high, np.inf) for low, high in pairs]
+        near.append(tuple(Range(own.distribution, gauge, *ends) for ends in harmless))
+        for c in range(classes):
+            low = 0.0 if harmless[c][0] == harmless[c][1] else near[-1][c].share
+            count = len(kind.errors)
+            shares[number, c] = (low + within[-1][c].share) ** count - low**count
+    return Matching(edges, shares, shares.min(axis=0), tuple(near), tuple(within))
+
+
+def _edges(classes: int, gauge: float, split: str, kind: Kind, own: _Diameters) -> NDArray[np.float64]:
+    """Edges of the classes of a kind, (classes + 1,)."""
+    parts = np.arange(1, classes) / classes
+    if split == "width":
+        assert own.band is not None
+        inner = own.band[0] + (own.band[1] - own.band[0]) * parts
+    else:
+        count = len(kind.errors)
+        below = parts ** (1.0 / count) if kind.worst > 0 else 1.0 - (1.0 - parts) ** (1.0 / count)
+        reach = own.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
+        inner = np.array([_quantile(own.distribution, gauge, share, *reach) for share in below])
+    return np.concatenate([[-np.inf], inner, [np.inf]])
+
+
+def _quantile(distribution: Distribution, gauge: float, share: float, low: float, high: float) -> float:
+    """Measured deviation that a share of the parts stays below."""
+    if not gauge:
+        return float(distribution.ppf(np.array([share]))[0])
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if Range(distribution, gauge, -np.inf, middle).share < share else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _bands(entries: Iterable[Toleranced]) -> dict[str, tuple[float, float] | None]:
+    models: list[tuple[Any, Any]] = [own for entry in entries for own in entry.models if own[0].name in DIAMETERS]
+    return {site.name: model.band(site) for site, model in models}
+
+
+def faults(
+    settings: SelectiveEntry,
+    entries: tuple[Toleranced, ...],
+    found: Mapping[str, Distribution],
+    depending: set[str],
+    place: str,
+) -> list[Fault]:
+    """Faults of ``sampling.selective`` beside the tolerances; `depending`: errors that depend on others."""
+    where, bands = f"{place}: sampling.selective", _bands(entries)
+    missing = [name for name in DIAMETERS if name not in found]
+    if missing:
+        remedy = 'add "pin*.diameter" and "hole*.diameter" to [tolerances], or fit'
+        return [Fault(where, f"{missing[0]} has no tolerance", remedy)]
+    made = []
+    for kind in KINDS:
+        if len({(str(found[name].describe()), bands[name]) for name in kind.errors}) > 1:
+            remedy = "give the diameters of one part one tolerance"
+            made.append(Fault(where, f"the diameters of the {kind.name} have different tolerances", remedy))
+        if settings.split == "width" and bands[kind.errors[0]] is None:
+            made.append(Fault(where, f"{kind.errors[0]} has no band", 'add plus_minus, or write split = "count"'))
+    both = sorted(depending & set(DIAMETERS))
+    if both:
+        found_ = f"{both[0]} depends on other parts or errors: by a correlation, a lot or a bonus with reject"
+        made.append(Fault(where, found_, "remove that, or selective"))
+    return made

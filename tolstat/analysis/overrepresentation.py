@@ -85,9 +85,7 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
     return Overrepresentation(Part(*(part[:d] for part in found)), Part(*(part[d:] for part in found)))
 
 
-def _larger(
-    found: NDArray[np.intp], over: BoolArray, confidence: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _larger(found: NDArray[np.intp], over: BoolArray, confidence: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """P(value of one above > of one not above), ties count half, with DeLong's (1988) interval on the logit scale.
 
     `found` has the `ranks.places` of all joints, (d, n).

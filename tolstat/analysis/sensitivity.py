@@ -186,9 +186,7 @@ def over_revolution(
     )
 
 
-def first_and_total(
-    x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
-) -> tuple[FirstOrder, Total]:
+def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> tuple[FirstOrder, Total]:
     """First-order indices, and bounds of the total Sobol' indices, from given data.
 
     Interactions of two errors are expanded in products of Legendre polynomials of their ranks (high-dimensional model

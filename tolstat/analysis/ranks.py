@@ -1,4 +1,4 @@
-"""Ranks of the values in each column of a table, and of parts of its rows, from one sort. Ties share their mean rank."""
+"""Ranks of values in each column of a table, and of parts of its rows, from one sort; ties share their mean rank."""
 
 from __future__ import annotations
 

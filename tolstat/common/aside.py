@@ -8,6 +8,7 @@ from __future__ import annotations
 import multiprocessing
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
@@ -41,10 +42,8 @@ class Aside(Generic[T]):
     def result(self) -> T:
         """Result of the function; where its process failed or was killed, it is evaluated here, and may raise."""
         if not self._found and self._process is not None:
-            try:
+            with suppress(EOFError, OSError):  # the process has ended without its result
                 self._found.append(self._end.recv())
-            except EOFError:
-                pass
             self._end.close()
             self._process.join()
             self._process = None
@@ -56,7 +55,7 @@ class Aside(Generic[T]):
 def _send(function: Callable[[], object], end: Connection) -> None:
     try:
         end.send(function())
-    except BaseException:  # noqa: BLE001 - the parent evaluates the function again, and raises what there is to raise
+    except BaseException:  # the parent evaluates the function again, and raises what there is to raise
         end.close()
 
 

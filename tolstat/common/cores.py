@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 
-
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",

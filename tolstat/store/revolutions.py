@@ -17,7 +17,7 @@ from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import restore, simulate_rows
 from tolstat.store.recorded import joint_of, options_of
-from tolstat.store.result_file import RUN_AGAIN
+from tolstat.store.result_file import RUN_AGAIN, pick
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -27,8 +27,6 @@ ANGLES = 60
 """Default number of input angles per revolution to read, if the histories have as many samples."""
 JOINTS_PER_BLOCK = 256
 """Maximum number of joints whose loads are read at a time: 9 MB at 180 samples per revolution."""
-NEAR = 16
-"""Distance of two file slots up to which they are read together."""
 _COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 FloatArray = NDArray[np.float64]
@@ -243,9 +241,9 @@ def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[NDArray[np.float32],
 
 def _job(store: Reader, slots: NDArray[np.intp]) -> Callable[[], Again]:
     """Read from the file what it takes to simulate joints again, and return the function that does."""
-    params = perturb(joint_of(store, int(slots[0])), store.operation, _pick(store.errors, slots))
-    attempts = _pick(store.attempt, slots)
-    stored = _pick(store.results, slots)[["F_max", "T_max"]].copy()
+    params = perturb(joint_of(store, int(slots[0])), store.operation, pick(store.errors, slots))
+    attempts = pick(store.attempt, slots)
+    stored = pick(store.results, slots)[["F_max", "T_max"]].copy()
     settings = [(here, options_of(store, int(slots[here[0]]))) for here in _alike(attempts)]
     return partial(_simulate, params, settings, stored, int(store.options["steps_per_rev"]))
 
@@ -268,9 +266,3 @@ def _simulate(
             largest = off.max(axis=1, initial=0.0, where=np.isfinite(off))
             apart[here] = np.maximum(apart[here], largest)
     return loads, apart
-
-
-def _pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
-    """Read `slots`, ascending, of a table that is read by slices; slots that lie close together as one slice."""
-    runs = np.split(slots, np.flatnonzero(np.diff(slots) > NEAR) + 1)
-    return np.concatenate([read(slice(int(run[0]), int(run[-1]) + 1))[run - run[0]] for run in runs])

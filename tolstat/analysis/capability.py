@@ -174,7 +174,9 @@ def _normality(valid: FloatArray) -> float:
     # kurtosis, normal by a cube root (Anscombe and Glynn 1983)
     variance = 24.0 * n * (n - 2) * (n - 3) / ((n + 1) * (n + 1.0) * (n + 3) * (n + 5))
     x = (m4 / m2**2 - 3.0 * (n - 1) / (n + 1)) / np.sqrt(variance)
-    root = 6.0 * (n * n - 5 * n + 2) / ((n + 7) * (n + 9)) * np.sqrt(6.0 * (n + 3) * (n + 5) / (n * (n - 2.0) * (n - 3)))
+    root = (
+        6.0 * (n * n - 5 * n + 2) / ((n + 7) * (n + 9)) * np.sqrt(6.0 * (n + 3) * (n + 5) / (n * (n - 2.0) * (n - 3)))
+    )
     a = 6.0 + 8.0 / root * (2.0 / root + np.sqrt(1.0 + 4.0 / root**2))
     third = np.cbrt((1.0 - 2.0 / a) / (1.0 + x * np.sqrt(2.0 / (a - 4.0))))
     peaked = (1.0 - 2.0 / (9.0 * a) - third) / np.sqrt(2.0 / (9.0 * a))

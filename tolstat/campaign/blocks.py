@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign import executors
 from tolstat.campaign.executors import Lost
+from tolstat.campaign.executors.common import no_preparation
 from tolstat.common.cores import available_cores
 from tolstat.common.solver_options import from_names
 from tolstat.common.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
@@ -61,6 +62,8 @@ class Stages(NamedTuple):
     origins : callable
         Study, rows of the campaign (range) -> which proposal or level gave each joint, consecutive tables; None if the
         sampling method has no such table (`draw_records.columns`).
+    is_compiled : callable
+        Options -> whether `warm_up` only has to load what is compiled: then workers need not wait for this process.
     """
 
     draw: Callable[..., Iterable[NDArray[np.void]]]
@@ -70,6 +73,7 @@ class Stages(NamedTuple):
     simulate: Callable[..., Simulation]
     warm_up: Callable[[Options], object]
     origins: Callable[..., Iterable[NDArray[np.void]] | None] = lambda *_: None
+    is_compiled: Callable[[Options], bool] = lambda _: False
 
 
 @dataclass(frozen=True)
@@ -183,9 +187,17 @@ def pending(store: Reader, stop_slot: int) -> Iterator[tuple[Reader, NDArray[np.
 
 
 def simulate_pending(
-    study: Study, store: Reader, stop_slot: int, stages: Stages, execution: Execution, stop: Callable[[], bool]
+    study: Study,
+    store: Reader,
+    stop_slot: int,
+    stages: Stages,
+    execution: Execution,
+    stop: Callable[[], bool],
+    meanwhile: Callable[[], object] = no_preparation,
 ) -> Generator[Finished, None, None]:
     """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true.
+
+    `meanwhile` is called once, while worker processes start.
 
     Close the generator (`contextlib.closing`) when leaving it early.
 
@@ -217,7 +229,7 @@ def simulate_pending(
 
         results = map_on_cluster(work, blocks, execution.scheduler, workers, versions, stop)
     else:
-        results = executors.map_in_processes(work, blocks, max(1, min(workers, -(-todo // size))), stop)
+        results = executors.map_in_processes(work, blocks, max(1, min(workers, -(-todo // size))), stop, meanwhile)
     with closing(results):
         for block, result in results:
             if isinstance(result, Lost):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tolstat.campaign import signals, verify
 from tolstat.campaign.blocks import Execution, Finished, Stages, pending, prepare, settings_in_use, simulate_pending
 from tolstat.campaign.executors import WorkerDied
+from tolstat.campaign.executors.common import no_preparation
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
 from tolstat.campaign.retry import Retry, begin
@@ -131,10 +132,13 @@ def run(
         try:
             if next(pending(store, last), None) is not None:
                 stage(kernels())
-                prepare(stages.warm_up, settings_in_use(study, store))
+                used = settings_in_use(study, store)
+                if not all(map(stages.is_compiled, used)):
+                    prepare(stages.warm_up, used)
                 store.begin_session(counts.done)
             stage(JOINTS)
-            finished = simulate_pending(study, store, last, stages, execution, stop)
+            own = partial(prepare, stages.warm_up, settings_in_use(study, store)) if check else no_preparation
+            finished = simulate_pending(study, store, last, stages, execution, stop, own)
             with stop.deferred(), closing(finished):
                 counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
@@ -185,6 +189,7 @@ def _own_stages() -> Stages:
         simulation.simulate_rows,
         compilation.warm_up,
         sampling.origin_blocks,
+        compilation.is_compiled,
     )
 
 

@@ -62,6 +62,7 @@ def report(
     if out is not None and out.suffix.lower() in PAGES:
         _page(file, out, accept, again, point or "")
         return
+    from tolstat.common.cores import available_cores
     from tolstat.report import build
     from tolstat.store import Reader
 
@@ -70,7 +71,7 @@ def report(
         Reader.open(file).close()  # check the file before the folder is created
         make_folder(out)
     with progress("report") as shown:
-        made = build(file, out, width_of(wide), shown.stage, accepted, point or "")
+        made = build(file, out, width_of(wide), shown.stage, accepted, point or "", available_cores())
     tell(made)
 
 

@@ -37,6 +37,7 @@ from tolstat.campaign.executors.common import (
     Work,
     WorkerDied,
     never_stop,
+    no_preparation,
 )
 from tolstat.campaign.executors.watch import Watch, shared_memory
 from tolstat.campaign.executors.worker import RAISED, READY, serve
@@ -62,7 +63,11 @@ HINT = (
 
 
 def map_in_processes(
-    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], workers: int, stop: Callable[[], bool] = never_stop
+    work: Work[BlockT, ResultT],
+    blocks: Iterable[BlockT],
+    workers: int,
+    stop: Callable[[], bool] = never_stop,
+    meanwhile: Callable[[], object] = no_preparation,
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
     """Apply the function to every block in worker processes and yield the results as they arrive.
 
@@ -78,6 +83,8 @@ def map_in_processes(
         Number of processes.
     stop : callable, optional
         Called often; once it returns True no further block is started, and blocks in work are finished.
+    meanwhile : callable, optional
+        Called once, while the workers start.
 
     Yields
     ------
@@ -95,7 +102,7 @@ def map_in_processes(
     team: _Team[BlockT, ResultT] = _Team(work, iter(blocks), workers)
     try:
         with one_thread_each():
-            yield from team.run(stop)
+            yield from team.run(stop, meanwhile)
     finally:
         team.end()
 
@@ -155,11 +162,13 @@ class _Team(Generic[BlockT, ResultT]):
         self.control: _Task[BlockT] | None = None
         self.losses = self.failed_controls = self.failed_starts = 0
 
-    def run(self, stop: Callable[[], bool]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
+    def run(self, stop: Callable[[], bool], meanwhile: Callable[[], object]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
         while True:
             if stop():
                 self._drop_tasks()
             self._hand_out()
+            meanwhile()
+            meanwhile = no_preparation
             if not any(worker.task for worker in self.workers) and not self._has_task():
                 break
             # Read all messages, then hand out blocks, then yield: the caller may take long with the results.

@@ -62,7 +62,7 @@ def _quantile(share: float, number: int, a: int, b: int) -> float:
     counts = np.arange(number + 1.0)
     log = betaln(counts + a, number - counts + b) - betaln(counts + 1.0, number - counts + 1.0) - betaln(a, b)
     reached = np.cumsum(np.exp(log)) / (number + 1.0)
-    return float(min(np.searchsorted(reached, share), number))
+    return float(min(int(np.searchsorted(reached, share)), number))
 
 
 def half(confidence: float) -> float:

@@ -68,19 +68,19 @@ def ranks(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
         raise ValueError(f"{found}: give {errors.shape[1] + 2 * GROUPS} or more")
     if (np.ptp(errors, axis=0) == 0).any() or np.ptp(load) == 0:
         raise ValueError("give a load and errors that scatter")
-    found = places(np.column_stack([errors, load]))
-    estimate, r2 = _coefficients(found)
+    place = places(np.column_stack([errors, load]))
+    estimate, r2 = _coefficients(place)
     if not iid:
         return RankRegression(estimate, np.full_like(estimate, np.nan), np.full_like(estimate, np.nan), r2)
     group = np.arange(len(load)) % GROUPS
-    without = np.array([_coefficients(found[:, group != g])[0] for g in range(GROUPS)])
+    without = np.array([_coefficients(place[:, group != g])[0] for g in range(GROUPS)])
     spread = np.sqrt((GROUPS - 1) / GROUPS * ((without - estimate) ** 2).sum(axis=0))
     half = stdtrit(GROUPS - 1, 0.5 * (1.0 + confidence)) * spread
     return RankRegression(estimate, estimate - half, estimate + half, r2)
 
 
-def _coefficients(found: NDArray[np.intp]) -> tuple[FloatArray, float]:
+def _coefficients(place: NDArray[np.intp]) -> tuple[FloatArray, float]:
     """Coefficients and R^2 of joints whose places, (d + 1, m), are given: those of the errors, then of the load."""
-    correlation = np.corrcoef(from_places(found))
-    slopes = np.linalg.lstsq(correlation[:-1, :-1], correlation[:-1, -1], rcond=None)[0]
+    correlation: FloatArray = np.asarray(np.corrcoef(from_places(place)))
+    slopes: FloatArray = np.asarray(np.linalg.lstsq(correlation[:-1, :-1], correlation[:-1, -1], rcond=None)[0])
     return slopes, float(slopes @ correlation[:-1, -1])

@@ -9,6 +9,7 @@ import multiprocessing
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
@@ -62,6 +63,10 @@ def _send(function: Callable[[], object], end: Connection) -> None:
 def mapped(functions: Sequence[Callable[[], T]], processes: int) -> list[T]:
     """Results of functions, in their order, evaluated in so many processes: every other one here, if these are two."""
     parts = [functions[first::processes] for first in range(min(processes, max(1, len(functions))))]
-    others = [Aside(lambda part=part: [one() for one in part]) for part in parts[1:]]
-    found = [[one() for one in parts[0]], *(other.result() for other in others)]
+    others = [Aside(partial(_all, part)) for part in parts[1:]]
+    found = [_all(parts[0]), *(other.result() for other in others)]
     return [found[i % len(parts)][i // len(parts)] for i in range(len(functions))]
+
+
+def _all(functions: Sequence[Callable[[], T]]) -> list[T]:
+    return [one() for one in functions]

@@ -14,7 +14,7 @@ THREAD_VARIABLES = (
 """Variables that set the number of threads; libraries read them when they are imported."""
 
 
-def one_thread_each() -> None:
+def limit_threads() -> None:
     """Let libraries that are imported from now on use one thread, unless the user has set a number.
 
     For the small products here, threads of BLAS cost more than they gain: twice the processor time where they wait for

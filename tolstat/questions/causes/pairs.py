@@ -175,4 +175,5 @@ def _spearman(x: FloatArray, y: FloatArray) -> float:
     """Rank correlation; 0 if one of the two does not scatter."""
     if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0
-    return float(np.corrcoef(ranks(np.column_stack([x, y])), rowvar=False)[0, 1])
+    a, b = ranks(np.column_stack([x, y])).T
+    return float(np.corrcoef(a, b)[0, 1])

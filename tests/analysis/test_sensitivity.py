@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.stats import norm
 
-from tolstat.analysis import overrepresentation, regression, sensitivity
+from tolstat.analysis import overrepresentation, ranks, regression, sensitivity
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
@@ -37,8 +38,9 @@ def found():
     first, bounds, naive = [], [], []
     for _ in range(SEEDS):
         x, y = ishigami(1000, rng)
-        first.append(sensitivity.first_order(x, y))
-        bounds.append(sensitivity.total(x, y))
+        alone, in_all = sensitivity.first_and_total(x, y)
+        first.append(alone)
+        bounds.append(in_all)
         naive.append(share_explained(x, y))
     return first, bounds, np.array(naive)
 
@@ -73,7 +75,7 @@ def test_total_indices_lie_between_their_bounds_and_first_order_indices_do_not(f
 def test_an_effect_of_three_errors_is_in_the_bounds():
     """x1 x2 x3 has no effect of one or two: every total index is 1, all of it rest."""
     x = np.random.default_rng(2).standard_normal((2000, 4))
-    bounds = sensitivity.total(x, x[:, 0] * x[:, 1] * x[:, 2])
+    _, bounds = sensitivity.first_and_total(x, x[:, 0] * x[:, 1] * x[:, 2])
     assert bounds.rest == pytest.approx(1.0, abs=0.15)
     assert np.all(bounds.upper[:3] > 0.9)
     assert np.all(bounds.estimate < 0.15)
@@ -82,8 +84,11 @@ def test_an_effect_of_three_errors_is_in_the_bounds():
 def test_linear_model_has_the_shares_of_its_slopes():
     x, y = linear(20_000, np.random.default_rng(5))
     shares = SLOPES**2 / (SLOPES @ SLOPES)
-    assert sensitivity.first_order(x, y).estimate == pytest.approx(shares, abs=0.012)
-    assert sensitivity.total(x, y).rest == pytest.approx(0.0, abs=0.01)
+    first, total = sensitivity.first_and_total(x, y)
+    assert first.estimate == pytest.approx(shares, abs=0.012)
+    assert total.rest == pytest.approx(0.0, abs=0.01)
+    for one, other in zip(sensitivity.first_order(x, y), first, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-10)
 
 
 def test_errors_of_few_values_and_of_one_value():
@@ -93,7 +98,7 @@ def test_errors_of_few_values_and_of_one_value():
     assert found.estimate[:2] == pytest.approx([0.5, 0.5], abs=0.05)
     assert np.isnan(found.estimate[2])
     with pytest.raises(ValueError, match="scatter"):
-        sensitivity.total(x, x[:, 1])
+        sensitivity.first_and_total(x, x[:, 1])
 
 
 def test_contributions_against_shaft_angle_are_those_of_each_angle():
@@ -213,8 +218,29 @@ def test_misuse_is_refused(call, message):
         call()
 
 
+def test_ranks_are_those_of_scipy_for_all_joints_and_for_some():
+    rng = np.random.default_rng(4)
+    x = np.column_stack([rng.standard_normal(300), rng.integers(0, 5, 300), np.zeros(300)])
+    np.testing.assert_array_equal(ranks.ranks(x), stats.rankdata(x, axis=0))
+    some = rng.random(300) < 0.3
+    np.testing.assert_array_equal(ranks.from_places(ranks.places(x)[:, some]).T, stats.rankdata(x[some], axis=0))
+
+
+def test_p_values_in_the_tail_are_those_of_mann_whitney():
+    rng = np.random.default_rng(5)
+    x = np.column_stack([rng.standard_normal(200), rng.integers(-3, 4, 200)])
+    above = x[:, 0] + rng.standard_normal(200) > 1.0
+    both = np.column_stack([x, np.abs(x)])
+    p = stats.mannwhitneyu(both[above], both[~above], method="asymptotic").pvalue
+    found = overrepresentation.tail(x, above)
+    ours = np.concatenate([found.direction.p, found.size.p])
+    smallest = np.argmin(p)
+    assert ours[smallest] == pytest.approx(4 * p[smallest], rel=1e-12)  # Holm's factor of the smallest
+    assert np.argmin(ours) == smallest
+
+
 def test_dependent_samples_have_no_interval():
     x, y = linear(300, np.random.default_rng(6))
-    ends = [sensitivity.first_order(x, y, iid=False).lower, sensitivity.total(x, y, iid=False).upper]
+    ends = [sensitivity.first_order(x, y, iid=False).lower, sensitivity.first_and_total(x, y, iid=False)[1].upper]
     ends += [regression.ranks(x, y, iid=False).lower, overrepresentation.tail(x, y > 0.8, iid=False).size.upper]
     assert np.isnan(ends).all()

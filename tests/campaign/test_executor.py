@@ -17,8 +17,8 @@ import pytest
 
 from tests.support.environment import environment
 from tolstat.campaign.executors import Lost, Work, WorkerDied, map_in_processes, map_serially
-from tolstat.campaign.executors.common import THREAD_VARIABLES, never_stop
-from tolstat.common.cores import available_cores
+from tolstat.campaign.executors.common import never_stop
+from tolstat.common.cores import THREAD_VARIABLES, available_cores
 
 SQUARES = {i: i * i for i in range(20)}
 

@@ -5,13 +5,19 @@ from __future__ import annotations
 import json
 import math
 import re
+import subprocess
+import sys
 
 import pytest
 from pydantic_core import PydanticCustomError
 
 from tests.support.environment import ROOT
+from tolstat.common import units
 from tolstat.common.notation import DIAMETER, PLUS_MINUS
 from tolstat.common.units import diameter, is_diameter, to_si, written
+from tolstat.common.usual_units import FACTORS
+
+NUMBERS = ("0.1", "3.3", "-7.77e3", "1e-7", "0.30000000000000004", "123456.789", "0")
 
 
 @pytest.mark.parametrize("text", ["0,1 mm", "1,5 mm", "1 000 N", "10**10**10 mm", "1_000 mm", "mm", "", "0.1 mm;"])
@@ -40,6 +46,21 @@ def test_what_is_no_number_with_a_unit_is_not_guessed(text: str) -> None:
 )
 def test_quantities_are_read(text: str, unit: str, value: float) -> None:
     assert to_si(text, unit) == pytest.approx(value, rel=1e-14)
+
+
+def test_usual_units_have_the_bits_of_pint(monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = [(f"{number} {name}", unit) for unit, known in FACTORS.items() for name in known for number in NUMBERS]
+    ours = [to_si(*case) for case in cases]
+    monkeypatch.setattr(units, "FACTORS", {})
+    assert ours == [to_si(*case) for case in cases]
+
+
+def test_usual_units_do_not_load_pint() -> None:
+    said = (
+        "import sys; from tolstat.common.units import to_si; to_si('0.1 mm', 'm'), to_si('500 rpm', 'rad/s');"
+        "sys.exit('pint' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", said], cwd=ROOT, check=False).returncode == 0
 
 
 @pytest.mark.parametrize(

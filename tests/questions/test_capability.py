@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from scipy.special import nctdtr
-from scipy.stats import lognorm, norm, t
+from scipy.stats import betabinom, lognorm, norm, normaltest, t
 
 from tests.support.views import view
-from tolstat.analysis import capability, exceedance, extreme
+from tolstat.analysis import capability, exceedance, extreme, prediction
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.tables import Status
 from tolstat.questions.capability import query, rendering
@@ -179,3 +179,19 @@ def test_a_tail_that_is_not_generalised_pareto_is_not_extrapolated(monkeypatch):
     assert poor.loc[0, "estimate":"shape_upper"].isna().all()
     assert poor["p"].notna().all()
     assert rendering.no_tail(poor).startswith("cross1.F: the tail is not generalised Pareto")
+
+
+@pytest.mark.parametrize("n", [20, 61, 3000])
+def test_normality_is_tested_as_by_scipy(n):
+    rng = np.random.default_rng(n)
+    for load in (rng.normal(size=n), rng.exponential(size=n), 700.0 + rng.uniform(size=n)):
+        found = capability.capability(load, [Status.OK] * n, 800.0).normal_p
+        assert found == pytest.approx(normaltest(load).pvalue, rel=1e-10)
+
+
+@pytest.mark.parametrize("counts", [(1, 1, 20, 7), (5, 9, 100, 200), (4000, 4100, 20_000, 3000), (99, 100, 100, 50)])
+def test_prediction_is_from_quantiles_of_the_beta_binomial_distribution(counts):
+    least, most, n, number = counts
+    low, high = prediction.of_counts(*counts)
+    assert low == betabinom.ppf(0.025, number, least, n - least + 1)
+    assert high == (betabinom.ppf(0.975, number, most + 1, n - most) if most < n else number)

@@ -130,6 +130,7 @@ def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypa
 
     monkeypatch.setattr(Reader, "column", counting)
     monkeypatch.setattr(revolutions, "read", drawn)
+    monkeypatch.setattr(revolutions, "ahead", lambda *_: None)
     opened = mock.Mock(side_effect=Reader.open)
     monkeypatch.setattr(Reader, "open", opened)
     recalled = mock.Mock(side_effect=recall)
@@ -139,6 +140,26 @@ def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypa
     assert len(tables) > 150
     assert {name: rows for name, rows in tables.items() if rows != (400 if name.startswith("errors/") else 401)} == {}
     assert (opened.call_count, recalled.call_count) == (1, 1)
+
+
+def test_two_processes_give_the_same_bytes(path, html, tmp_path):
+    page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=0, processes=2)
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == html
+
+
+@pytest.mark.slow
+def test_joints_are_simulated_again_once_in_any_number_of_processes(path, tmp_path, monkeypatch):
+    pages = []
+    for processes in (1, 2):
+        jobs = mock.Mock(side_effect=revolutions._job)
+        monkeypatch.setattr(revolutions, "_job", jobs)
+        page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=300, processes=processes)
+        monkeypatch.undo()
+        slots = np.concatenate([call.args[1] for call in jobs.call_args_list])
+        assert len(slots) == len(np.unique(slots)) >= 300
+        pages.append((tmp_path / "page.html").read_bytes())
+    assert b"simulated again" in pages[0]
+    assert pages[0] == pages[1]
 
 
 def drawn(store, slots, most_angles=60):
@@ -358,7 +379,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
     assert "wrote" in done.stderr
-    _, out, accepted, again, _, _ = calls[0]
+    _, out, accepted, again, *_ = calls[0]
     assert (str(out), again) == (asked[0], asked[2])
     assert accepted == pytest.approx(asked[1])
 

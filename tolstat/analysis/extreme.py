@@ -196,8 +196,7 @@ def of_sample(
     sample: exceedance.Sample, share: float | None = None, confidence: float = 0.95, iid: bool = True
 ) -> Tail:
     """Fit a tail to loads that are sorted already; other parameters and errors raised as in `fit`."""
-    from scipy.special import xlog1py, xlogy
-    from scipy.stats import chi2
+    from scipy.special import gammaincinv, xlog1py, xlogy
 
     valid = sample.valid
     share = min(0.1, 3.0 / np.sqrt(max(valid.size, 1))) if share is None else share
@@ -209,7 +208,7 @@ def of_sample(
     if excesses.size < MIN_EXCESSES:
         raise TooThinError(excesses.size, int(np.ceil(sample.n * MIN_EXCESSES / max(excesses.size, 1))))
     m, n = excesses.size, valid.size
-    reach = 0.5 * float(chi2.ppf(confidence, 1))
+    reach = float(gammaincinv(0.5, confidence))  # half the quantile of chi-square with one degree of freedom
     k, sigma, deficit = _likelihood(excesses, reach)
     best = [float(value) for value in pareto.most_likely(excesses)]
     half = 5.0 * np.sqrt(m * (1.0 - m / n)) / n

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.ranks import from_places, places
 
 BoolArray = NDArray[np.bool_]
 
@@ -76,34 +77,44 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
         raise ValueError(f"{n} of {over.size} joints are above the limit: {FEWEST} are needed on either side")
     if (np.ptp(z, axis=0) == 0).any():
         raise ValueError("give errors that scatter")
-    both = np.concatenate([z, np.abs(z)], axis=1)
+    both = places(np.concatenate([z, np.abs(z)], axis=1))
     found = Part(*_larger(both, over, confidence), _holm(_p_values(both, over)))
     if not iid:
-        found = found._replace(lower=np.full(both.shape[1], np.nan), upper=np.full(both.shape[1], np.nan))
+        found = found._replace(lower=np.full(len(both), np.nan), upper=np.full(len(both), np.nan))
     d = z.shape[1]
     return Overrepresentation(Part(*(part[:d] for part in found)), Part(*(part[d:] for part in found)))
 
 
-def _larger(values: FloatArray, over: BoolArray, confidence: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """P(value of one above > of one not above), ties count half, with DeLong's (1988) interval on the logit scale."""
+def _larger(found: NDArray[np.intp], over: BoolArray, confidence: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """P(value of one above > of one not above), ties count half, with DeLong's (1988) interval on the logit scale.
+
+    `found` has the `ranks.places` of all joints, (d, n).
+    """
     from scipy.special import expit, logit, ndtri
-    from scipy.stats import rankdata
 
     m, k = int(over.sum()), int((~over).sum())
-    joint = rankdata(values, axis=0)
-    of_above = (joint[over] - rankdata(values[over], axis=0)) / k  # share of the others that each one surpasses
-    of_others = 1.0 - (joint[~over] - rankdata(values[~over], axis=0)) / m
-    estimate = of_above.mean(axis=0)
-    error = np.sqrt(of_above.var(axis=0, ddof=1) / m + of_others.var(axis=0, ddof=1) / k)
+    joint = from_places(found)
+    of_above = (joint[:, over] - from_places(found[:, over])) / k  # share of the others that each one surpasses
+    of_others = 1.0 - (joint[:, ~over] - from_places(found[:, ~over])) / m
+    estimate = of_above.mean(axis=1)
+    error = np.sqrt(of_above.var(axis=1, ddof=1) / m + of_others.var(axis=1, ddof=1) / k)
     inside = np.clip(estimate, 0.5 / (m * k), 1.0 - 0.5 / (m * k))
     half = ndtri(0.5 * (1.0 + confidence)) * np.maximum(error, 0.5 / (m * k)) / (inside * (1.0 - inside))
     return estimate, expit(logit(inside) - half), expit(logit(inside) + half)
 
 
-def _p_values(values: FloatArray, over: BoolArray) -> FloatArray:
-    from scipy.stats import mannwhitneyu
+def _p_values(found: NDArray[np.intp], over: BoolArray) -> FloatArray:
+    """Two-sided p-values of the Wilcoxon–Mann–Whitney test, (d,): normal, with corrections for ties and continuity."""
+    from scipy.special import ndtr
 
-    return np.asarray(mannwhitneyu(values[over], values[~over], axis=0, method="asymptotic").pvalue)
+    n, m = over.size, int(over.sum())
+    k = n - m
+    surpassed = from_places(found)[:, over].sum(axis=1) - 0.5 * m * (m + 1)
+    alike = [np.bincount(own).astype(float) for own in found]
+    ties = np.array([(own**3 - own).sum() for own in alike])
+    spread = np.sqrt(m * k / 12.0 * (n + 1 - ties / (n * (n - 1.0))))
+    p: FloatArray = 2.0 * ndtr(-(np.maximum(surpassed, m * k - surpassed) - 0.5 * m * k - 0.5) / spread)
+    return np.minimum(p, 1.0)
 
 
 def _holm(p: FloatArray) -> FloatArray:

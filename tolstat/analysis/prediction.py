@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 DELIVERY = 1000
 """Joints of the next delivery, unless another number is given."""
 
@@ -44,15 +46,23 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
     >>> of_counts(5, 5, 100, 200)
     (2.0, 25.0)
     """
-    from scipy.stats import betabinom
-
     if not 0 <= least <= most <= n:
         raise ValueError(f"counts {least} and {most} must lie between 0 and {n}")
     tail = 0.5 * (1.0 - confidence)
     # beta-binomial distributions whose tails are those of the hypergeometric test
-    lower = betabinom.ppf(tail, number, least, n - least + 1) if least else 0.0
-    upper = betabinom.ppf(1.0 - tail, number, most + 1, n - most) if most < n else float(number)
-    return float(lower), float(upper)
+    lower = _quantile(tail, number, least, n - least + 1) if least else 0.0
+    upper = _quantile(1.0 - tail, number, most + 1, n - most) if most < n else float(number)
+    return lower, upper
+
+
+def _quantile(share: float, number: int, a: int, b: int) -> float:
+    """Quantile of the beta-binomial distribution: least count whose distribution function reaches `share`."""
+    from scipy.special import betaln
+
+    counts = np.arange(number + 1.0)
+    log = betaln(counts + a, number - counts + b) - betaln(counts + 1.0, number - counts + 1.0) - betaln(a, b)
+    reached = np.cumsum(np.exp(log)) / (number + 1.0)
+    return float(min(int(np.searchsorted(reached, share)), number))
 
 
 def half(confidence: float) -> float:

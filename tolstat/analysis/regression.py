@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.ranks import from_places, places
 
 GROUPS = 20
 """Number of groups in the delete-a-group jackknife."""
@@ -67,19 +68,19 @@ def ranks(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
         raise ValueError(f"{found}: give {errors.shape[1] + 2 * GROUPS} or more")
     if (np.ptp(errors, axis=0) == 0).any() or np.ptp(load) == 0:
         raise ValueError("give a load and errors that scatter")
-    estimate, r2 = _coefficients(errors, load)
+    place = places(np.column_stack([errors, load]))
+    estimate, r2 = _coefficients(place)
     if not iid:
         return RankRegression(estimate, np.full_like(estimate, np.nan), np.full_like(estimate, np.nan), r2)
     group = np.arange(len(load)) % GROUPS
-    without = np.array([_coefficients(errors[group != g], load[group != g])[0] for g in range(GROUPS)])
+    without = np.array([_coefficients(place[:, group != g])[0] for g in range(GROUPS)])
     spread = np.sqrt((GROUPS - 1) / GROUPS * ((without - estimate) ** 2).sum(axis=0))
     half = stdtrit(GROUPS - 1, 0.5 * (1.0 + confidence)) * spread
     return RankRegression(estimate, estimate - half, estimate + half, r2)
 
 
-def _coefficients(errors: FloatArray, load: FloatArray) -> tuple[FloatArray, float]:
-    from scipy.stats import rankdata
-
-    correlation = np.corrcoef(np.column_stack([rankdata(errors, axis=0), rankdata(load)]), rowvar=False)
-    found = np.linalg.lstsq(correlation[:-1, :-1], correlation[:-1, -1], rcond=None)[0]
-    return found, float(found @ correlation[:-1, -1])
+def _coefficients(place: NDArray[np.intp]) -> tuple[FloatArray, float]:
+    """Coefficients and R^2 of joints whose places, (d + 1, m), are given: those of the errors, then of the load."""
+    correlation: FloatArray = np.asarray(np.corrcoef(from_places(place)))
+    slopes: FloatArray = np.asarray(np.linalg.lstsq(correlation[:-1, :-1], correlation[:-1, -1], rcond=None)[0])
+    return slopes, float(slopes @ correlation[:-1, -1])

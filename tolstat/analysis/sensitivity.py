@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.ranks import ranks
 from tolstat.common.shown import shown
 
 WIDER = 1.2
@@ -68,6 +69,26 @@ class Total(NamedTuple):
     rest: float
 
 
+class Fit(NamedTuple):
+    """Mean of m loads given one error, fitted to n joints.
+
+    Attributes
+    ----------
+    mean, influence : ndarray, shape (n, m)
+        Fitted mean less that of all joints, and influence function of the share.
+    share, chance : ndarray, shape (m,)
+        Share of the variance, and variance of its estimate in the absence of any effect.
+    degrees : int
+        Degrees of freedom of the fit.
+    """
+
+    mean: FloatArray
+    influence: FloatArray
+    share: FloatArray
+    chance: FloatArray
+    degrees: int
+
+
 def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> FirstOrder:
     """First-order Sobol' indices from given data.
 
@@ -110,9 +131,8 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     found = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
     for i, column in enumerate(errors.T):
         if np.ptp(column) > 0:
-            _, share, influence, degrees = _fit(column, centred)
-            found[0, i] = share
-            found[1, i] = _error(influence, _chance(share, degrees, len(loads)))
+            own = _fit(column, centred)
+            found[0, i], found[1, i] = own.share, _error(own.influence, own.chance)
     estimate, error = found.reshape(2, errors.shape[1], *loads.shape[1:])
     return _with_ends(estimate, error, variance.reshape(loads.shape[1:]), confidence, iid)
 
@@ -156,20 +176,20 @@ def over_revolution(
     found = np.full((2, errors.shape[1]), np.nan)
     for i, column in enumerate(errors.T):
         if np.ptp(column) > 0 and whole > 0:
-            _, share, influence, degrees = _fit(column, centred)
-            local[0, i], local[1, i] = share, _error(influence, _chance(share, degrees, n))
-            share, influence = np.nan_to_num(share), np.nan_to_num(influence)
+            fit = _fit(column, centred)
+            local[0, i], local[1, i] = fit.share, _error(fit.influence, fit.chance)
+            share, influence = np.nan_to_num(fit.share), np.nan_to_num(fit.influence)
             found[0, i] = variance @ share / whole
             own = (influence @ variance + square @ (share - found[0, i])) / whole
-            found[1, i] = _error(own, alike * _chance(found[0, i], degrees, n))
+            found[1, i] = _error(own, alike * _chance(found[0, i], fit.degrees, n))
     return (
         _with_ends(local[0], local[1], variance, confidence, iid),
         _with_ends(found[0], found[1], np.asarray(variance.mean()), confidence, iid),
     )
 
 
-def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> Total:
-    """Bounds of the total Sobol' indices from given data.
+def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> tuple[FirstOrder, Total]:
+    """First-order indices, and bounds of the total Sobol' indices, from given data.
 
     Interactions of two errors are expanded in products of Legendre polynomials of their ranks (high-dimensional model
     representation, Li, Wang and Rabitz 2002), estimated from the residual of the effects of single errors. Their shares
@@ -188,7 +208,9 @@ def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
 
     Returns
     -------
-    Total
+    first : FirstOrder
+        As of `first_order`, of these joints.
+    total : Total
         Indices of each error.
 
     Raises
@@ -199,14 +221,14 @@ def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
     errors, loads = _checked(np.asarray(x)[:MOST], np.asarray(y)[:MOST])
     if loads.ndim != 1 or np.ptp(loads) == 0 or (np.ptp(errors, axis=0) == 0).any():
         raise ValueError("give one load and errors that scatter")
-    n = len(loads)
     e = loads - loads.mean()
     fits = [_fit(column, e[:, None]) for column in errors.T]
-    first = np.array([share[0] for _, share, _, _ in fits])
-    influence = np.column_stack([own[:, 0] for _, _, own, _ in fits])
-    chance = np.array([_chance(share, degrees, n)[0] for _, share, _, degrees in fits])
+    first = np.array([fit.share[0] for fit in fits])
+    influence = np.column_stack([fit.influence[:, 0] for fit in fits])
+    chance = np.array([fit.chance[0] for fit in fits])
+    alone = _with_ends(first, _error(influence, chance), np.asarray(e.var()), confidence, iid)
     # subtract significant effects of single errors, which would be noise in the estimates of pairs
-    main = sum((m[:, 0] for (m, _, _, _), s, c in zip(fits, first, chance, strict=True) if s > 2 * c**0.5), 0.0 * e)
+    main = sum((fit.mean[:, 0] for fit, s, c in zip(fits, first, chance, strict=True) if s > 2 * c**0.5), 0.0 * e)
     pairs, of_pairs, chance_of_pairs = _interactions(errors, e - main, e.var())
     influence_of_pairs = of_pairs - pairs.sum(axis=1) * (e**2 / e.var())[:, None]
     estimate = first + pairs.sum(axis=1)
@@ -220,7 +242,7 @@ def total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
     np.fill_diagonal(pairs, np.nan)
     lower = np.clip(estimate - z * errors_lower, 0, 1)
     upper = np.clip(np.maximum(estimate + rest + z * errors_upper, estimate + z * errors_lower), 0, 1)
-    return Total(estimate, lower, upper, pairs, float(rest))
+    return alone, Total(estimate, lower, upper, pairs, float(rest))
 
 
 def _with_ends(
@@ -241,33 +263,36 @@ def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
     return errors, loads
 
 
-def _fit(column: FloatArray, centred: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """Fitted mean of loads given one error, (n, m), shares of the variance, (m,), influence functions, and degrees.
+def _fit(column: FloatArray, centred: FloatArray) -> Fit:
+    """Fit the mean of loads, (n, m), given one error.
 
     With mean m(x), deviation e and share S = Var m / Var e, the influence function of S is
     (m² + 2 m (e - m) - S e²) / Var e.
     """
     n = len(column)
-    basis = _pieces(column)
-    mean = basis @ (basis.T @ centred)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        variance = (centred**2).mean(axis=0)
-        inside = ((centred - mean) ** 2).sum(axis=0) / (n - 1 - basis.shape[1])
-        share = 1.0 - inside / (variance * n / (n - 1))
-        influence = (mean * (2.0 * centred - mean) - share * centred**2) / variance
-    return mean, share, influence, basis.shape[1]
-
-
-def _pieces(column: FloatArray) -> FloatArray:
-    """Orthonormal basis, (n, degrees), of continuous piecewise linear functions, centred; as many joints a piece."""
-    n = len(column)
-    knots = np.unique(np.quantile(column, np.linspace(0, 1, min(max(8, round(np.cbrt(n))), 32) + 1)))
-    hats = np.column_stack([np.interp(column, knots, unit) for unit in np.eye(len(knots))[1:]])
-    hats -= hats.mean(axis=0)
+    hats = _hats(column)
     size, axes = np.linalg.eigh(hats.T @ hats)  # well conditioned: hats overlap with neighbours only
     held = size > 1e-12 * n
-    basis: FloatArray = hats @ (axes[:, held] / np.sqrt(size[held]))
-    return basis
+    basis, degrees = axes[:, held] / np.sqrt(size[held]), int(held.sum())
+    mean = hats @ (basis @ (basis.T @ (hats.T @ centred)))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        variance = (centred**2).mean(axis=0)
+        inside = ((centred - mean) ** 2).sum(axis=0) / (n - 1 - degrees)
+        share = 1.0 - inside / (variance * n / (n - 1))
+        influence = (mean * (2.0 * centred - mean) - share * centred**2) / variance
+    return Fit(mean, influence, share, _chance(share, degrees, n), degrees)
+
+
+def _hats(column: FloatArray) -> FloatArray:
+    """Basis, (n, knots - 1), of continuous piecewise linear functions, centred; as many joints a piece."""
+    n = len(column)
+    knots = np.unique(np.quantile(column, np.linspace(0, 1, min(max(8, round(np.cbrt(n))), 32) + 1)))
+    piece = np.clip(np.searchsorted(knots, column, side="right") - 1, 0, len(knots) - 2)
+    part = (column - knots[piece]) / np.diff(knots)[piece]
+    hats, rows = np.zeros((n, len(knots))), np.arange(n)
+    hats[rows, piece], hats[rows, piece + 1] = 1.0 - part, part
+    found: FloatArray = hats[:, 1:] - hats[:, 1:].mean(axis=0)
+    return found
 
 
 def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -292,9 +317,7 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
 
 def _polynomials(errors: FloatArray) -> FloatArray:
     """Legendre polynomials of the degrees 1 to `DEGREE` of the errors' ranks, orthonormal; shape (n, d, DEGREE)."""
-    from scipy.stats import rankdata
-
-    u = 2.0 * (rankdata(errors, axis=0) - 0.5) / len(errors) - 1.0
+    u = 2.0 * (ranks(errors) - 0.5) / len(errors) - 1.0
     degrees = range(1, DEGREE + 1)
     basis = [np.sqrt(2 * k + 1) * np.polynomial.Legendre.basis(k)(u) for k in degrees]
     return np.stack(basis, axis=2)

@@ -62,6 +62,8 @@ class Stages(NamedTuple):
     origins : callable
         Study, rows of the campaign (range) -> which proposal or level gave each joint, consecutive tables; None if the
         sampling method has no such table (`draw_records.columns`).
+    is_compiled : callable
+        Options, some joints or None -> whether `warm_up` only has to load what is compiled: the workers do so then.
     """
 
     draw: Callable[..., Iterable[NDArray[np.void]]]
@@ -71,6 +73,7 @@ class Stages(NamedTuple):
     simulate: Callable[..., Simulation]
     warm_up: Callable[..., object]
     origins: Callable[..., Iterable[NDArray[np.void]] | None] = lambda *_: None
+    is_compiled: Callable[..., bool] = lambda *_: False
 
 
 @dataclass(frozen=True)
@@ -290,6 +293,12 @@ def prepare(warm_up: Callable[..., object], options: Iterable[Options], params: 
     """Compile what joints with any of the options need, such as `params`, or load it."""
     for one in options:
         warm_up(one, params)
+
+
+def compile_missing(stages: Stages, options: Options, params: NDArray[np.void] | None = None) -> None:
+    """Compile what joints with these options need, such as `params`, unless it lies in the cache."""
+    if not stages.is_compiled(options, params):
+        stages.warm_up(options, params)
 
 
 def _blocks(

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
-from tolstat.store import Counts
-
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
+
+    from tolstat.store import Counts
 
 LINE_INTERVAL_S = 60.0
 """Time between two lines if stderr is not a terminal, s."""

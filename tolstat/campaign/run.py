@@ -18,6 +18,7 @@ from tolstat.campaign.blocks import (
     Execution,
     Finished,
     Stages,
+    compile_missing,
     pending,
     prepare,
     settings_in_use,
@@ -146,10 +147,11 @@ def run(
             begin(store, retry, stages.history_specs(retry.options, *_history_options(study)), tell)
         counts = store.counts()
         last = store.n if until_row is None else store.slot(until_row)
+        compile_kernels = partial(compile_missing, stages)
         try:
             if next(pending(store, last), None) is not None:
                 stage(kernels())
-                prepare(stages.warm_up, settings_in_use(study, store), _some_joints(study, store, stages))
+                prepare(compile_kernels, settings_in_use(study, store), _some_joints(study, store, stages))
                 store.begin_session(counts.done)
             stage(JOINTS)
             work = work_of(study, store, stages, execution)
@@ -158,7 +160,7 @@ def run(
                 counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
                 stage("check of the numerical error")
-                again = Supervised(work, stages.warm_up, execution.kind)
+                again = Supervised(work, compile_kernels, execution.kind)
                 for one in store.each():
                     verify.check_few(one, partial(_rows_of, study.at(one.point or ""), one, stages), again)
             store.finish()
@@ -205,6 +207,7 @@ def _own_stages() -> Stages:
         simulation.simulate_rows,
         compilation.warm_up,
         sampling.origin_blocks,
+        compilation.is_compiled,
     )
 
 

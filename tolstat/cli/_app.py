@@ -21,6 +21,7 @@ from typer.core import TyperArgument, TyperCommand, TyperGroup
 from tolstat import __version__
 from tolstat.cli._shortage import shortage
 from tolstat.cli._talk import LogFile, Quiet, Verbose, fail, say, session, warn
+from tolstat.common.cores import limit_threads
 from tolstat.common.errors import Fault, InputError, TolstatError
 
 if TYPE_CHECKING:
@@ -154,6 +155,7 @@ StudyOption = Annotated[
 
 def main() -> None:
     """Run the command line; the entry point of ``tolstat`` and ``python -m tolstat``."""
+    limit_threads()
     app(prog_name="tolstat")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -63,6 +62,7 @@ def report(
     if out is not None and out.suffix.lower() in PAGES:
         _page(file, out, accept, again, point or "")
         return
+    from tolstat.common.cores import available_cores
     from tolstat.report import build
     from tolstat.store import Reader
 
@@ -71,15 +71,12 @@ def report(
         Reader.open(file).close()  # check the file before the folder is created
         make_folder(out)
     with progress("report") as shown:
-        made = build(file, out, width_of(wide), shown.stage, accepted, point or "")
+        made = build(file, out, width_of(wide), shown.stage, accepted, point or "", available_cores())
     tell(made)
 
 
 def _page(file: Path, out: Path, accept: str | None, again: int | None, point: str) -> None:
-    from tolstat.campaign.executors.common import THREAD_VARIABLES
-
-    for name in THREAD_VARIABLES:  # for many small products, BLAS threads only cost time
-        os.environ.setdefault(name, "1")
+    from tolstat.common.cores import available_cores
     from tolstat.common.files import check_target
     from tolstat.report import page
     from tolstat.store import Reader, revolutions
@@ -102,5 +99,5 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None, point: s
         if again and store.sampling["method"] in DRAWN and not held:
             announce_compilation()
     with progress("page") as shown:
-        page.write_page(file, out, accepted, again, shown.stage, point)
+        page.write_page(file, out, accepted, again, shown.stage, point, available_cores())
     say(f"wrote {out}")

@@ -209,9 +209,10 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
 
     if report:
         with progress("report") as shown:
+            from tolstat.common.cores import available_cores
             from tolstat.report import build
 
-            made = build(path, None, width_of(wide), shown.stage)
+            made = build(path, None, width_of(wide), shown.stage, processes=available_cores())
         tell(made)
     with Reader.open(path) as store:
         found = reasons(store, {one.point or "": one.status() for one in store.each()})

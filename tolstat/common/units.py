@@ -18,6 +18,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from tolstat.common import json_schema, notation
 from tolstat.common.notation import DIAMETER, PLUS_MINUS, Written
+from tolstat.common.usual_units import FACTORS
 
 if TYPE_CHECKING:
     import pint
@@ -180,6 +181,9 @@ def _short(number: float) -> str:
 
 def _value(read: Written, unit: str, value: str) -> float:
     """Value in `unit`, which `value` must be convertible to."""
+    factor = FACTORS.get(unit, {}).get(read.unit)
+    if factor is not None:
+        return read.number * factor
     import pint
 
     try:

@@ -32,6 +32,8 @@ class Asked:
         Remarks that concern the whole page; sections append to it.
     stage : callable
         Called with the name of each part of the page when its computation begins.
+    processes : int
+        Number of processes that make the page, whose bytes do not depend on it.
     """
 
     path: Path
@@ -39,6 +41,7 @@ class Asked:
     replay: int = 0
     notes: list[str] = field(default_factory=list)
     stage: Callable[[str], None] = silent
+    processes: int = 1
 
     @property
     def judges(self) -> bool:

@@ -9,9 +9,11 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from tolstat.common.aside import Aside
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
 from tolstat.common.tables import VALID
@@ -62,6 +64,7 @@ def build(
     stage: Callable[[str], None] = silent,
     accepted: float = math.nan,
     point: str = "",
+    processes: int = 1,
 ) -> Report:
     """Write the report of a result file; the campaign may be unfinished.
 
@@ -86,6 +89,8 @@ def build(
     point : str
         Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; names of files end in it. The worst of
         all by default.
+    processes : int
+        Number of processes: with two, on Linux, the pictures of load exceedance are drawn in a fork of this one.
 
     Returns
     -------
@@ -110,7 +115,11 @@ def build(
             if store.case_names:
                 return _noted(_cases(store, stem, width), stands_on)
             stem = stem.with_name(f"{stem.name}_{point}") if point else stem
-            report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width, accepted)
+            report = (
+                _sweep(view, stem, width)
+                if view.method == "sweep"
+                else _exceedance(view, stem, width, accepted, processes)
+            )
             for note in (view.missing(), _stopped(store.stop) if store.stop.get("reached") else "", stands_on):
                 report = _noted(report, note)
             return report
@@ -123,7 +132,7 @@ def _noted(report: Report, note: str) -> Report:
     return report._replace(notes=f"{report.notes}\n{note}") if note else report
 
 
-def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> Report:
+def _exceedance(view: View, stem: Path, width: int | None, accepted: float, processes: int) -> Report:
     from tolstat.display import style
     from tolstat.questions.capability import query as capability
     from tolstat.questions.capability import rendering as capabilities
@@ -131,8 +140,10 @@ def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> R
     from tolstat.report.headline import headline
 
     files, shown, more = [], "no largest load is kept; the results that are: tolstat export", ""
+    pictures = None
     if view.bushing_loads:
-        files = style.save(rendering.figure(view), stem.with_name(f"{stem.name}_exceedance"))
+        figure = rendering.figure(view)
+        pictures = Aside(partial(style.save, figure, stem.with_name(f"{stem.name}_exceedance")), processes > 1)
     if view.shown_loads:
         files.append(text.csv(query.curves(view), stem, "exceedance"))
         quantiles = query.quantiles(view)
@@ -153,6 +164,7 @@ def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> R
             kept = capabilities.together(capability.limits(view))
             shown += f"\n\nyield: {kept.value} {kept.words}"
     notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]
+    files = [*(pictures.result() if pictures else ()), *files]
     return Report(shown, "\n".join(note for note in notes if note), files)
 
 

@@ -6,15 +6,18 @@ import base64
 import hashlib
 import json
 import re
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
 import tolstat
+from tolstat.common.aside import mapped
 from tolstat.common.files import atomic_write
 from tolstat.display import drawing, schemes
-from tolstat.display.blocks import Page, Panel
+from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
 from tolstat.report import templates
 
 POLICY = (
@@ -26,8 +29,8 @@ _TORQUE = re.compile(r"\bN m\b")
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:k?N|mm|[µu]m|m?rad|deg|rpm|rad/s|[MG]Pa|ms|min|[smh])\b|[%°])")
 
 
-def write(page: Page, path: Path) -> None:
-    """Write a page; the same page gives the same bytes.
+def write(page: Page, path: Path, processes: int = 1) -> None:
+    """Write a page; the same page gives the same bytes, with any number of processes.
 
     Parameters
     ----------
@@ -35,9 +38,14 @@ def write(page: Page, path: Path) -> None:
         The page.
     path : Path
         HTML file.
+    processes : int
+        Number of processes that draw pictures.
     """
+    panels = [panel for section in page.sections for block in section.blocks for panel in _panels(block)]
+    drawn = mapped([partial(_figure, panel) for panel in panels], processes)
+    figures = {panel.key: figure for panel, figure in zip(panels, drawn, strict=True)}
     environment = templates.environment()
-    environment.globals["figure"] = _figure
+    environment.globals["figure"] = lambda panel: figures[panel.key]
     environment.filters |= {"data": _data, "grouped": grouped, "bound": bound}
     script = (templates.FOLDER / "page.js").read_text(encoding="utf-8")
     text = environment.get_template("page.html.j2").render(
@@ -65,6 +73,12 @@ def bound(words: str) -> str:
     """Keep numbers with their units, and intervals, on one line: no-break spaces in them."""
     words = _BEFORE_UNIT.sub("\u00a0", _TORQUE.sub("N\u00a0m", words))
     return words.replace(" .. ", "\u00a0..\u00a0")
+
+
+def _panels(block: Block) -> Sequence[Panel]:
+    if isinstance(block, Panels):
+        return block.panels
+    return [block.picture] if isinstance(block, Decision) and block.picture else []
 
 
 def _figure(panel: Panel) -> dict[str, Any]:

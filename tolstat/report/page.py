@@ -13,6 +13,7 @@ from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
 from tolstat.display.asked import Asked, silent
 from tolstat.display.blocks import Facts, Listing, Page, Section
+from tolstat.questions.causes import section as causes
 from tolstat.report import html, joint_values, verdict
 from tolstat.solver import fidelity
 from tolstat.store import viewed
@@ -36,6 +37,7 @@ def write_page(
     replay: int = REPLAYED,
     stage: Callable[[str], None] = silent,
     point: str = "",
+    processes: int = 1,
 ) -> Path:
     """Write the report of a result file as one page; the campaign may be unfinished.
 
@@ -54,11 +56,13 @@ def write_page(
         Called with the name of each part of the page when its computation begins.
     point : str
         Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; the worst of all by default.
+    processes : int
+        Number of processes: on Linux, joints are simulated again and pictures are drawn in forks of this one.
 
     Returns
     -------
     Path
-        The file written; the same result file gives the same bytes.
+        The file written; the same result file gives the same bytes, with any number of processes.
 
     Raises
     ------
@@ -74,9 +78,9 @@ def write_page(
         if view.store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
             raise StoreError(str(Fault(str(view.path), "lists its joints one by one", remedy)))
-        made = compose(view.at(point), Asked(view.path, accepted, replay, stage=stage))
+        made = compose(view.at(point), Asked(view.path, accepted, replay, stage=stage, processes=processes))
         stage("page: pictures")  # drawn from the view
-        html.write(made, Path(out))
+        html.write(made, Path(out), processes)
     return Path(out)
 
 
@@ -92,6 +96,7 @@ def compose(view: View, asked: Asked) -> Page:
         point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
         remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
         asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
+    causes.begin(view, asked)
     sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
     facts = Facts(tuple(_facts(view.store)))
     text = Listing("The study as it was run", view.store.study_text)

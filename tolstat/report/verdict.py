@@ -69,6 +69,8 @@ def limits(view: View, asked: Asked) -> list[Section]:
 
 def _points(view: View) -> list[Table]:
     """Operating points, and of the joints that keep all limits there; none of a file with one point."""
+    if len(view.parts) == 1:
+        return []
     rows = []
     for part in view.parts:
         point = part.store.points[part.points[0]]
@@ -77,7 +79,7 @@ def _points(view: View) -> list[Table]:
             found = capabilities.together(capability.limits(part))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
-    return [as_block("Operating points", POINTS, pd.DataFrame(rows))] if len(rows) > 1 else []
+    return [as_block("Operating points", POINTS, pd.DataFrame(rows))]
 
 
 def _has(name: str) -> Callable[[pd.DataFrame], bool]:

@@ -90,9 +90,9 @@ def missing(options: Options, params: NDArray[np.void] | None = None) -> list[st
     return [name for name in kernels(options, params) if not any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))]
 
 
-def is_compiled(options: Options | None = None) -> bool:
-    """Whether the kernels that `options` need lie in the cache, so that `warm_up` only has to load them."""
-    return not missing(options or Options())
+def is_compiled(options: Options | None = None, params: NDArray[np.void] | None = None) -> bool:
+    """Whether the kernels that joints with `options` need, such as `params`, lie in the cache."""
+    return not missing(options or Options(), params)
 
 
 def warm_up(options: Options | None = None, params: NDArray[np.void] | None = None) -> None:

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     import xarray
 
     from tolstat.joint import Operation
+    from tolstat.store.revolutions import Ahead
 
 
 class Reader(CheckedTables):
@@ -85,7 +86,11 @@ class Reader(CheckedTables):
         Settings of each retry, in chronological order; see `attempt`.
     history_specs : dict of str to HistorySpec
         Histories that the campaign keeps; empty if none.
+    ahead : Ahead or None
+        Joints that are simulated again for all who ask for their loads over the revolution; see `revolutions.ahead`.
     """
+
+    ahead: Ahead | None = None
 
     @classmethod
     def open(cls, path: str | Path) -> Reader:

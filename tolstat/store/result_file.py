@@ -29,6 +29,8 @@ LINKED = ("row", "nominal")
 """Datasets of the file that every group with joints has as links: number of each row, mark of the nominal joint."""
 BLOCK = 1 << 16
 """Rows read or written at a time, so that no table of a large campaign need be in memory."""
+TOGETHER = 2048
+"""Rows that lie between two others in a block of so many are read with them: a read takes as long as some 4000 rows."""
 RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
 """Remedy for a file that cannot be repaired."""
 
@@ -227,6 +229,12 @@ def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], gr
         opened.pop_all()
     held.close()
     return copy
+
+
+def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
+    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `TOGETHER`."""
+    runs = np.split(slots, np.flatnonzero(np.diff(slots // TOGETHER)) + 1)
+    return np.concatenate([read(slice(int(run[0]), int(run[-1]) + 1))[run - run[0]] for run in runs])
 
 
 def store_error(path: Path, found: str, remedy: str) -> StoreError:

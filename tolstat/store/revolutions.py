@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.aside import Aside
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.shown import shown
-from tolstat.common.tables import BUSHINGS
+from tolstat.common.tables import BUSHINGS, Options
 from tolstat.joint import perturb
-from tolstat.solver.compilation import warm_up
+from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import restore, simulate_rows
 from tolstat.store.recorded import joint_of, options_of
-from tolstat.store.result_file import RUN_AGAIN
+from tolstat.store.result_file import RUN_AGAIN, pick
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -28,6 +30,8 @@ JOINTS_PER_BLOCK = 256
 _COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 FloatArray = NDArray[np.float64]
+Again = tuple[NDArray[np.float32], FloatArray]
+"""Loads of joints, (m, samples, 8, 6), and the largest relative difference of each from the stored values, (m,)."""
 
 
 @shown
@@ -112,7 +116,7 @@ def of_components(store: Reader, slots: NDArray[np.intp]) -> Iterator[tuple[slic
     Arguments and exceptions as in `read`; joints are simulated again where the file holds no loads.
     """
     again = not held(store)
-    if again and len(slots):
+    if again and len(slots) and store.ahead is None:
         warm_up()
     for part in blocks(len(slots)):
         if again:
@@ -172,28 +176,93 @@ def channel(loads: NDArray[Any], name: str) -> FloatArray:
     return np.asarray(np.linalg.norm(own[..., :3] if load == "F" else own[..., 3:], axis=-1))
 
 
+class Ahead(NamedTuple):
+    """Joints that are simulated again before anyone asks for them, and once for all who do.
+
+    Attributes
+    ----------
+    slots : ndarray, shape (m,)
+        File slots, ascending.
+    parts : list of Aside
+        Simulations of `blocks` of them, every other one in the same process if these are two.
+    """
+
+    slots: NDArray[np.intp]
+    parts: list[Aside[list[Again]]]
+
+    def of(self, slots: NDArray[np.intp]) -> Again | None:
+        """Loads of some of the joints; None unless all are among them."""
+        place = np.searchsorted(self.slots, slots)
+        if not np.array_equal(self.slots[np.minimum(place, len(self.slots) - 1)], slots):
+            return None
+        found = [part.result() for part in self.parts]
+        pieces = [found[i % len(found)][i // len(found)] for i in range(sum(map(len, found)))]
+        block, own = np.divmod(place, JOINTS_PER_BLOCK)
+        loads = np.stack([pieces[b][0][k] for b, k in zip(block, own, strict=True)])
+        return loads, np.array([pieces[b][1][k] for b, k in zip(block, own, strict=True)])
+
+
+def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
+    """Begin to simulate joints again, for all who ask `store` for their loads later.
+
+    Parameters
+    ----------
+    store : Reader
+        A campaign without load histories.
+    slots : ndarray of int, shape (m,)
+        File slots, ascending; none pending.
+    processes : int
+        Number of processes; with 1 the joints are simulated when they are asked for.
+
+    Raises
+    ------
+    InputError
+        As `read`.
+    """
+    if processes > 1 and not is_compiled():
+        warm_up()  # one process compiles
+    jobs = [_job(store, slots[part]) for part in blocks(len(slots))]
+    number = min(max(1, processes - 1), len(jobs))
+    parts = [Aside(partial(_all, jobs[first::number]), processes > 1) for first in range(number)]
+    store.ahead = Ahead(slots, parts)
+
+
+def _all(jobs: list[Callable[[], Again]]) -> list[Again]:
+    warm_up()
+    return [job() for job in jobs]
+
+
 def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
-    """Simulate joints again: their loads, (m, samples, 8, 6), and `Revolutions.apart`."""
-    params = perturb(joint_of(store, int(slots[0])), store.operation, _pick(store.errors, slots))
-    attempts = _pick(store.attempt, slots)
-    stored = _pick(store.results, slots)
-    loads = np.empty((len(slots), int(store.options["steps_per_rev"]), 8, 6), np.float32)
-    apart = 0.0
-    for attempt in np.unique(attempts):
-        here = np.flatnonzero(attempts == attempt)
-        found = simulate_rows(params[here], options_of(store, int(slots[here[0]])), "full")
+    """Loads of joints that are simulated again, (m, samples, 8, 6), and `Revolutions.apart`."""
+    found = None if store.ahead is None else store.ahead.of(slots)
+    loads, off = found or _job(store, slots)()
+    return loads, float(np.max(off, initial=0.0))
+
+
+def _job(store: Reader, slots: NDArray[np.intp]) -> Callable[[], Again]:
+    """Read from the file what it takes to simulate joints again, and return the function that does."""
+    params = perturb(joint_of(store, int(slots[0])), store.operation, pick(store.errors, slots))
+    attempts = pick(store.attempt, slots)
+    stored = pick(store.results, slots)[["F_max", "T_max"]].copy()
+    settings = [(here, options_of(store, int(slots[here[0]]))) for here in _alike(attempts)]
+    return partial(_simulate, params, settings, stored, int(store.options["steps_per_rev"]))
+
+
+def _alike(attempts: NDArray[np.int32]) -> list[NDArray[np.intp]]:
+    return [np.flatnonzero(attempts == attempt) for attempt in np.unique(attempts)]
+
+
+def _simulate(
+    params: NDArray[np.void], settings: list[tuple[NDArray[np.intp], Options]], stored: NDArray[np.void], steps: int
+) -> Again:
+    loads, apart = np.empty((len(params), steps, 8, 6), np.float32), np.zeros(len(params))
+    for here, options in settings:
+        found = simulate_rows(params[here], options, "full")
         samples = found.histories["loads"]
-        loads[here] = samples[:, :: max(1, samples.shape[1] // loads.shape[1])]
+        loads[here] = samples[:, :: max(1, samples.shape[1] // steps)]
         for name in ("F_max", "T_max"):
             with np.errstate(invalid="ignore", divide="ignore"):
                 off = np.abs(found.results[name] / stored[name][here] - 1.0)
-            apart = max(apart, float(np.max(off, initial=0.0, where=np.isfinite(off))))
+            largest = off.max(axis=1, initial=0.0, where=np.isfinite(off))
+            apart[here] = np.maximum(apart[here], largest)
     return loads, apart
-
-
-def _pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
-    """Read `slots` of a table that is read by slices; as one slice if they lie close together."""
-    first, last = int(slots[0]), int(slots[-1]) + 1
-    if last - first <= 8 * len(slots):
-        return read(slice(first, last))[slots - first]
-    return np.concatenate([read(slice(slot, slot + 1)) for slot in slots.tolist()])

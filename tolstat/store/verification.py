@@ -16,7 +16,7 @@ from tolstat.store import metadata
 from tolstat.store.checks import DAMAGE_ERRORS
 from tolstat.store.integrity import seal_values, sealed_values
 from tolstat.store.new_file import create_table
-from tolstat.store.result_file import put_attributes, store_error, text
+from tolstat.store.result_file import pick, put_attributes, store_error, text
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -79,8 +79,7 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
         found = f"is damaged: its verification cannot be used: {error}"
         again = f"tolstat verify {store.path}" + (" --near LIMIT" if name == NEAR else "")
         raise store_error(store.path, found, f"make it anew: {again}") from error
-    base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in store.slot(rows).tolist()])
-    return Verification(seed, rows, base, checks)
+    return Verification(seed, rows, pick(store.results, np.asarray(store.slot(rows))), checks)
 
 
 def _read(group: h5py.Group, store: Reader) -> tuple[NDArray[np.intp], dict[str, Check]]:

@@ -91,7 +91,7 @@ def _given_data(load: Load, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         x = load.draw(rng, (n, 3))
-        first, total = (estimate(x, load.of(x)) for estimate in (sensitivity.first_order, sensitivity.total))
+        first, total = sensitivity.first_and_total(x, load.of(x))
         return [
             *(Found(*own) for own in zip(first.lower, first.upper, load.first, strict=True)),
             *(Found(*own) for own in zip(total.lower, total.upper, load.total, strict=True)),

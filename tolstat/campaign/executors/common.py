@@ -14,14 +14,6 @@ ResultT = TypeVar("ResultT")
 POLL_S = 0.2
 """Interval at which a request to stop is checked while workers are busy, s."""
 
-THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "NUMBA_NUM_THREADS",
-)
-
 
 class WorkerDied(TolstatError):
     """Worker processes die whichever block they work on; finished results have been yielded before."""

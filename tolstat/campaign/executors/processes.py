@@ -32,7 +32,6 @@ from typing import Any, Generic, Literal, NamedTuple
 
 from tolstat.campaign.executors.common import (
     POLL_S,
-    THREAD_VARIABLES,
     BlockT,
     Lost,
     ResultT,
@@ -42,6 +41,7 @@ from tolstat.campaign.executors.common import (
 )
 from tolstat.campaign.executors.watch import Watch, shared_memory
 from tolstat.campaign.executors.worker import RAISED, READY, serve
+from tolstat.common.cores import THREAD_VARIABLES
 
 MAX_FAILURES = 2
 """Number of failures at which a single joint is given up."""

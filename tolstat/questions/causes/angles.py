@@ -117,6 +117,21 @@ def against_angle(
     for name in loads:
         if name not in BUSHING_LOADS:
             raise InputError([Fault(name, "is not a load over the shaft angle", did_you_mean(name, BUSHING_LOADS))])
+    nominal, samples = evaluated(view, joints)
+    found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]))
+    errors = view.errors(samples, sampling.columns(view.study))
+    x = scattering(sampling.components(view.study, errors))
+    return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
+
+
+def evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """File slots of the nominal joint, (1,), if it settled, else (0,); and the samples that `against_angle` evaluates.
+
+    Raises
+    ------
+    StoreError
+        As `against_angle`.
+    """
     view.check_drawn()
     view.check_sample(allow_weights=False)
     if view.study.groups:
@@ -126,11 +141,7 @@ def against_angle(
     if len(samples) < MIN_JOINTS:
         too_few = f"has {len(samples)} settled joints to evaluate"
         raise StoreError(str(Fault(str(view.path), too_few, f"{MIN_JOINTS} are needed: run more joints")))
-    nominal = view.nominal_slots[view.nominal["status"] == Status.OK]
-    found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]))
-    errors = view.errors(samples, sampling.columns(view.study))
-    x = scattering(sampling.components(view.study, errors))
-    return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
+    return view.nominal_slots[view.nominal["status"] == Status.OK], samples
 
 
 def modulus(found: Revolutions, load: str) -> FloatArray:

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.ranks import ranks
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import PINS
@@ -173,7 +173,7 @@ def _scattering(errors: NDArray[np.void]) -> list[str]:
 
 def _spearman(x: FloatArray, y: FloatArray) -> float:
     """Rank correlation; 0 if one of the two does not scatter."""
-    a, b = rankdata(x), rankdata(y)
-    if np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0
+    a, b = ranks(np.column_stack([x, y])).T
     return float(np.corrcoef(a, b)[0, 1])

@@ -144,11 +144,13 @@ def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> C
     names, x = list(own), np.column_stack(list(own.values()))
     y = values[:MAX_JOINTS]
     response = np.log(y) if log else y
-    first = sensitivity.first_order(x, response, confidence, view.iid)
     ranks = regression.ranks(x, y, confidence, view.iid)
-    parts: dict[str, NamedTuple] = {"first": first, "srrc": ranks}
-    if not study.copula.names and not study.sampling.is_matched:
-        parts["total"] = sensitivity.total(x, response, confidence, view.iid)
+    parts: dict[str, NamedTuple] = {"srrc": ranks}
+    if study.copula.names or study.sampling.is_matched:
+        first = parts["first"] = sensitivity.first_order(x, response, confidence, view.iid)
+    else:
+        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, view.iid)
+        parts["first"] = first
     level = _tail_level(load)
     above = values > level
     if overrepresentation.FEWEST <= above.sum() <= above.size - overrepresentation.FEWEST:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.loads import BUSHING_LOADS, unit_text
@@ -76,6 +77,11 @@ def section(view: View, loads: Sequence[str], against: Sequence[AgainstAngle], h
     at = " --point POINT" if len(view.points) > 1 else ""
     blocks.append(Text(f"To simulate one of them again: tolstat replay FILE --row ROW{at} --out trace.csv", small=True))
     return Section("worst", "The worst joints", blocks)
+
+
+def drawn(view: View, load: str) -> NDArray[np.intp]:
+    """Samples of the worst joints whose loads over the revolution are drawn, ascending."""
+    return np.unique(worst_joints(view, load, DRAWN).samples)
 
 
 def _table(tail: Tail) -> Table:

@@ -1,0 +1,39 @@
+"""Functions evaluated in forked processes: the same results, also where a process fails or is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from tolstat.common.aside import CAN_FORK, Aside, mapped
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3, 9])
+def test_results_come_in_the_order_of_the_functions(processes: int) -> None:
+    assert mapped([lambda i=i: i * i for i in range(5)], processes) == [0, 1, 4, 9, 16]
+    assert mapped([], processes) == []
+
+
+def test_a_function_is_evaluated_in_another_process() -> None:
+    assert (Aside(os.getpid).result() != os.getpid()) == CAN_FORK
+    assert Aside(os.getpid, forks=False).result() == os.getpid()
+
+
+def test_what_was_killed_is_evaluated_here() -> None:
+    parent = os.getpid()
+
+    def killed() -> int:
+        if os.getpid() != parent:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 7
+
+    aside = Aside(killed)
+    assert aside.result() == aside.result() == 7
+
+
+def test_what_fails_raises_where_the_result_is_asked_for() -> None:
+    aside = Aside(lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        aside.result()

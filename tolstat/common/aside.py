@@ -1,0 +1,72 @@
+"""Functions evaluated in other processes while this one goes on: forks of it, which need no start and no copies.
+
+Where there is no fork that is safe (outside Linux), functions are evaluated here. Results do not depend on that.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from multiprocessing.connection import Connection
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+CAN_FORK = sys.platform == "linux"
+
+
+class Aside(Generic[T]):
+    """A function that is being evaluated in a forked process.
+
+    Parameters
+    ----------
+    function : callable
+        Function without arguments; its result must be picklable. It must not write to files that this process has open.
+    forks : bool
+        Whether to fork; otherwise the function is evaluated here when its result is asked for.
+    """
+
+    def __init__(self, function: Callable[[], T], forks: bool = True) -> None:
+        self._function = function
+        self._found: list[T] = []
+        self._process = None
+        if forks and CAN_FORK:
+            context = multiprocessing.get_context("fork")
+            self._end, other = context.Pipe(duplex=False)
+            self._process = context.Process(target=_send, args=(function, other), daemon=True)
+            self._process.start()
+            other.close()
+
+    def result(self) -> T:
+        """Result of the function; where its process failed or was killed, it is evaluated here, and may raise."""
+        if not self._found and self._process is not None:
+            with suppress(EOFError, OSError):  # the process has ended without its result
+                self._found.append(self._end.recv())
+            self._end.close()
+            self._process.join()
+            self._process = None
+        if not self._found:
+            self._found.append(self._function())
+        return self._found[0]
+
+
+def _send(function: Callable[[], object], end: Connection) -> None:
+    try:
+        end.send(function())
+    except BaseException:  # the parent evaluates the function again, and raises what there is to raise
+        end.close()
+
+
+def mapped(functions: Sequence[Callable[[], T]], processes: int) -> list[T]:
+    """Results of functions, in their order, evaluated in so many processes: every other one here, if these are two."""
+    parts = [functions[first::processes] for first in range(min(processes, max(1, len(functions))))]
+    others = [Aside(partial(_all, part)) for part in parts[1:]]
+    found = [_all(parts[0]), *(other.result() for other in others)]
+    return [found[i % len(parts)][i // len(parts)] for i in range(len(functions))]
+
+
+def _all(functions: Sequence[Callable[[], T]]) -> list[T]:
+    return [one() for one in functions]

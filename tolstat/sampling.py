@@ -2,7 +2,9 @@
 
 The errors of joint i depend on the seed, i and the error's name only: not on the number of joints, not on which
 others are drawn with it, and not on other errors that are added to the study later. There are two exceptions: `lhs` has
-as many strata as joints, and with `pick_freeze` the number of joints per point depends on the number of groups.
+as many strata as joints, and with `pick_freeze` the number of joints per point depends on the number of groups. Joints
+that share a lot have the same scores of the lot, whose number follows from i. With selective assembly the class of
+joint i has a stream of its own, and its diameters depend on the tolerances of all diameters.
 """
 
 from __future__ import annotations

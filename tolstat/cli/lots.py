@@ -65,7 +65,7 @@ def lots(
     accepted = float("nan") if accept is None else parse_share(accept)
     if source.suffix == ".toml":
         path = out or Path(f"{source.stem}_lots.h5")
-        run.simulate(query.study_of(source, number, joints), path, execution=Execution("processes", workers))
+        run.simulate(query.study_of(source, number, joints), path, execution=Execution(workers=workers))
     elif number or joints or out:
         remedy = "give a study, or remove --lots, --joints and --out"
         raise InputError([Fault(str(source), "holds its lots already", remedy)])

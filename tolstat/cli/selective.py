@@ -53,7 +53,7 @@ def selective(
     for plan in plans:
         assert plan.sampling.selective is not None
         paths.append(out / f"{study_file.stem}_k{plan.sampling.selective.classes}.h5")
-        run.simulate(plan, paths[-1], execution=Execution("processes", workers))
+        run.simulate(plan, paths[-1], execution=Execution(workers=workers))
     with progress("selective assembly"), ExitStack() as opened:
         found = query.assembled([opened.enter_context(Reader.open(path)).view() for path in paths])
     with output_folder(out), style.settings():

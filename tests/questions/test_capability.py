@@ -64,7 +64,7 @@ def test_interval_of_quantiles_covers_for_a_skew_load():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("load", [norm(), lognorm(0.25), t(6)])
+@pytest.mark.parametrize("load", [lognorm(0.25), t(6)])
 def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(load):
     n, limit, seeds = 1000, float(load.ppf(0.999)), 200
     truth, missed = (limit - load.mean()) / (3.0 * load.std()), {"own": [0, 0], "of a normal load": [0, 0]}
@@ -78,7 +78,7 @@ def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(loa
             missed[name][0] += low > truth
             missed[name][1] += high < truth
     assert max(missed["own"]) <= seeds * (0.025 + 2.5 * np.sqrt(0.025 * 0.975 / seeds))
-    assert max(missed["of a normal load"]) > 0.05 * seeds or load.kwds == load.args == ()
+    assert max(missed["of a normal load"]) > 0.04 * seeds
 
 
 def test_no_index_of_a_long_tail_and_no_interval_of_few_joints():

@@ -157,14 +157,14 @@ def invert(m, b):
 
 @njit
 def multiply_columns(m, b, c):
-    """Replace matrix `c` of `m` by matrix `b` times it."""
+    """Replace matrix `c` of `m`, shape (n, 6, 6), by matrix `b` times it."""
     for j in range(6):
         put_column(m, c, j, product(m, b, column(m, c, j)))
 
 
 @njit
 def subtract_product(m, o, a, b):
-    """Subtract matrix `a` of `m` times matrix `b` from matrix `o`."""
+    """Subtract matrix `a` of `m`, shape (n, 6, 6), times matrix `b` from matrix `o`."""
     for j in range(6):
         put_column(m, o, j, plus_product(column(m, o, j), m, a, minus(column(m, b, j))))
 

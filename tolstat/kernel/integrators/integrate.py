@@ -29,9 +29,9 @@ from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.kernel.simd.lane import where
 
 BDF2, GENERALIZED_ALPHA, TR_BDF2 = int(Method.BDF2), int(Method.GENERALIZED_ALPHA), int(Method.TR_BDF2)
-SLOW, SLOW_WITH_ERROR_CONTROL = 0.1, 0.2
-"""Ratio of successive residuals above which the tangent is renewed. Where errors control the steps, these are so short
-that a tangent serves many of them."""
+SLOW, SLOW_OF_OTHERS = 0.1, 0.2
+"""Ratio of successive residuals above which the tangent is renewed, with BDF2 and with other methods. Where errors
+control the steps of these, they are so short that a tangent serves many."""
 STALLED = 0.2
 """Ratio of successive residuals, or its inverse, between which the iteration has stalled."""
 ROUNDOFF = 10 * 2.0**-52
@@ -147,7 +147,7 @@ def at_rounding(cv, ca, fresh, options, work, state):
 @njit
 def renewal_ratio(options):
     """Ratio of successive residuals above which the tangent is renewed."""
-    return SLOW_WITH_ERROR_CONTROL if options.rtol > 0 else SLOW
+    return SLOW if options.method == BDF2 else SLOW_OF_OTHERS
 
 
 def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding):

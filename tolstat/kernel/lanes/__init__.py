@@ -14,6 +14,8 @@ joint : int
     Row of the joint among those simulated together.
 words : ndarray, shape (n, words)
     The memory of `rows` as doubles.
+starts : ndarray, shape (n, 55)
+    Where the search for each joint's start begins, see `revolution.starts`.
 steps : ndarray of int, shape (n,)
     Steps of the first revolution of each joint.
 left : ndarray of int, shape (n,)

@@ -164,7 +164,7 @@ def multiply_columns(m, b, c):
 
 @njit
 def subtract_product(m, o, a, b):
-    """Subtract matrix `a` of `m` times matrix `b` from matrix `o`; `m`: (n, 6, 6)."""
+    """Subtract matrix `a` of `m`, shape (n, 6, 6), times matrix `b` from matrix `o`."""
     for j in range(6):
         put_column(m, o, j, plus_product(column(m, o, j), m, a, minus(column(m, b, j))))
 

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from tests.support import synthetic
 from tolstat.analysis import accuracy, exceedance, prediction
-from tolstat.campaign import near, verify
+from tolstat.campaign import checks, near, verify
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
@@ -43,10 +43,8 @@ def path(tmp_path, monkeypatch):
         base = store.results()[slots]
         other = base.copy()
         other["F_max"] *= 1.02
-        checks = {name: Check("", {}, base.copy()) for name in verify.QUICK_CHECKS} | {
-            "reference": Check("", {}, other)
-        }
-        return Verification(0, store.row(slots), base, checks)
+        made = {name: Check("", {}, base.copy()) for name in checks.QUICK_CHECKS} | {"reference": Check("", {}, other)}
+        return Verification(0, store.row(slots), base, made)
 
     monkeypatch.setattr(verify, "check_slots", check_slots)
     text = synthetic.STUDY.replace("n = 60", "n = 400").partition("[limits]")[0]

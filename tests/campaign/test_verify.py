@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 from tests.support import fakes, synthetic
 from tolstat import cli, joint, sampling, study
 from tolstat.analysis import accuracy
+from tolstat.campaign import checks, verify
 from tolstat.campaign import run as campaign
-from tolstat.campaign import verify
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.solver_options import from_names
 from tolstat.common.tables import LOAD_KINDS, Method, Options, Simulation, Start, Status
@@ -96,7 +96,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
 @pytest.mark.slow
 def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows[-1:]])
-    here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
+    here = checks.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
     for name in ("F_max", "T_max"):  # with other threads LAPACK rounds otherwise, and Radau takes other steps
         np.testing.assert_allclose(coarse.checks["reference"].results[name][-1], here[name][0], rtol=1e-6)
     assert [(counts.done, counts.total) for counts in told] == [(k, 6) for k in range(7)]
@@ -110,22 +110,22 @@ def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):
     for name in ("newton", "settling"):
         assert force_and_torque(coarse.base, coarse.checks[name].results).max() < 1e-3 * np.median(true)
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows])
-    fine = verify.run_checks(params, [Options(steps_per_rev=90)] * len(params), ("half_step",))["half_step"]
+    fine = checks.run_checks(params, [Options(steps_per_rev=90)] * len(params), ("half_step",))["half_step"]
     assert fine.options["steps_per_rev"] == 180
     assert np.median(force_and_torque(fine.results, reference)) < 0.05 * np.median(true)
 
 
 def test_each_check_changes_what_it_says():
     options = Options()
-    assert verify.options_of_check(options, "half_step") == options._replace(steps_per_rev=360)
-    assert verify.options_of_check(options, "newton").newton_tol == pytest.approx(1e-8)
-    settling = verify.options_of_check(options, "settling")
+    assert checks.options_of_check(options, "half_step") == options._replace(steps_per_rev=360)
+    assert checks.options_of_check(options, "newton").newton_tol == pytest.approx(1e-8)
+    settling = checks.options_of_check(options, "settling")
     assert (settling.settle_tol, settling.start) == (pytest.approx(1e-6), Start.RAMP)
     for method in Method:
-        assert verify.options_of_check(options._replace(method=int(method)), "method").method != method
+        assert checks.options_of_check(options._replace(method=int(method)), "method").method != method
     # types of the fields decide which compiled code runs
-    for name in verify.ALL_CHECKS:
-        assert [type(x) for x in verify.options_of_check(options, name)] == [type(x) for x in options]
+    for name in checks.ALL_CHECKS:
+        assert [type(x) for x in checks.options_of_check(options, name)] == [type(x) for x in options]
 
 
 def test_the_seed_chooses_the_joints():
@@ -170,13 +170,13 @@ def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
         assert found is not None
         assert found.rows.tolist() == verify.choose(np.flatnonzero(store.status()[1:] == Status.OK) + 1, 2, 7).tolist()
         assert np.array_equal(found.base, store.results()[found.rows])
-    assert tuple(found.checks) == verify.QUICK_CHECKS
+    assert tuple(found.checks) == checks.QUICK_CHECKS
     for name, check in found.checks.items():
         # the invented solver knows no settings but the number of steps
         expected = found.base.copy()
         expected["steps"] *= 2 if name == "half_step" else 1
         assert np.array_equal(check.results, expected)
-        assert from_names(check.options) == verify.options_of_check(Options(steps_per_rev=30), name)
+        assert from_names(check.options) == checks.options_of_check(Options(steps_per_rev=30), name)
     with ResultStore.open_to_write(path) as store:
         verification.write(store, found._replace(rows=found.rows[:1], checks={}))
         again = verification.read(store)
@@ -211,8 +211,8 @@ def off_by(path, factor, rows=(5, 9)):
         true = base.copy()
         for name in ("F_max", "T_max", "contact_max", "psi_max"):
             true[name] *= factor
-        checks = {name: Check("", {}, base) for name in verify.QUICK_CHECKS} | {"reference": Check("", {}, true)}
-        verification.write(store, Verification(1, np.array(rows), base, checks))
+        made = {name: Check("", {}, base) for name in checks.QUICK_CHECKS} | {"reference": Check("", {}, true)}
+        verification.write(store, Verification(1, np.array(rows), base, made))
 
 
 @pytest.mark.slow
@@ -270,11 +270,11 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
     assert done.exit_code == 0, done.stderr
     found = json.loads(done.stdout)
     assert len(found["rows"]) == 2
-    assert list(found["checks"]) == list(verify.ALL_CHECKS)
+    assert list(found["checks"]) == list(checks.ALL_CHECKS)
     assert found["kinds"]["reference"]["F"]["joints"] == 2
     assert found["loads"]["half_step"]["cross1.T"]["worst"] > 0
     table = pd.read_csv(out)
-    assert len(table) == 2 * len(verify.ALL_CHECKS) * len(accuracy.OBSERVABLES)
+    assert len(table) == 2 * len(checks.ALL_CHECKS) * len(accuracy.OBSERVABLES)
     with Reader.open(path) as store:
         kept = verification.read(store)
         assert kept is not None
@@ -284,7 +284,7 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
         assert part["value"].tolist() == kept.checks["reference"].results["T_max"][:, 5].tolist()
     lines = call("verify", plan_path, "--joints", 1).stdout.splitlines()
     assert lines[0].split() == ["load", "error", "joints", "median", "95", "%", "below", "worst"]
-    assert len(lines) == 1 + len(LOAD_KINDS) * (len(verify.ALL_CHECKS) + 1)
+    assert len(lines) == 1 + len(LOAD_KINDS) * (len(checks.ALL_CHECKS) + 1)
 
 
 def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
@@ -312,7 +312,7 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
         "500 rpm", "1000 rpm"
     )
-    found = verify.check_study(study.load(written(tmp_path, text)), joints=1, names=(*verify.QUICK_CHECKS, "reference"))
+    found = verify.check_study(study.load(written(tmp_path, text)), joints=1, names=(*checks.QUICK_CHECKS, "reference"))
     true = force_and_torque(found.base, found.checks["reference"].results)
     seen = force_and_torque(found.base, found.checks["fidelity"].results)
     assert true.min() > 5e-4  # the inertia of bodies that deviate from the ideal motion

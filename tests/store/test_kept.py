@@ -237,7 +237,7 @@ def test_reports_show_what_there_is() -> None:
     assert list(query.quantiles(made)["load"].unique()) == held
     assert list(query.curves(made)["load"].unique()) == held
     assert texts(exceedance.figure(made)).count("not kept by the study") == 2
-    assert "cross1.T, cross2.T" in made.missing()
+    assert "cross1.T, cross2.T" in query.not_kept(made)
     assert query.limits(made)["estimate"].between(0, 1).all()
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.accuracy import LEAST_NEAR
 from tolstat.campaign import verify
-from tolstat.campaign.verify import QUICK_CHECKS, Progress, no_progress
+from tolstat.campaign.checks import QUICK_CHECKS, Progress, no_progress
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS, Limit, load_of, split
@@ -59,7 +59,7 @@ def check_near(
     joints : int
         Number of joints for each load of the limit, at least `LEAST_NEAR`.
     names : iterable of str
-        As in `verify.run_checks`, the same at each call.
+        As in `checks.run_checks`, the same at each call.
     on_start, workers, progress
         As in `verify.check_file`.
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, quantile
-from tolstat.campaign import verify
+from tolstat.campaign import checks, verify
 from tolstat.campaign.progress import Tell, kernels, silent
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
@@ -295,7 +295,7 @@ def _check(study: Study, params: NDArray[np.void], simulation: Simulation, optio
     if not settled.size:
         return 0.0
     begin = time.process_time()
-    verify.run_checks(params[settled], [options[i] for i in settled.tolist()], verify.QUICK_CHECKS, simulate_rows)
+    checks.run_checks(params[settled], [options[i] for i in settled.tolist()], checks.QUICK_CHECKS, simulate_rows)
     return time.process_time() - begin
 
 

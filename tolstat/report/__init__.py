@@ -107,6 +107,8 @@ def build(
     folder = None if out_dir is None else Path(out_dir)
     try:
         stage("report")
+        from tolstat.questions.exceedance import query
+
         with viewed(source) as view:
             store = view.store
             folder = view.path.parent if folder is None else folder
@@ -120,7 +122,8 @@ def build(
                 if view.method == "sweep"
                 else _exceedance(view, stem, width, accepted, processes)
             )
-            for note in (view.missing(), _stopped(store.stop) if store.stop.get("reached") else "", stands_on):
+            stopped = _stopped(store.stop) if store.stop.get("reached") else ""
+            for note in (query.not_kept(view), stopped, stands_on):
                 report = _noted(report, note)
             return report
     except OSError as error:

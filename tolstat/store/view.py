@@ -397,10 +397,4 @@ class View:
         if all(self.points):
             *others, last = self.points
             text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"
-        text += f", {self.counts.shortfall}"
-        return text + (f", {pending} still pending" if pending else "")
-
-    def missing(self) -> str:
-        """Sentence that names the bushing loads that the study does not keep; empty if it keeps all."""
-        names = [name for name in BUSHING_LOADS if name not in self.bushing_loads]
-        return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
+        return f"{text}, {self.counts.shortfall}" + (f", {pending} still pending" if pending else "")

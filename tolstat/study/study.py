@@ -1,4 +1,4 @@
-"""Studies and cases: the only reader of their TOML files."""
+"""Studies, read from their TOML files."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results, shown
-from tolstat.common.errors import Fault, InputError
+from tolstat.common import selected_results
 from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
-from tolstat.common.strict import with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import AFFECT_NOTHING, Joint, Operation
 from tolstat.study import listing
 from tolstat.study.axes import Axis
+from tolstat.study.case import Case
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
@@ -33,58 +32,6 @@ from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.fits import Fit
 from tolstat.study.tolerances.lots import Lot
-
-
-@dataclass(frozen=True, repr=False)
-class Case:
-    """One joint to be simulated.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    text : str
-        The file as read.
-    joint : Joint
-        Nominal joint.
-    operation : Operation
-        Operating point.
-    solver : Solver
-        Numerical settings.
-    errors : dict
-        Error name to deviation (SI).
-    """
-
-    path: Path
-    text: str
-    joint: Joint
-    operation: Operation
-    solver: Solver
-    errors: dict[str, float]
-
-    @property
-    def name(self) -> str:
-        """Name of the file without folder and ending."""
-        return self.path.stem
-
-    def fault(self, key: str, found: str, remedy: str) -> Fault:
-        """Fault of a key of the file, with its line."""
-        (lined,) = with_lines([Fault(f"{self.path}: {key}", found, remedy)], str(self.path), self.text)
-        return lined
-
-    def __repr__(self) -> str:
-        errors = f"{len(self.errors)} errors" if self.errors else "no errors"
-        return f"<case {self.name!r}: one joint, {errors}, {self.solver.fidelity}>"
-
-    def _repr_html_(self) -> str:
-        return shown.table(repr(self)[1:-1], self._entries())
-
-    def _entries(self) -> list[tuple[str, object]]:
-        """Named values that a notebook shows."""
-        solver, turned = self.solver, Point("", self.operation).in_words
-        words = f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution"
-        errors = ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none"
-        return [("file", str(self.path)), ("operation", turned), ("solver", words), ("fixed errors, SI", errors)]
 
 
 @dataclass(frozen=True, repr=False)
@@ -279,32 +226,6 @@ class Study(Case):
     def _operation_identity(self) -> dict[str, Any]:
         named = {point.name: point.operation.model_dump() for point in self.points}
         return named.get("", named)
-
-
-def load_case(path: str | Path) -> Case:
-    """Read a case file: one joint with its errors.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file.
-    """
-    file = StudyFile(Path(path), ("joint", "operation", "errors", "solver"))
-    if "sampling" in file.data:
-        raise InputError(
-            [Fault(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")]
-        )
-    joint = file.joint()
-    operation = file.model("operation", Operation, required=True)
-    solver = file.model("solver", Solver)
-    errors = file.errors()
-    if solver is not None:
-        file.check_one_joint(solver)
-    file.finish()
-    assert joint is not None
-    assert operation is not None
-    assert solver is not None
-    return Case(file.path, file.text, joint, operation, solver, errors)
 
 
 SECTIONS = (

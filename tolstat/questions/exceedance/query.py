@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import ALL_LIMITS, load_of, unit_text
+from tolstat.common.loads import ALL_LIMITS, BUSHING_LOADS, load_of, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
@@ -231,3 +231,9 @@ def summary(view: View, confidence: float) -> dict[str, Any]:
         "at_points": text.records(at_points(view)),
         "quantiles": text.records(quantiles(view, confidence)) if view.shown_loads else [],
     }
+
+
+def not_kept(view: View) -> str:
+    """Sentence that names the bushing loads that the study does not keep; empty if it keeps all."""
+    names = [name for name in BUSHING_LOADS if name not in view.bushing_loads]
+    return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""

@@ -55,7 +55,7 @@ def _note(view: View) -> str:
         said += f" Triangle: the joint without errors.{_beyond(view)}"
     if len(view.points) > 1:
         said += " Loads are the largest over all operating points, unless they name some."
-    missing = view.missing()
+    missing = query.not_kept(view)
     return f"{said} {text.sentence(missing)}" if missing else said
 
 

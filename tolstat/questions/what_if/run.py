@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tolstat.campaign import what_if as sets
+from tolstat.campaign.checks import no_progress
 from tolstat.campaign.executors import kept_workers
 from tolstat.campaign.progress import clock, silent
-from tolstat.campaign.verify import no_progress
 from tolstat.campaign.what_if import Asked, Wanted
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, StoreError

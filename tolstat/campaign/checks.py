@@ -1,0 +1,162 @@
+"""Checks of the numerical error: joints are simulated again with other settings or another solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.campaign import blocks
+from tolstat.campaign.blocks import Execution
+from tolstat.campaign.executors import Lost, Work, kept_workers, map_in_processes, map_serially
+from tolstat.campaign.supervised import supervised
+from tolstat.common.solver_options import to_names
+from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
+from tolstat.store import Counts
+from tolstat.store.verification import Check
+
+QUICK_CHECKS = ("half_step", "newton", "settling")
+"""Checks at the end of every run; they need no code beyond that of the run."""
+ALL_CHECKS = (*QUICK_CHECKS, "method", "reference")
+MIN_STEPS = 180
+"""Minimum steps per revolution of the dynamic simulation that checks one of lower fidelity."""
+DESCRIPTION = {
+    "half_step": "twice as many steps a revolution",
+    "newton": "a hundredth of solver.newton_tol",
+    "settling": "the other solver.start, and a hundredth of solver.settle_tol",
+    "method": "another solver.method",
+    "fidelity": "dynamic fidelity instead of a lower one",
+    "reference": "scipy's Radau, rtol 1e-7, largest loads at 2880 angles and all steps",
+}
+
+Simulate = Callable[..., Simulation]
+Progress = Callable[[Counts], None]
+
+
+def no_progress(counts: Counts) -> None:
+    """Report no progress."""
+
+
+def options_of_check(options: Options, check: str) -> Options:
+    """Return the solver options of a check.
+
+    Parameters
+    ----------
+    options : Options
+        Solver options of the campaign.
+    check : str
+        One of `ALL_CHECKS`, or ``fidelity``.
+    """
+    if check == "half_step":
+        return options._replace(steps_per_rev=2 * options.steps_per_rev)
+    if check == "newton":
+        return options._replace(newton_tol=0.01 * options.newton_tol)
+    if check == "settling":
+        other_start = Start.RAMP if options.start == Start.STATIC else Start.STATIC
+        return options._replace(settle_tol=0.01 * options.settle_tol, start=int(other_start))
+    if check == "method":
+        other = Method.BDF2 if options.method == Method.TR_BDF2 else Method.TR_BDF2
+        return options._replace(method=int(other))
+    if check == "fidelity" and options.fidelity != Fidelity.DYNAMIC:
+        steps = max(options.steps_per_rev, MIN_STEPS)
+        return options._replace(fidelity=int(Fidelity.DYNAMIC), steps_per_rev=steps)
+    return options
+
+
+def run_checks(
+    params: NDArray[np.void],
+    options: Sequence[Options],
+    names: Iterable[str],
+    simulate: Simulate | None = None,
+    workers: int = 1,
+    progress: Progress = no_progress,
+) -> dict[str, Check]:
+    """Simulate joints again, once for each check.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (m,)
+        Parameters of the joints.
+    options : sequence of Options
+        Solver options of each joint in the campaign.
+    names : iterable of str
+        Names from `ALL_CHECKS`; ``fidelity`` is added if a joint is below dynamic fidelity.
+    simulate : callable, optional
+        Replaces `simulation.simulate_rows` in supervised processes.
+    workers : int
+        Processes that compute the references, seconds each; their number changes results within the tolerance only.
+    progress : callable
+        Called with the counts of joints whose reference is computed.
+
+    Returns
+    -------
+    dict of str to Check
+    """
+    lower = any(own.fidelity != Fidelity.DYNAMIC for own in options)
+    checks = {}
+    with kept_workers():
+        for name in (*names, *(("fidelity",) if lower else ())):
+            own = [options_of_check(one, name) for one in options]
+            if name == "reference":
+                results = _references(params, own, workers, progress)
+            else:
+                results = solve_by_options(partial(plain, simulate), params, own)
+            checks[name] = Check(DESCRIPTION[name], to_names(own[0]), results)
+    return checks
+
+
+Single = tuple[int, NDArray[np.void], Options]
+"""A joint: its index, its row of PARAM, shape (1,), and its solver options."""
+
+
+def _references(
+    params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
+) -> NDArray[np.void]:
+    """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
+    joints: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
+    work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
+    done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
+    workers = min(workers, len(joints))
+    serial = blocks.default_kind(workers, len(joints)) == "serial"
+    done = map_serially(work, joints) if serial else map_in_processes(work, joints, workers)
+    results, counts = without_results(len(joints), Status.CRASHED), Counts(len(joints), 0, 0, 0)
+    progress(counts)
+    with closing(done):
+        for (i, _, _), result in done:
+            if not isinstance(result, Lost):
+                results[i] = result[0]
+            counts = counts.after(results["status"][i : i + 1])
+            progress(counts)
+    return results
+
+
+def _reference(joint: Single) -> NDArray[np.void]:
+    from tolstat.solver.reference import reference_rows
+
+    _, params, options = joint
+    return reference_rows(params, options)
+
+
+def plain(simulate: Simulate | None, params: NDArray[np.void], options: Options) -> NDArray[np.void]:
+    """Results of joints, (m,) table RESULT, simulated by `simulate`, or in supervised processes."""
+    from tolstat.solver.compilation import warm_up
+    from tolstat.solver.simulation import simulate_rows
+
+    simulate = simulate or supervised(simulate_rows, warm_up, [Options()], Execution())
+    return simulate(params, options, histories="none", n_harmonics=0).results
+
+
+def solve_by_options(
+    solve: Callable[[NDArray[np.void], Options], NDArray[np.void]],
+    params: NDArray[np.void],
+    options: Sequence[Options],
+) -> NDArray[np.void]:
+    """Results of joints with individual options, (m,) table RESULT; one call of `solve` per distinct option set."""
+    results = np.empty(len(params), RESULT)
+    for one in dict.fromkeys(options):
+        here = np.array([own == one for own in options])
+        results[here] = solve(params[here], one)
+    return results

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 
-SOME = 64
-"""Number of joints that tell which kernels a campaign needs."""
+SOME, READ = 64, 4096
+"""Number of joints that tell which kernels a campaign needs, and of the first rows that they are from."""
 
 
 class Interrupted(Exception):
@@ -250,8 +250,11 @@ def _rows_of(study: Study, store: Reader, stages: Stages, rows: NDArray[np.intp]
 
 def _some_joints(study: Study, store: Reader, stages: Stages) -> NDArray[np.void]:
     """Return the parameters of some joints at each point: kernels that none of them needs are not compiled ahead."""
-    rows = np.unique(np.linspace(0, store.n - 1, min(store.n, SOME)).astype(np.intp))
-    return np.concatenate([_rows_of(study.at(one.point or ""), one, stages, rows) for one in store.each()])
+    first = min(store.n, READ)
+    rows = np.unique(np.linspace(0, first - 1, min(first, SOME)).astype(np.intp))
+    errors = store.errors(slice(0, first))[rows]
+    each = [perturbed(study.at(one.point or ""), one.row(rows), errors, stages.perturb) for one in store.each()]
+    return np.concatenate(each)
 
 
 def choose_fidelity(study: Study, stages: Stages | None = None, execution: Execution | None = None) -> dict[str, Any]:

@@ -21,7 +21,7 @@ COMMANDS = [name.replace("_", "-") for names in cli.COMMANDS.values() for name i
 STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
 FEW = {"codes": 'codes = ["LSODA"]', "methods": 'methods = ["bdf2"]', "fidelities": 'fidelities = ["quasistatic"]'}
 """One integrator of each side in ``studies/precision.toml``."""
-SHORT = {"rare": ("--n", "100", "--repeats", "1"), "bench coverage": ("--seeds", "20")}
+SHORT = {"rare": ("--n", "100", "--repeats", "1"), "bench": ("--joints", "16"), "bench coverage": ("--seeds", "20")}
 """Options with which an example takes seconds."""
 
 

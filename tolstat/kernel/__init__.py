@@ -1,1 +1,66 @@
-"""Jitted mechanics on plain arrays: no units, no files, no Python objects, failures as a status."""
+"""Jitted mechanics on plain arrays: no units, no files, no Python objects, failures as a status.
+
+An argument means what stands here in every function whose docstring does not say otherwise, or, for some folders and
+files, in their docstrings. "Read as lanes" means that each number of a record is one per joint, see `simd.lane`.
+
+Arguments
+---------
+t : float
+    Time, s; theta is omega t.
+h : float
+    Length of a step, s.
+q, v, a : ndarray, shape (55,)
+    Unknowns and their first and second derivatives; m and rad, per s, per s^2. Textbook equations have (n,).
+cv, ca : float
+    dv/dq (1/s) and da/dq (1/s^2) of the integration formula.
+level : int
+    Number of times that a step of the output grid, or a cell of the mesh, is halved.
+stage : int
+    Stage of the integration method, from 0.
+fresh : bool
+    Whether the last correction was made with a new tangent.
+par : record of PARAM
+    The joint, in SI units.
+rows : ndarray of PARAM, shape (n,)
+    Several joints.
+options : Options
+    Numerical settings.
+work : record of WORK, or DenseWork
+    Scratch of an evaluation: bodies, stations, loads, blocks of the tangent.
+state : record of State
+    Trial point, accepted points, counters of the integrator.
+ring : Ring
+    Samples of the last revolution, closure errors, and samples of the closer look.
+samples : ndarray of SAMPLE, shape (steps_per_rev,)
+    The last revolution; point k of the output grid is sample k modulo its length.
+notes : record of NOTES
+    Closure errors.
+fine : ndarray of SAMPLE, shape (3,)
+    Last parts of a closer look, or of a cell.
+alone : Scratch
+    All work arrays of one joint.
+past : Past
+    What error-controlled and explicit steps keep from one revolution to the next.
+trail : Trail
+    Moduli of the bushing loads and statistics of the last revolutions.
+turns : record of TURNS
+    Number of the revolution, and what has been found so far.
+out : ndarray, or record of KERNEL_RESULT
+    Written: the result.
+lane : int
+    Number of the lane; 0 for a single joint.
+body : int
+    Number of the body, as in `mechanics.topology`.
+bushing : int
+    Number of the bushing, 0 to 7, as in `mechanics.topology`.
+pin : int
+    Number of the pin, 0 to 3.
+status : int
+    How a joint has ended, a `Status`.
+counters : ndarray of int, shape (6,)
+    Work so far, indices as in `integrators.state`.
+loads : ndarray, shape (N_LOADS,)
+    Values of all loads at one instant, N, N m or 1.
+mask : bool, read as lanes
+    Joints that the function applies to.
+"""

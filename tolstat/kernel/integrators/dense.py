@@ -188,7 +188,10 @@ def build_differences(acceleration):
 
 
 def build_given(acceleration, force, tangent, mass=None, divided=False):
-    """Build `factorise` of `integrate.build_integrator` with the user's `tangent`; arguments as in `build_dense`."""
+    """Build `factorise` of `integrate.build_integrator` with the user's `tangent`; other arguments as in `build_dense`.
+
+    `acceleration`: as `build_acceleration` returns it from the same `force`, `mass` and `divided`.
+    """
 
     @njit_inner
     def mass_moves(t, q, v, a, cv, ca, work):

@@ -32,7 +32,7 @@ def rate(t, y, par, options, work, out):
 
 @njit
 def jacobian(t, y, par, options, work, column, out):
-    """Write d(rate)/dy to `out`, (110, 110), by forward differences; `column`, (3, 110), is scratch; see `rate`."""
+    """Write d(rate)/dy at `y` to `out`, (110, 110), by forward differences; `column`, (3, 110), is scratch."""
     base, moved, there = column[0], column[1], column[2]
     rate(t, y, par, options, work, base)
     copy(y, moved)
@@ -47,13 +47,13 @@ def jacobian(t, y, par, options, work, column, out):
 
 @njit
 def rate_of_row(t, y, params, options, works, out):
-    """`rate` with `params` and `works` of shape (1,): Python passes arrays to kernels faster than records."""
+    """`rate` at `y`, with `params` and `works` of shape (1,): Python passes arrays to kernels faster than records."""
     rate(t, y, params[0], options, works[0], out)
 
 
 @njit
 def jacobian_of_row(t, y, params, options, works, column, out):
-    """`jacobian` with `params` and `works` of shape (1,), as in `rate_of_row`."""
+    """`jacobian` at `y`, scratch `column`, with `params` and `works` of shape (1,), as in `rate_of_row`."""
     jacobian(t, y, params[0], options, works[0], column, out)
 
 

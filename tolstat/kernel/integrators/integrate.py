@@ -142,7 +142,10 @@ def at_rounding(cv, ca, fresh, options, work, state):
 
 
 def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding):
-    """Bind a system to Newton's iteration; arguments and returned function as in `build_integrator`."""
+    """Bind a system to Newton's iteration.
+
+    `residual`, `factorise`, `solve`, `size`, `small` and the returned function are those of `build_integrator`.
+    """
 
     @njit_inner
     def newton(t, cv, ca, par, options, work, state):

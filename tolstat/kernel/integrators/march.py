@@ -13,12 +13,13 @@ OK, NEWTON_FAILED, NOT_FINITE = int(Status.OK), int(Status.NEWTON_FAILED), int(S
 
 
 def build_march(force, tangent=None, mass=None, divided=False):
-    """Bind a system to the integrator; arguments as for `dense.build_dense`.
+    """Bind a system to the integrator; `force`, `tangent`, `mass` and `divided` are those of `dense.build_dense`.
 
     Returns
     -------
     run : function (t0, t1, options, attempts, matrix, points) -> (status, counters)
-        ``points[0]`` holds q and v at the start; ``points``, shape (steps + 1, 3, n), is filled with q, v, a.
+        From time `t0` to `t1` (s). ``points[0]`` holds q and v at the start; `points`, shape (steps + 1, 3, n), is
+        filled with q, v, a.
         `attempts` is the largest number of sub-steps tried; `matrix` is a constant mass or None.
     """
     acceleration, residual, factorise, solve = build_dense(force, tangent, mass, divided)

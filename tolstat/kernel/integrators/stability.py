@@ -50,9 +50,18 @@ def press_on(h, stiffness, damping):
 
 @njit
 def connect(one, other, on_one, on_other, along, about, work):
-    """Add the forces between points `on_one` and `on_other` of two bodies that move by ``work.vel`` and ``work.spin``.
+    """Add the forces between points of two bodies that move by ``work.vel`` and ``work.spin`` to ``work.force``.
 
-    `along`, `about`: factors of displacement and rotation along e, t, z of body `one`; ``work.force`` is added to.
+    Parameters
+    ----------
+    one, other : int
+        Numbers of the bodies.
+    on_one, on_other : tuple of 3 float
+        The points, m, from the bodies' reference points, in axes of their ideal frame.
+    along, about : tuple of 3 float
+        Factors of displacement (N/m) and rotation (N m) along e, t, z of body `one`.
+    work : record of WORK
+        Scratch.
     """
     here = add(row(work.vel, one), cross(row(work.spin, one), on_one))
     there = add(row(work.vel, other), cross(row(work.spin, other), on_other))
@@ -65,7 +74,7 @@ def connect(one, other, on_one, on_other, along, about, work):
 
 @njit
 def multiply(h, depth, par, work):
-    """Multiply the motion ``work.vel``, ``work.spin`` by h^2/4 K + h C; the product is written to ``work.force``."""
+    """Multiply ``work.vel``, ``work.spin`` by h^2/4 K + h C, stations at `depth` (m), into ``work.force``."""
     for body in range(N_BODIES):
         for k in range(6):
             work.force[body, k] = 0.0

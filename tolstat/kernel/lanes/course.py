@@ -1,18 +1,8 @@
 """Transitions of one lane: through equilibrium, sub-steps, grid points, input angles, and cells.
 
 Each function sets up the next trial point of a lane, or returns how the joint has ended: `NOT_SETTLED` while it
-continues, `OK`, `GIVEN_UP`, or `NEWTON_FAILED`. Arguments:
-
-lane : int
-    Number of the lane.
-par : record of PARAM
-    The lane's joint.
-lanes : tuple
-    Parameters, work and motion of all joints, read as lanes.
-control, motion : records of CONTROL and MOTION
-    Those of the batch, read joint by joint.
-samples, notes, fine, past, out
-    Those of the lane's joint, as in `settle.Ring` and `resolve.Past`, and its row of KERNEL_RESULT.
+continues, `OK`, `GIVEN_UP`, or `NEWTON_FAILED`. `par`, `samples`, `notes`, `fine`, `past` and `out` are those of the
+lane's joint; `control` and `motion` are read joint by joint.
 """
 
 from tolstat.common.tables import MAX_ITERATIONS

@@ -74,7 +74,7 @@ def start_revolution(lane, par, options, batch):
 
 @njit
 def load_joint(lane, joint, rows, words, steps, left, options, alone, batch, samples, past, results):
-    """Put a joint into a lane, at its start; one outside the model ends at once. For the arguments see `explicit`."""
+    """Put a joint into a lane, at its start; one outside the model ends at once."""
     work, state, _, _ = alone
     par, control, motion, out = rows[joint], batch.control, batch.motion, results[joint]
     clear_results(out)
@@ -142,7 +142,7 @@ def arrive(lane, par, lanes, left, options, alone, batch, samples, past, out):
 
 @njit
 def finish_joint(lane, status, left, options, alone, batch, blocks, results):
-    """Write the results of a joint that has ended, and empty its lane; for the arguments see `explicit`."""
+    """Write the results of a joint that has ended, and empty its lane."""
     joint, counters = batch.control.joint[lane], alone.state.counters
     batch.control.count[lane] = 0.0  # is part of the steps by now
     left[joint] -= spent(lane, batch.control)

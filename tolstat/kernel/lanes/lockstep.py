@@ -182,7 +182,7 @@ def next_closeup_step(lane, k, par, options, alone, batch, samples, out):
 def load_joint(lane, joint, rows, words, left, options, alone, batch, samples, results):
     """Put a joint into a lane and set up its start: equilibrium from the pose where all pins just touch, or ramp.
 
-    A joint outside the model ends at once. For the arguments see `lockstep`.
+    A joint outside the model ends at once.
     """
     work, state, _, _ = alone
     par, control, motion = rows[joint], batch.control, batch.motion
@@ -217,7 +217,7 @@ def load_joint(lane, joint, rows, words, left, options, alone, batch, samples, r
 def fill(lane, queued, rows, words, left, options, alone, batch, samples, results):
     """Give an empty lane the next joint of the queue, if there is one; return how many have left the queue.
 
-    `queued` is the number that had left it before; for the other arguments see `lockstep`.
+    `queued` is the number that had left it before.
     """
     while queued < len(rows) and batch.control.live[lane] == 0:
         load_joint(lane, queued, rows, words, left, options, alone, batch, samples, results)

@@ -20,7 +20,7 @@ def markers(i, par):
 
 @njit
 def accumulate(force, body, f, torque):
-    """Add a force `f` (N) and a `torque` (N m), in axes of the body's frame, to row `body`."""
+    """Add a force `f` (N) and a `torque` (N m), in axes of the body's frame, to row `body` of `force`, (11, 6)."""
     for k in range(3):
         force[body, k] += f[k]
         force[body, 3 + k] += torque[k]

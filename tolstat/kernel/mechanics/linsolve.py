@@ -134,14 +134,14 @@ def invert(m, b):
 
 @njit
 def multiply_columns(m, b, columns, c):
-    """Replace the 6 x 6 matrix ``columns[c]`` by ``m[b]`` times it."""
+    """Replace matrix `c` of `columns`, shape (n, 6, 6), by matrix `b` of `m` times it."""
     for j in range(6):
         put_column(columns, c, j, product(m, b, column(columns, c, j)))
 
 
 @njit
 def subtract_product(out, o, left, a, right, b):
-    """out[o] -= left[a] right[b], all 6 x 6."""
+    """Subtract matrix `a` of `left` times matrix `b` of `right` from matrix `o` of `out`; all (n, 6, 6)."""
     for j in range(6):
         put_column(out, o, j, plus_product(column(out, o, j), left, a, minus(column(right, b, j))))
 

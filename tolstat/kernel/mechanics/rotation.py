@@ -96,7 +96,7 @@ def spin_rate(phi, rate, change):
 
 @njit
 def _bias(x, s, phi, rate):
-    """`spin_bias` with given x = |phi|^2 and coefficients `s` = (s1, s2, s3) at x."""
+    """`spin_bias` at `phi` (rad) and `rate` (rad/s), with `x` = |phi|^2 and coefficients `s` = (s1, s2, s3) at x."""
     s1, s2, s3 = s
     small = x < SERIES_BELOW
     ds2 = -1 / 24 + x * (1 / 360 - x * (1 / 13440 - x * (1 / 907200 - x * (1 / 95800320))))

@@ -92,7 +92,7 @@ def plus(a, b):
 
 @njit
 def put(blocks, b, i, j, a):
-    """Add the 3 x 3 matrix with columns `a` to block `b` from row `i` and column `j` on."""
+    """Add the 3 x 3 matrix with columns `a` to block `b` of `blocks`, (n, 6, 6), from row `i` and column `j` on."""
     for k in range(3):
         blocks[b, i + k, j] += a[0][k]
         blocks[b, i + k, j + 1] += a[1][k]
@@ -101,7 +101,7 @@ def put(blocks, b, i, j, a):
 
 @njit
 def take(blocks, b, i, j, a):
-    """Subtract the 3 x 3 matrix with columns `a` from block `b` from row `i` and column `j` on."""
+    """Subtract what `put` adds: columns `a`, block `b` of `blocks`, from row `i` and column `j` on."""
     for k in range(3):
         blocks[b, i + k, j] -= a[0][k]
         blocks[b, i + k, j + 1] -= a[1][k]
@@ -182,7 +182,7 @@ def _directions(pin, j, work):
 
 @njit
 def _add_dyads(pin, n, by_n, m, by_m, work):
-    """Add n by_n^T + m by_m^T to the four blocks of a pin and its arm; vectors of 12: the pin's six, the arm's six."""
+    """Add `n` `by_n`^T + `m` `by_m`^T to the four blocks of a pin and its arm; (12,): the pin's six, the arm's six."""
     body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
     for i in range(6):
         for j in range(6):

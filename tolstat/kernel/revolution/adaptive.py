@@ -44,7 +44,10 @@ def begin_mesh(par, options, memory, weight, past):
 
 @njit
 def adapt_mesh(halved, par, options, memory, weight, past):
-    """Prepare the next revolution; `halved`: number of times that steps had been halved before this one."""
+    """Prepare the next revolution; `halved`: number of times that steps had been halved before this one.
+
+    `memory` and `weight`, those of State, are written.
+    """
     if past.turns.halved > halved:
         memory[TOLERANCE] /= TIGHTER
         refine_mesh(past.mesh)

@@ -37,7 +37,7 @@ def step_length(par, turns):
 
 @njit
 def begin_explicit(steps, par, options, work, past):
-    """Initialise `past` for a joint at its start, with that number of steps a revolution; `work` is scratch."""
+    """Initialise `past` for a joint at its start, with `steps` a revolution."""
     begin_turns(par, options, past)
     past.turns.steps = steps
     past.turns.bearable = largest_force(steps, par, work)
@@ -45,7 +45,7 @@ def begin_explicit(steps, par, options, work, past):
 
 @njit
 def begin_revolution(point, before, par, work, past):
-    """Keep `point` (q, v, a) at the start of a revolution; `before`: steps of the last one; `work` is scratch."""
+    """Keep `point` (q, v, a) at the start of a revolution; `before`: steps of the last one."""
     turns = past.turns
     for i in range(N_DOF):
         past.begun[0, i], past.begun[1, i], past.begun[2, i] = point[0][i], point[1][i], point[2][i]
@@ -66,8 +66,15 @@ def is_stable(force, q, turns):
 def repeat_finer(force, point, par, options, work, past):
     """Return to the start of the revolution with more steps, at most twice as many; return False if there are too many.
 
-    `force`: largest contact force of an end station that was met, N; where it is a consequence of instability, twice
-    as many steps will do.
+    Parameters
+    ----------
+    force : float
+        Largest contact force of an end station that was met, N; where it is a consequence of instability, twice as many
+        steps will do.
+    point : tuple of 3 ndarray
+        Written: q, v, a at the start of the revolution.
+    par, options, work, past
+        As in all kernels.
     """
     turns, n = past.turns, options.steps_per_rev
     wanted = min(steps_for(AMPLE * force, par, options, work), 2 * steps_of(turns))
@@ -84,7 +91,10 @@ def repeat_finer(force, point, par, options, work, past):
 
 @njit
 def walk(par, options, work, motion, control, peaks):
-    """Take steps in all lanes until one of them reaches a point of the output grid."""
+    """Take steps in all lanes until one of them reaches a point of the output grid; `peaks` follows the loads.
+
+    `motion` and `control` are read as lanes, as in `lanes`.
+    """
     h, origin = control.h, control.origin
     while not any_of(control.until <= 0):
         control.count, control.until = control.count + 1, control.until - 1

@@ -44,7 +44,10 @@ def turning_points(x, points):
 
 @njit
 def keep(size, mean, ranges, means):
-    """Insert a cycle into `ranges` and `means`, (k,), in descending order of range; the smallest one drops out."""
+    """Insert a cycle, range `size` about `mean`, into `ranges` and `means`, (k,), in descending order.
+
+    The smallest one drops out.
+    """
     k = ranges.size - 1
     if not size > ranges[k]:
         return

@@ -199,7 +199,10 @@ def largest_change(before, out):
 
 @njit
 def find_period(last, closure, tolerance, turns, trail):
-    """Period, in revolutions, of the motion at the end of revolution `last` (from 0); 0 if it does not repeat."""
+    """Period, in revolutions, of the motion at the end of revolution `last` (from 0); 0 if it does not repeat.
+
+    `closure`: error against the revolution before; the motion repeats where such an error is at most `tolerance`.
+    """
     if closure <= tolerance:
         return 1
     known = last + 1 - turns.since
@@ -222,7 +225,10 @@ def halve_steps(period, turns, out):
 
 @njit
 def repeats(last, options, trail, turns, out):
-    """Whether a joint repeats and its largest loads are resolved or no halving is left; may halve the steps."""
+    """Whether a joint repeats after revolution `last` (from 0), and its largest loads are resolved.
+
+    Loads that no further halving is allowed for count as resolved; others that are not halve the steps.
+    """
     period = find_period(last, out.closure, max(NEARLY, options.settle_tol), turns, trail)
     tired = turns.halved == 0 and last + 1 >= PATIENT
     if period == 0 and not tired:
@@ -270,7 +276,7 @@ def radius_of(i, R):
 
 @njit
 def set_beside(q, v, a, R, turns):
-    """Start the neighbouring motion at distance `APART`, with a difference in all unknowns."""
+    """Start the neighbouring motion at distance `APART`, with a difference in all unknowns; `R`: radius, m."""
     turns.growth = 0.0
     share = APART / math.sqrt(N_DOF)
     for i in range(N_DOF):
@@ -292,7 +298,7 @@ def swap(q, v, a, turns):
 def rescale_neighbour(q, v, a, h, R, turns):
     """Scale the neighbour's difference back to `APART`; return the logarithm of its growth.
 
-    Velocities are weighted by `h`, the step of the output grid, s.
+    Velocities are weighted by `h`, the step of the output grid (s), rotations by `R` (m).
     """
     square = 0.0
     for i in range(N_DOF):

@@ -256,7 +256,7 @@ def is_finite(out):
 
 @njit
 def write_counters(status, steps_per_rev, counters, out):
-    """Write status, step numbers and counters of a joint that has ended."""
+    """Write status, step numbers and counters of a joint that has ended; `steps_per_rev`: of its last revolution."""
     out.status = status
     out.settled = status == OK
     out.steps_per_rev = steps_per_rev

@@ -63,6 +63,11 @@ def test_usual_units_do_not_load_pint() -> None:
     assert subprocess.run([sys.executable, "-c", said], cwd=ROOT, check=False).returncode == 0
 
 
+def test_commands_are_known_before_numpy_reads_the_number_of_threads() -> None:
+    said = "import sys; import tolstat.cli; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", said], cwd=ROOT, check=False).returncode == 0
+
+
 @pytest.mark.parametrize(
     "text",
     [

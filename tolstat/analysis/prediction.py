@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 DELIVERY = 1000
 """Joints of the next delivery, unless another number is given."""
 
@@ -57,6 +55,7 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
 
 def _quantile(share: float, number: int, a: int, b: int) -> float:
     """Quantile of the beta-binomial distribution: least count whose distribution function reaches `share`."""
+    import numpy as np
     from scipy.special import betaln
 
     counts = np.arange(number + 1.0)

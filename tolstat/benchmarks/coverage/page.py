@@ -111,11 +111,13 @@ def _case(found: Coverage, row: Row) -> list[str]:
 
 def _legend(found: Coverage) -> str:
     seeds = max(row.seeds for row in found.rows)
+    fewer = {row.asked.statistic: row.seeds for row in found.rows if row.seeds < seeds}
+    apart = "".join(f"; {name}: 0 to {number - 1}" for name, number in fewer.items())
     return (
-        f"Seeds 0 to {seeds - 1}. Covered: least of the cases, with its 95 % interval, and their median; cases count "
-        f"in which at least {100 * ENOUGH:.0f} % of the seeds give an interval. Above, below: largest share of the "
-        "intervals that lie above the truth, and below it. Given: share of the seeds with an interval. Width: median, "
-        "over that of as many independent joints of equal weight."
+        f"Seeds 0 to {seeds - 1}{apart}. Covered: least of the cases, with its 95 % interval, and their median; cases "
+        f"count in which at least {100 * ENOUGH:.0f} % of the seeds give an interval. Above, below: largest share of "
+        "the intervals that lie above the truth, and below it. Given: share of the seeds with an interval. Width: "
+        "median, over that of as many independent joints of equal weight."
     )
 
 

@@ -23,6 +23,8 @@ ADDED = "an unknown mean can only add to a sum of squares: lower ends lie too hi
 TAKEN_FOR_KNOWN = "the tolerances are taken as exact: the interval of a study without `known_from`"
 CASES = ((30, 1024, 0.05), (30, 4096, 0.005), (50, 1024, 0.002))
 """Measured parts, joints, and share above the level."""
+MOST = 250
+"""Number of seeds: one takes up to a second."""
 Rng = np.random.Generator
 
 
@@ -64,6 +66,7 @@ def _known(load: Load, parts: int, n: int, share: float) -> Experiment:
             Asked("share, parts left out", case, n, fresh, TAKEN_FOR_KNOWN),
         ),
         once,
+        MOST,
     )
 
 

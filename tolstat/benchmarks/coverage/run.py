@@ -136,17 +136,23 @@ def measure(
         raise InputError(
             [Fault("--only", f"no statistic has {only!r} in its name", did_you_mean(only, list(STATISTICS)))]
         )
-    jobs = [(k, range(first, min(first + CHUNK, seeds))) for first in range(0, seeds, CHUNK) for k in numbers]
+    jobs = [
+        (k, range(first, min(first + CHUNK, seeds, every[k].most)))
+        for first in range(0, seeds, CHUNK)
+        for k in numbers
+        if first < every[k].most
+    ]
+    last = {own.start: number for number, (_, own) in enumerate(jobs)}
     parts: dict[int, list[FloatArray]] = {k: [] for k in numbers}
 
     def collect(done: Iterator[FloatArray]) -> Coverage:
         found = Coverage([])
-        for number, ((k, own), judged) in enumerate(zip(jobs, done, strict=True), start=1):
+        for number, ((k, own), judged) in enumerate(zip(jobs, done, strict=True)):
             parts[k].append(judged)
-            if number % len(numbers) == 0:
+            if number == last[own.start]:
                 found = _counted({k: every[k] for k in numbers}, parts, only)
                 keep(found)
-                say(f"{own.stop} of {seeds} seeds")
+                say(f"{min(own.start + CHUNK, seeds)} of {seeds} seeds")
         return found
 
     if workers == 1 or among is not None:

@@ -59,10 +59,13 @@ class Experiment(NamedTuple):
         What is asked.
     once : callable
         Maps a random generator to what an estimator finds from one sample: `Found`, in the order of `asked`.
+    most : int
+        Largest number of seeds; less than the default for samples that take a second.
     """
 
     asked: tuple[Asked, ...]
     once: Callable[[np.random.Generator], Sequence[Found]]
+    most: int = 1_000_000
 
     def run(self, seeds: range) -> FloatArray:
         """Repeat with samples of several seeds.

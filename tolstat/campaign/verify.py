@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import blocks
-from tolstat.campaign.blocks import Execution
 from tolstat.campaign.executors import Lost, Work, kept_workers, map_in_processes, map_serially
 from tolstat.campaign.supervised import supervised
 from tolstat.common import selected_results
@@ -136,9 +135,9 @@ def _references(
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
     joints: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
     work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
-    done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
     workers = min(workers, len(joints))
     serial = blocks.default_kind(workers, len(joints)) == "serial"
+    done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
     done = map_serially(work, joints) if serial else map_in_processes(work, joints, workers)
     results, counts = without_results(len(joints), Status.CRASHED), Counts(len(joints), 0, 0, 0)
     progress(counts)
@@ -162,7 +161,7 @@ def _plain(simulate: Simulate | None, params: NDArray[np.void], options: Options
     from tolstat.solver.compilation import warm_up
     from tolstat.solver.simulation import simulate_rows
 
-    simulate = simulate or supervised(simulate_rows, warm_up, [Options()], Execution())
+    simulate = simulate or supervised(simulate_rows, warm_up, [Options()], blocks.Execution())
     return simulate(params, options, histories="none", n_harmonics=0).results
 
 
@@ -246,8 +245,8 @@ def check_few(store: ResultStore, parameters: Callable[..., NDArray[np.void]], s
     """Check a few joints of a complete campaign and store the checks, unless the file is a slice or has checks."""
     if not (store.complete and store.whole) or verification.read(store) is not None:
         return
-    found = check_campaign(store, parameters, QUICK_CHECKS, few(store.n), int(store.sampling["seed"]), simulate)
-    if found is not None:
+    seed = int(store.sampling["seed"])
+    if found := check_campaign(store, parameters, QUICK_CHECKS, few(store.n), seed, simulate):
         verification.write(store, found)
 
 
@@ -325,8 +324,7 @@ def check_file(
         on_start()
         for one in store.each():
             params = partial(recorded.parameters, one)
-            found = check_campaign(one, params, names, number, seed, None, workers, progress)
-            if found is not None:
+            if found := check_campaign(one, params, names, number, seed, None, workers, progress):
                 verification.write(one, found)
         checked = worst.checks([one for one in map(verification.read, store.each()) if one is not None])
         assert checked is not None
@@ -366,11 +364,10 @@ def _check_at(
     from tolstat.joint import perturb
     from tolstat.sampling import draw
 
-    number = parse_joints(joints)
+    number, seed = parse_joints(joints), plan.sampling.seed if seed is None else seed
     if plan.solver.fidelity == "auto":
         found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
         raise InputError([plan.fault("solver.fidelity", found, remedy)])
-    seed = plan.sampling.seed if seed is None else seed
     first = 0 if number is None else plan.first_sample
     rows = choose(np.arange(first, plan.rows), number, seed)
     params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)

@@ -109,8 +109,8 @@ def check_few(store: ResultStore, parameters: Callable[..., NDArray[np.void]], s
     """Check a few joints of a complete campaign and store the checks, unless the file is a slice or has checks."""
     if not (store.complete and store.whole) or verification.read(store) is not None:
         return
-    found = check_campaign(store, parameters, QUICK_CHECKS, few(store.n), int(store.sampling["seed"]), simulate)
-    if found is not None:
+    seed = int(store.sampling["seed"])
+    if found := check_campaign(store, parameters, QUICK_CHECKS, few(store.n), seed, simulate):
         verification.write(store, found)
 
 
@@ -188,8 +188,7 @@ def check_file(
         on_start()
         for one in store.each():
             params = partial(recorded.parameters, one)
-            found = check_campaign(one, params, names, number, seed, None, workers, progress)
-            if found is not None:
+            if found := check_campaign(one, params, names, number, seed, None, workers, progress):
                 verification.write(one, found)
         checked = worst.checks([one for one in map(verification.read, store.each()) if one is not None])
         assert checked is not None
@@ -229,11 +228,10 @@ def _check_at(
     from tolstat.joint import perturb
     from tolstat.sampling import draw
 
-    number = parse_joints(joints)
+    number, seed = parse_joints(joints), plan.sampling.seed if seed is None else seed
     if plan.solver.fidelity == "auto":
         found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
         raise InputError([plan.fault("solver.fidelity", found, remedy)])
-    seed = plan.sampling.seed if seed is None else seed
     first = 0 if number is None else plan.first_sample
     rows = choose(np.arange(first, plan.rows), number, seed)
     params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)

@@ -43,7 +43,7 @@ def lots(
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print which share of the joints of a lot, and of the next delivery, exceeds each limit.
+    """Print which share of a lot or of a delivery exceeds limits.
 
     Parts of one lot deviate together, as the key lot of an entry of [tolerances] says. Simulates 50 lots of 20 joints
     of STUDY into FILE. To resume after an interruption, run the same command again.

@@ -28,7 +28,7 @@ def selective(
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print yield and unmatched parts of selective assembly over the number of classes.
+    """Print yield and unmatched parts of selective assembly.
 
     Pins and holes are measured and sorted in classes; crosses and forks of equal class are assembled. Simulates one
     campaign for each number of classes, with the same seed, into STUDY_kK.h5; 1 is without sorting. To resume after an

@@ -26,7 +26,7 @@ def sorting(
     wide: Wide = False,
     as_json: AsJson = False,
 ) -> None:
-    """Print yield and cost before and after parts are scrapped and joints are rejected.
+    """Print yield and cost before and after parts are sorted.
 
     Parts are scrapped by the gauge of their entry in [tolerances], joints rejected by [reject]. No joint is simulated:
     each counts by the probability that it is kept.

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 
 import pytest
 
+from tolstat.common import aside
 from tolstat.common.aside import CAN_FORK, Aside, mapped
 
 
@@ -29,11 +31,23 @@ def test_what_was_killed_is_evaluated_here() -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         return 7
 
-    aside = Aside(killed)
-    assert aside.result() == aside.result() == 7
+    other = Aside(killed)
+    assert other.result() == other.result() == 7
+
+
+def test_what_hangs_is_evaluated_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(aside, "STILL_S", 0.1)
+    parent = os.getpid()
+
+    def hangs() -> int:
+        if os.getpid() != parent:
+            time.sleep(1000)
+        return 7
+
+    assert Aside(hangs).result() == 7
 
 
 def test_what_fails_raises_where_the_result_is_asked_for() -> None:
-    aside = Aside(lambda: 1 / 0)
+    other = Aside(lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        aside.result()
+        other.result()

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import time
 from dataclasses import dataclass
 from multiprocessing.context import SpawnContext
-from pathlib import Path
 from typing import Any
 
 from tolstat.campaign.executors.common import POLL_S
+from tolstat.common.cores import processor_time
 from tolstat.common.progress_memory import SIZE
 
 
@@ -45,7 +44,7 @@ class Watch:
         """Begin to watch over another block."""
         self.limit_s, self.joints = limit_s, joints
         self._seen = bytes(self.memory)
-        self._at, (self._used, _) = time.monotonic(), _processor_time(self.pid)
+        self._at, (self._used, _) = time.monotonic(), processor_time(self.pid)
         self._idle = 0.0
 
     def is_over(self) -> bool:
@@ -55,7 +54,7 @@ class Watch:
         """
         if self.limit_s is None:
             return False
-        at, (used, sleeps), seen = time.monotonic(), _processor_time(self.pid), bytes(self.memory)
+        at, (used, sleeps), seen = time.monotonic(), processor_time(self.pid), bytes(self.memory)
         if seen != self._seen:
             self._seen, self._idle, self.joints = seen, 0.0, 1
         elif used > self._used or not sleeps:
@@ -64,13 +63,3 @@ class Watch:
             self._idle += min(at - self._at, 2 * POLL_S)  # this process may have been stopped meanwhile
         self._at, self._used = at, used
         return self._idle > self.limit_s * self.joints
-
-
-def _processor_time(pid: int) -> tuple[float, bool]:
-    """Processor time of a process, s, and whether it sleeps; where the system does not say, the time on the clock."""
-    try:
-        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return time.monotonic(), False
-    state, *fields = text.rpartition(")")[2].split()  # the name of the program, in brackets, may have spaces
-    return (int(fields[10]) + int(fields[11])) / os.sysconf("SC_CLK_TCK"), state == "S"

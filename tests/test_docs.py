@@ -177,6 +177,9 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
         study.write_text(
             study.read_text(encoding="utf-8").replace("[sampling]", f"[output]\n{CHEAP}"), encoding="utf-8"
         )
+    tolstat.run(
+        tolstat.load(made / "studies" / "known_parts.toml", n=60), made / "known_parts.h5", workers=1, check=False
+    )
     few = lots.study_of(made / "studies" / "lots.toml", 30, 2)
     tolstat.run(few, made / "lots_lots.h5", workers=1, check=False)
     for classes in (1, 3):

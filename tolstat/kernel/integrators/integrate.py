@@ -29,11 +29,8 @@ from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.kernel.simd.lane import where
 
 BDF2, GENERALIZED_ALPHA, TR_BDF2 = int(Method.BDF2), int(Method.GENERALIZED_ALPHA), int(Method.TR_BDF2)
-SLOW, SLOW_OF_OTHERS = 0.1, 0.2
-"""Ratio of successive residuals above which the tangent is renewed, with BDF2 and with other methods. Where errors
-control the steps of these, they are so short that a tangent serves many."""
-STALLED = 0.2
-"""Ratio of successive residuals, or its inverse, between which the iteration has stalled."""
+SLOW = 0.2
+"""Ratio of successive residuals above which the tangent is renewed, and the iteration has stalled."""
 ROUNDOFF = 10 * 2.0**-52
 NO, IF_STALLED, YES, LOST = range(4)
 """Does a change end Newton's iteration: no; if the residual stalls; yes; yes, as a failure."""
@@ -144,12 +141,6 @@ def at_rounding(cv, ca, fresh, options, work, state):
     return YES if step <= ROUNDOFF * largest else NO
 
 
-@njit
-def renewal_ratio(options):
-    """Ratio of successive residuals above which the tangent is renewed."""
-    return SLOW if options.method == BDF2 else SLOW_OF_OTHERS
-
-
 def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding):
     """Bind a system to Newton's iteration.
 
@@ -159,20 +150,20 @@ def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding
     @njit_inner
     def newton(t, cv, ca, par, options, work, state):
         q, v, a = state.q, state.v, state.a
-        before, slow = 0.0, renewal_ratio(options)
+        before = 0.0
         negligible = NO
         for iteration in range(options.newton_max_iter + 1):
             residual(t, q, v, a, par, options, work, state.residual)
             now = size(cv, ca, state)
             if now <= options.newton_tol or (negligible == YES and now < 1e300):
                 return True
-            if negligible == IF_STALLED and STALLED * before < now <= before / STALLED:
+            if negligible == IF_STALLED and SLOW * before < now <= before / SLOW:
                 return True
             if not now < 1e300 or iteration == options.newton_max_iter:
                 break
             if state.counters[ITERATIONS] >= state.counters[ALLOWED]:
                 break
-            fresh = state.memory[CV_FACTORISED] != cv or (iteration > 0 and now > slow * before)
+            fresh = state.memory[CV_FACTORISED] != cv or (iteration > 0 and now > SLOW * before)
             last = now <= state.memory[LAST_ITERATION_BELOW] and not fresh
             if fresh:
                 state.memory[CV_FACTORISED] = cv

@@ -5,7 +5,7 @@ lanes that begin a step, stage or angle, and lanes whose trial point is accepted
 """
 
 from tolstat.kernel.integrators import bdf2, trbdf2
-from tolstat.kernel.integrators.integrate import ROUNDOFF, renewal_ratio, scaled_size
+from tolstat.kernel.integrators.integrate import ROUNDOFF, SLOW, scaled_size
 from tolstat.kernel.integrators.state import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP
 from tolstat.kernel.lanes.batch import CHECK
 from tolstat.kernel.mechanics.topology import N_DOF
@@ -102,7 +102,7 @@ def classify_lanes(options, motion, control):
     solved = live & ((checked & (now < ENOUGH)) | (~checked & small))
     failed = live & ~solved & (checked | ~finite | (control.iteration == options.newton_max_iter))
     going = live & ~solved & ~failed
-    slow = (control.iteration > 0) & (now > renewal_ratio(options) * control.before)
+    slow = (control.iteration > 0) & (now > SLOW * control.before)
     stale = going & ((control.factorised != control.cv) | slow)
     control.before = where(going & ~stale, now, control.before)
     moving = going & ~stale

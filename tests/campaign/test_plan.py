@@ -77,7 +77,14 @@ def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400
     return stop_rule.run_until(made, path, stop_rule.parse(RULE, {}), run)
 
 
+@pytest.fixture
+def few_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Looks that are far apart: each one opens the file and starts a run."""
+    monkeypatch.setattr(sequential, "GROWTH", 1.3)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_looks")
 def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     outcome = stopped(path)
@@ -110,6 +117,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_looks")
 def test_workers_and_blocks_do_not_move_the_stop(tmp_path: Path) -> None:
     outcomes = [stopped(tmp_path / "a.h5", 1, 7), stopped(tmp_path / "b.h5", 2, 50), stopped(tmp_path / "c.h5", 1, 999)]
     assert outcomes[0] == outcomes[1] == outcomes[2]
@@ -144,6 +152,7 @@ def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_looks")
 def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.campaign.test_extend import STAGES
 

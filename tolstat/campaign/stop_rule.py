@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tolstat.analysis import exceedance, sequential
+from tolstat.campaign.executors import kept_workers
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import Limit, load_of
@@ -125,23 +126,37 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
             remedy = f"add {', '.join(load.columns)}"
             raise InputError([study.fault("output.results", f"leaves out {load.name}, which --until needs", remedy)])
     scheme = sequential.scheme(rule.bound, sequential.looks(rule.bound, study.samples, _taken(out)), CONFIDENCE)
-    first, look, number, simulated = study.first_sample, None, 0, -1
-    for number, joints in enumerate(scheme.looks):
-        if number > simulated:
-            simulated = number if look is None else scheme.next_look(number - 1, look.above)
-            run(first + scheme.looks[simulated])
-        with Reader.open(out) as store:
-            look = _look(store, rule.limit, range(first, first + joints), scheme, number)
-        if scheme.narrow(number, look.above, look.n_unresolved):
-            break
-    assert look is not None
-    reached = scheme.narrow(number, look.above, look.n_unresolved)
+    with kept_workers():
+        number, look, reached = _looked(study.first_sample, out, rule.limit, scheme, run)
     valid = max(look.joints - look.n_unresolved, 1)
     look = look._replace(estimate=scheme.estimate(number, look.above) * look.joints / valid)
     outcome = Outcome(reached, look, scheme.looks, scheme.confidence)
     with ResultStore.open_to_write(out) as store:
         store.record_stop(outcome.record(rule))
     return outcome
+
+
+def _looked(
+    first: int, out: Path, limit: Limit, scheme: sequential.Scheme, run: Callable[[int], object]
+) -> tuple[int, Look, bool]:
+    """Simulate and look until the rule holds, or the joints end; return the last look, its number, whether it holds.
+
+    `first` is the row of sample 0. The file is opened once for all looks at what has been simulated.
+    """
+    number, simulated = 0, 0
+    while True:
+        run(first + scheme.looks[simulated])
+        with Reader.open(out) as store:
+            while True:
+                look = _look(store, limit, range(first, first + scheme.looks[number]), scheme, number)
+                reached = scheme.narrow(number, look.above, look.n_unresolved)
+                if reached or number == simulated:
+                    break
+                number += 1
+        if reached or number == len(scheme.looks) - 1:
+            return number, look, reached
+        simulated = scheme.next_look(number, look.above)
+        number += 1
 
 
 def _taken(out: Path) -> list[int]:

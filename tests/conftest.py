@@ -99,6 +99,7 @@ def _small_campaigns_in_this_process() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tolstat.campaign.blocks.default_kind", quick)
+        patch.setattr("tolstat.cli.run.MAX_AHEAD", 0)
         yield
 
 

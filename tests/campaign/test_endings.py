@@ -79,6 +79,15 @@ def process(x: int) -> int:
     return os.getpid()
 
 
+def mark() -> None:
+    """Leave a mark in this process."""
+    os.environ["MARKED"] = "yes"
+
+
+def marked_process(x: int) -> tuple[int, bool]:
+    return os.getpid(), "MARKED" in os.environ
+
+
 @contextmanager
 def busy(number: int) -> Iterator[None]:
     """Keep that many processes busy beside this one."""
@@ -177,12 +186,24 @@ def test_ten_busy_processes_beside_change_no_byte(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_workers_are_kept_for_the_same_work() -> None:
+def test_workers_are_kept_for_other_work_too() -> None:
     with kept_workers():
         first, second = (next(iter(dict(map_in_processes(Work(process), [1], 1)).values())) for _ in range(2))
-        other = next(iter(dict(map_in_processes(Work(os.getpgid), [0], 1)).values()))
-    assert first == second != other
+        assert dict(map_in_processes(Work(abs, prepare=mark), [-3], 1)) == {-3: 3}
+        assert dict(map_in_processes(Work(marked_process), [1], 1)) == {1: (first, True)}
+    assert first == second
     assert not running(first)
+
+
+@pytest.mark.slow
+def test_workers_that_are_started_ahead_do_the_first_map() -> None:
+    with kept_workers(2, mark):
+        found = dict(map_in_processes(Work(marked_process), range(8), 2))
+        assert {marked for _, marked in found.values()} == {True}
+        assert len({number for number, _ in found.values()}) <= 2
+    with kept_workers(1, sys.exit):  # a worker that is gone before it gets its work is replaced
+        ((_, marked),) = dict(map_in_processes(Work(marked_process), [1], 1)).values()
+        assert not marked
 
 
 @pytest.mark.slow

@@ -25,7 +25,8 @@ import pytest
 from tests.campaign.test_campaign import datasets, start
 from tests.support import fakes
 from tolstat.campaign import run as campaign
-from tolstat.campaign.blocks import MAX_BLOCK, Execution, Pace, without_simulation
+from tolstat.campaign.block import without_simulation
+from tolstat.campaign.blocks import MAX_BLOCK, Execution, Pace
 from tolstat.campaign.retry import Retry, parse
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status

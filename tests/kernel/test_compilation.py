@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 
 import numba
 import numpy as np
@@ -106,3 +108,16 @@ def test_an_error_in_a_part_names_it():
 
     with pytest.raises(numba.TypingError, match="no_such_thing"):
         caller(1.0)
+
+
+def test_scipy_is_loaded_only_by_code_that_calls_blas():
+    script = (
+        "import sys, numba, numpy as np\n"
+        "from tolstat.kernel.simd.jit import njit_inner\n"
+        "X = np.ones((3, 3))\n"
+        "assert njit_inner(lambda x: x.sum())(X) == 9.0\n"
+        "assert 'scipy.linalg' not in sys.modules\n"
+        "assert numba.njit(lambda x: (x @ x)[0, 0])(X) == 3.0\n"
+        "assert 'scipy.linalg' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import betainc, betaincinv
 
 from tolstat.analysis import pareto
 from tolstat.analysis.exceedance import CURVE, Ends, Exceedance, FloatArray, Table, split
@@ -166,6 +165,8 @@ def _far_end(own: FloatArray, other: FloatArray, tail: float, least: float) -> F
     It is the share at which `other` joints or more would be found with the probability `tail`, if only cases with
     `least` or more are looked at.
     """
+    from scipy.special import betainc, betaincinv
+
     plain: FloatArray = np.asarray(betaincinv(own, other, 1.0 - tail), dtype=float)
     if not least:
         return plain

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import signals, verify
+from tolstat.campaign.block import prepare
 from tolstat.campaign.blocks import (
     Execution,
     Finished,
     Stages,
     compile_missing,
     pending,
-    prepare,
     settings_in_use,
     simulate_pending,
     work_of,

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.campaign import block as one_block
 from tolstat.campaign import blocks
-from tolstat.campaign.blocks import Block, BlockWork, Execution, Timed, status_of
+from tolstat.campaign.block import Block, BlockWork, Timed, simulate_block
+from tolstat.campaign.blocks import Execution, status_of
 from tolstat.campaign.executors import Lost, Work, map_in_processes, map_serially
 from tolstat.campaign.executors.common import never_stop
 from tolstat.common.tables import Options, Simulation, Status, without_results
@@ -68,7 +70,7 @@ def supervised(
     simulate: Simulate, warm_up: Callable[[Options], object], options: Sequence[Options], execution: Execution
 ) -> Supervised:
     """Simulate in workers of their own, which are ready once they have the code that `options` need."""
-    function = partial(blocks.simulate_block, simulate, "none", 0, {})
-    prepare = partial(blocks.prepare, warm_up, list(options))
+    function = partial(simulate_block, simulate, "none", 0, {})
+    prepare = partial(one_block.prepare, warm_up, list(options))
     work: BlockWork = Work(function, Block.split, Block.size, prepare, execution.joint_timeout)
     return Supervised(work, warm_up, execution.kind)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.campaign import blocks, supervised
-from tolstat.campaign.blocks import JOINT_TIMEOUT_S, Block, BlockWork, Execution, Timed
+from tolstat.campaign.block import Block, BlockWork, Timed
+from tolstat.campaign.blocks import JOINT_TIMEOUT_S, Execution
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status
 from tolstat.joint import perturb

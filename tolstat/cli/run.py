@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -12,6 +14,7 @@ import typer
 from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_warnings, tell, width_of
 from tolstat.cli._shortage import check_memory
 from tolstat.cli._talk import fail, progress, say
+from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
@@ -19,6 +22,8 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
+MAX_AHEAD = 4
+"""Largest number of workers that are started before the number of joints is known."""
 
 
 class Executor(StrEnum):
@@ -104,9 +109,6 @@ def run(
     Example: tolstat run studies/iso2768_f.toml --n 512 --out first.h5
     """
     check_memory()
-    from tolstat import study
-    from tolstat.campaign.blocks import Execution
-    from tolstat.campaign.retry import parse
     from tolstat.common.files import check_target
 
     limit, part, again = 0.0, None, None
@@ -120,18 +122,34 @@ def run(
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     with gather(faults):
         check_target(path)  # now, not when the pictures of the report are written
-    with gather(faults):
-        plan = study.load(study_file, n=n)
-        again = None if retry is None else parse(retry, settings or (), plan)
-    if faults:
-        raise InputError(faults)
-    print_study_warnings(study_file, plan)
-    execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
-    if until is None:
-        simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
-    else:
-        simulate(plan, path, until, execution=execution, check=verify)
+    with _workers_ahead(executor, workers):
+        from tolstat import study
+        from tolstat.campaign.blocks import Execution
+        from tolstat.campaign.retry import parse
+
+        with gather(faults):
+            plan = study.load(study_file, n=n)
+            again = None if retry is None else parse(retry, settings or (), plan)
+        if faults:
+            raise InputError(faults)
+        print_study_warnings(study_file, plan)
+        execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
+        if until is None:
+            simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
+        else:
+            simulate(plan, path, until, execution=execution, check=verify)
     conclude(path, report, wide, str(study_file))
+
+
+@contextmanager
+def _workers_ahead(executor: Executor, workers: int | None) -> Iterator[None]:
+    """Start workers inside, which load the kernels while the study is read."""
+    from tolstat.campaign.executors import kept_workers
+    from tolstat.solver.compilation import load
+
+    number = min(workers or available_cores(), MAX_AHEAD) if executor is Executor.PROCESSES else 0
+    with kept_workers(number, load):
+        yield
 
 
 def _cannot_be_combined(
@@ -209,7 +227,6 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
 
     if report:
         with progress("report") as shown:
-            from tolstat.common.cores import available_cores
             from tolstat.report import build
 
             made = build(path, None, width_of(wide), shown.stage, processes=available_cores())

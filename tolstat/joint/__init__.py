@@ -1,19 +1,35 @@
-"""The nominal joint and its errors: joint files, the formulas behind their numbers, and `perturb`."""
+"""The nominal joint and its errors: joint files, the formulas behind their numbers, and `perturb`.
 
-from tolstat.joint.bearing import Bearing
-from tolstat.joint.model import AFFECT_NOTHING, Joint, load
-from tolstat.joint.perturbation import HOLE_OF_PIN, Operation, nominal_errors, operating, perturb
-from tolstat.joint.variant import varied
+Names are imported when first used: a worker process needs none of them.
+"""
 
-__all__ = [
-    "AFFECT_NOTHING",
-    "HOLE_OF_PIN",
-    "Bearing",
-    "Joint",
-    "Operation",
-    "load",
-    "nominal_errors",
-    "operating",
-    "perturb",
-    "varied",
-]
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tolstat.joint.bearing import Bearing as Bearing
+    from tolstat.joint.model import AFFECT_NOTHING as AFFECT_NOTHING
+    from tolstat.joint.model import Joint as Joint
+    from tolstat.joint.model import load as load
+    from tolstat.joint.perturbation import HOLE_OF_PIN as HOLE_OF_PIN
+    from tolstat.joint.perturbation import Operation as Operation
+    from tolstat.joint.perturbation import nominal_errors as nominal_errors
+    from tolstat.joint.perturbation import operating as operating
+    from tolstat.joint.perturbation import perturb as perturb
+    from tolstat.joint.variant import varied as varied
+
+_HOMES = {
+    "bearing": ("Bearing",),
+    "model": ("AFFECT_NOTHING", "Joint", "load"),
+    "perturbation": ("HOLE_OF_PIN", "Operation", "nominal_errors", "operating", "perturb"),
+    "variant": ("varied",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"tolstat.joint.{home}"), name)
+    raise AttributeError(f"module 'tolstat.joint' has no attribute {name!r}")

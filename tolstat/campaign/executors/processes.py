@@ -38,6 +38,7 @@ from tolstat.campaign.executors.common import (
     Work,
     WorkerDied,
     never_stop,
+    no_preparation,
 )
 from tolstat.campaign.executors.watch import Watch, shared_memory
 from tolstat.campaign.executors.worker import RAISED, READY, serve
@@ -102,14 +103,25 @@ def map_in_processes(
 
 
 @contextmanager
-def kept_workers() -> Iterator[None]:
-    """Keep workers that have nothing left to do for the next map inside that does the same work."""
+def kept_workers(started: int = 0, ahead: Callable[[], object] = no_preparation) -> Iterator[None]:
+    """Keep workers that have nothing left to do for the next map inside.
+
+    Parameters
+    ----------
+    started : int, optional
+        Number of workers to start now, so that they are loaded while the caller still prepares the first map.
+    ahead : callable, optional
+        What these do before they know their work, such as loading what it is likely to need; picklable.
+    """
     global _kept
     if _kept is not None:  # somebody above keeps them
         yield
         return
     _kept = []
     try:
+        with one_thread_each(), suppress(OSError):  # a map that finds no worker starts one itself, or says why not
+            for _ in range(started):
+                _kept.append(_start(ahead))
         yield
     finally:
         for worker in _kept:
@@ -127,12 +139,12 @@ class _Task(NamedTuple, Generic[BlockT]):
 
 @dataclass
 class _Worker(Generic[BlockT]):
-    """A process, the pickled work that it does, its pipe, the watch over it, and its block."""
+    """A process, its pipe, the watch over it, the pickled work that it does, and its block."""
 
     process: SpawnProcess
-    work: bytes
     connection: Connection
     watch: Watch
+    work: bytes = b""
     ready: bool = False
     task: _Task[BlockT] | None = None
 
@@ -204,16 +216,12 @@ class _Team(Generic[BlockT, ResultT]):
                     return
                 self._give(worker, task)
         while len(self.workers) < self.size and self._has_task():
-            kept = next((worker for worker in _kept or () if worker.work == self.pickled), None)
-            if kept is None:
-                self.workers.append(_start(self.work, self.pickled))
-                continue
-            assert _kept is not None
-            _kept.remove(kept)
-            self.workers.append(kept)
-            task = self._next_task()
-            if task is not None:
-                self._give(kept, task)
+            worker = _take_kept(self.pickled) or _start()
+            self.workers.append(worker)
+            if worker.work != self.pickled:
+                _give_work(worker, self.pickled)
+            elif (task := self._next_task()) is not None:
+                self._give(worker, task)
 
     def _give(self, worker: _Worker[BlockT], task: _Task[BlockT]) -> None:
         worker.task = task
@@ -301,21 +309,35 @@ def _end_worker(worker: _Worker[Any]) -> None:
     worker.connection.close()
 
 
-def _start(work: Work[Any, Any], pickled: bytes) -> _Worker[Any]:
+def _take_kept(pickled: bytes) -> _Worker[Any] | None:
+    """Return a worker that was kept, if there is one: rather one that does this work than another."""
+    if not _kept:
+        return None
+    worker = next((worker for worker in _kept if worker.work == pickled), _kept[0])
+    _kept.remove(worker)
+    return worker
+
+
+def _give_work(worker: _Worker[Any], pickled: bytes) -> None:
+    worker.work, worker.ready = pickled, False
+    worker.watch.begin(START_LIMIT_S, 1)
+    with suppress(OSError):  # the worker has died: `_receive` will find its pipe closed
+        worker.connection.send_bytes(pickled)
+
+
+def _start(ahead: Callable[[], object] = no_preparation) -> _Worker[Any]:
     """Start a worker; it inherits a mask that blocks signals until `serve` ignores them."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     memory = shared_memory(context)
-    process = context.Process(target=serve, args=(there, work, memory), daemon=True)
+    process = context.Process(target=serve, args=(there, memory, ahead), daemon=True)
     try:
         with signals_blocked():
             process.start()
     finally:
         there.close()
     assert process.pid is not None
-    watch = Watch(process.pid, memory)
-    watch.begin(START_LIMIT_S, 1)
-    return _Worker(process, pickled, here, watch)
+    return _Worker(process, here, Watch(process.pid, memory))
 
 
 def _cause(exit_code: int | None) -> str:

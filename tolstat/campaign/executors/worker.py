@@ -1,4 +1,4 @@
-"""Main loop of a worker process: take blocks from a pipe until the other end is closed."""
+"""Main loop of a worker process: take work and its blocks from a pipe until the other end is closed."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import traceback
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from multiprocessing.reduction import ForkingPickler
 from typing import Any
@@ -21,9 +22,10 @@ F_SETSIG = 10
 """Command of Linux's fcntl that says which signal a file sends; the standard library has no name for it."""
 
 
-def serve(connection: Connection, work: Work[Any, Any], memory: Any) -> None:
+def serve(connection: Connection, memory: Any, ahead: Callable[[], object]) -> None:
     """Process blocks until the parent closes the pipe or ends; signals are ignored, the parent decides when to stop.
 
+    A message is either `Work`, which all blocks after it are for, or a block. `ahead` is called before the first one.
     `memory`, shared with the parent, shows it that the worker makes progress, see `progress_memory`.
     """
     progress_memory.attach(memory)
@@ -31,14 +33,20 @@ def serve(connection: Connection, work: Work[Any, Any], memory: Any) -> None:
         signal.signal(number, signal.SIG_IGN)
     _kill_with_parent()
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    work.prepare()
-    connection.send((READY, None))
+    ahead()
+    work: Work[Any, Any] | None = None
     while True:
         try:
-            block = connection.recv()
+            message = connection.recv()
         except (EOFError, OSError):
             return
-        connection.send(_answer(work, block))
+        if isinstance(message, Work):
+            work = message
+            work.prepare()
+            connection.send((READY, None))
+        else:
+            assert work is not None
+            connection.send(_answer(work, message))
 
 
 def _answer(work: Work[Any, Any], block: Any) -> tuple[str, Any]:

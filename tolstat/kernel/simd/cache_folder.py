@@ -13,9 +13,8 @@ import stat
 import sys
 import tempfile
 from functools import cache
+from importlib import metadata
 from pathlib import Path
-
-import numba
 
 KERNEL = Path(__file__).parent.parent
 TABLES = ("fields.py", "parameters.py", "tables.py")
@@ -28,7 +27,7 @@ _told = set()
 @cache
 def source_hash() -> str:
     """Hash of everything that compiled kernels depend on: the kernel's sources, the tables' layout, Numba's version."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(metadata.version("numba").encode())  # importing numba takes longer than all else here
     for path in [*sorted(KERNEL.rglob("*.py")), *(KERNEL.parent / "common" / name for name in TABLES)]:
         digest.update(path.relative_to(KERNEL.parent).as_posix().encode())
         digest.update(path.read_bytes())

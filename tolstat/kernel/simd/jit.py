@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,9 @@ try:
     from tolstat.kernel.simd.cache import CheckedCache
 except ImportError:  # likewise: Numba's own cache, without checksums
     from numba.core.caching import FunctionCache as CheckedCache
+
+with suppress(ImportError):  # likewise: slower to start
+    import tolstat.kernel.simd.without_blas  # noqa: F401
 
 OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
 """No ``fastmath``: it removes the checks for NaN. No ``parallel``: the work is divided among processes."""

@@ -17,7 +17,7 @@ from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Options
 from tolstat.store import meanings
-from tolstat.store.integrity import attempt_hash, errors_hash, seal
+from tolstat.store.integrity import attempt_hash, errors_hash
 from tolstat.store.meanings import Meanings
 from tolstat.store.provenance import git_commit, versions
 from tolstat.store.result_file import (
@@ -124,7 +124,7 @@ def fill(
     design: NDArray[np.void] | None,
     origin: Iterable[NDArray[np.void]] | None = None,
 ) -> None:
-    """Fill an empty file with everything but histories, all rows pending.
+    """Fill an empty file with everything but histories, all rows pending; who calls seals it (`integrity`).
 
     Parameters
     ----------
@@ -168,7 +168,6 @@ def fill(
     for group in dict.fromkeys((file, *at_points)):
         for name in GROUPS.keys() & group.keys():
             put_attributes(group[name], {"description": GROUPS[name]})
-    seal(file)
 
 
 def _mark_nominal(file: h5py.File, first: bool) -> None:

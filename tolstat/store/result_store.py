@@ -24,7 +24,7 @@ from tolstat.common.files import atomic_write, check_disk_space, make_parent, re
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store import left_out
 from tolstat.store.histories import HISTORY_BYTES, parts_folder
-from tolstat.store.integrity import attempt_hash, history_checks, results_hash
+from tolstat.store.integrity import attempt_hash, history_checks, results_hash, seal
 from tolstat.store.new_file import attributes, fill, size_of_new, study_attributes
 from tolstat.store.reader import Reader
 from tolstat.store.result_file import copy_open, get, is_at, put, put_attributes, replace, store_error, text
@@ -93,6 +93,7 @@ class ResultStore(Reader):
                 design = study.design[held.start : held.stop] if study.variants else None
                 attrs = attributes(study, specs, dimensions or {}, options, fidelity)
                 fill(file, attrs, held, blocks, design, origin)
+                seal(file)
         except FileExistsError as error:
             raise store_error(
                 path, "exists already", "resume it with its own study, or give another file: --out OTHER.h5"

@@ -77,8 +77,9 @@ def check(file: h5py.File, compressed: str = HISTORIES) -> Layout:
     found = Layout([], {})
     for path, held in objects(file):
         if isinstance(held, h5d.DatasetID):
-            inside = path.split("/")[-2] == compressed
-            named = inside or (path.split("/")[1], path.split("/")[-1]) == (WHAT_IF, "load")
+            parts = path.split("/")
+            inside = parts[-2] == compressed
+            named = inside or (parts[1], parts[-1]) == (WHAT_IF, "load")
             found.datasets[path] = _check_dataset(path, held, size, inside, named)
         for name, attribute in _attributes(held):
             stored = attribute.get_type()

@@ -27,6 +27,7 @@ from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import worst
 from tolstat.store.axes import attach_scales
 from tolstat.store.histories import create_dataset, create_group
+from tolstat.store.integrity import seal
 from tolstat.store.new_file import attributes, fill
 from tolstat.store.recorded import perturbed, settings, variants
 from tolstat.store.result_file import place_of
@@ -360,6 +361,7 @@ def _file_bytes(
     origin = origin_blocks(study, range(n))
     with h5py.File("pilot", "w", driver="core", backing_store=False, block_size=512) as file:
         fill(file, attributes(study, specs, dimensions(), options, choice), range(n), [errors], design, origin)
+        seal(file)
         for point in study.points if specs else ():
             group = create_group(file[place_of(point.name)])
             for name, spec in specs.items():

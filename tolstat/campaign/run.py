@@ -161,8 +161,7 @@ def run(
             if check:
                 stage("check of the numerical error")
                 again = Supervised(work, compile_kernels, execution.kind)
-                for one in store.each():
-                    verify.check_few(one, partial(_rows_of, study.at(one.point or ""), one, stages), again)
+                verify.check_few(store, partial(_rows_of, study, stages), again)
             store.finish()
             store.end_session()
         except KeyboardInterrupt:
@@ -242,10 +241,10 @@ def _check_part(part: range, n: int) -> None:
         raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {n}")])
 
 
-def _rows_of(study: Study, store: Reader, stages: Stages, rows: NDArray[np.intp]) -> NDArray[np.void]:
-    """Return the parameters of the joints in file slots `rows`, (m,) table PARAM."""
+def _rows_of(study: Study, stages: Stages, store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
+    """Return the parameters of the joints in file slots `rows` at the operating point of `store`, (m,) table PARAM."""
     errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
-    return perturbed(study, store.row(rows), errors, stages.perturb)
+    return perturbed(study.at(store.point or ""), store.row(rows), errors, stages.perturb)
 
 
 def _some_joints(study: Study, store: Reader, stages: Stages) -> NDArray[np.void]:

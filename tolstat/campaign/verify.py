@@ -105,13 +105,21 @@ def few(rows: int) -> int:
     return min(max(rows // JOINTS_PER_CHECKED, 1), MAX_CHECKED)
 
 
-def check_few(store: ResultStore, parameters: Callable[..., NDArray[np.void]], simulate: Simulate) -> None:
-    """Check a few joints of a complete campaign and store the checks, unless the file is a slice or has checks."""
-    if not (store.complete and store.whole) or verification.read(store) is not None:
-        return
-    seed = int(store.sampling["seed"])
-    if found := check_campaign(store, parameters, QUICK_CHECKS, few(store.n), seed, simulate):
-        verification.write(store, found)
+def check_few(
+    store: ResultStore, parameters: Callable[[ResultStore, NDArray[np.intp]], NDArray[np.void]], simulate: Simulate
+) -> None:
+    """Check a few joints of a campaign at each operating point at which it is complete, and store the checks.
+
+    Does nothing if the file is a slice, and leaves checks that it has as they are. `parameters` is called with the file
+    at an operating point, and file slots; otherwise as in `check_campaign`.
+    """
+    seed, made = int(store.sampling["seed"]), []
+    for one in store.each() if store.whole else ():
+        if one.complete and verification.read(one) is None:
+            found = check_campaign(one, partial(parameters, one), QUICK_CHECKS, few(one.n), seed, simulate)
+            made += [(one, found)] if found else []
+    if made:
+        verification.write_all(made)
 
 
 def check(

@@ -7,19 +7,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from h5py import h5t
 
-from tolstat.common import selected_results
-from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS
+from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.common.loads import split
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec
 from tolstat.joint import Operation
 from tolstat.store import integrity, layout, metadata
+from tolstat.store.layout import Stored
 from tolstat.store.result_file import FILETYPE, check_column, descriptions, place_of, store_error, text
 from tolstat.study.points import Point
 
@@ -31,8 +33,8 @@ MAX_SAMPLES = 50_000_000
 """Largest number of values in a history of one joint: more than the finest solution of all loads has."""
 
 
-def check_schema(path: Path, file: h5py.File) -> None:
-    """Check that an HDF5 file is a result file that this version can read.
+def check_schema(path: Path, file: h5py.File) -> Mapping[str, Stored]:
+    """Check that an HDF5 file is a result file that this version can read; return its datasets by path.
 
     Raises
     ------
@@ -53,8 +55,10 @@ def check_schema(path: Path, file: h5py.File) -> None:
             else "run its study again: tolstat run STUDY --out OTHER.h5"
         )
         raise store_error(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)
-    if not integrity.is_sealed(file, layout.check(file)):
+    laid_out = layout.check(file)
+    if not integrity.is_sealed(file, laid_out.values):
         raise ValueError("its attributes do not match their checksum")
+    return laid_out.datasets
 
 
 def integer(file: h5py.File, name: str, default: int | None = None) -> int:
@@ -139,8 +143,21 @@ def check_number(sampling: Mapping[str, Any], rows: int) -> None:
         raise ValueError(f"sampling.n is {sampling['n']} in a campaign of {rows} rows")
 
 
-def check_tables(file: h5py.File) -> int:
+def check_tables(
+    file: h5py.File, held: Mapping[str, Stored], results: tuple[Column, ...], specs: Mapping[str, HistorySpec]
+) -> int:
     """Check that every kept column is present with the type and length that its table defines.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The file.
+    held : mapping of str to Stored
+        Its datasets by path.
+    results : tuple of Column
+        Columns of the results that the campaign keeps.
+    specs : mapping of str to HistorySpec
+        Histories that the campaign keeps, if the file includes them.
 
     Returns
     -------
@@ -152,48 +169,39 @@ def check_tables(file: h5py.File) -> int:
     KeyError, ValueError
         With the dataset that is missing or wrong.
     """
-    at_points = [place_of(point) for point in points(file)]
-    status = _dataset(file, f"{at_points[0]}/results/status")
-    n = int(status.shape[0]) if status.ndim == 1 else 0
+    places = [place_of(point).rstrip("/") for point in points(file)]
+    path = f"{places[0]}/results/status"
+    shape = _dataset(held, path).shape
+    n = shape[0] if len(shape) == 1 else 0
     if n < 1:
-        raise ValueError(f"{status.name} has the shape {status.shape}")
-    histories = tuple(check_column(name) for name in metadata.read(file, "histories"))
-    results = selected_results.columns(metadata.read(file, "identity"))
+        raise ValueError(f"{path} has the shape {shape}")
     groups = {
-        "errors": ERROR_COLUMNS,
-        **{f"{place}/results": results for place in at_points},
-        **{f"{place}/ledger": (*LEDGER_COLUMNS, *histories) for place in at_points},
-        **{name: columns for name, (columns, _) in descriptions(file).items()},
+        "/errors": ERROR_COLUMNS,
+        **{f"{place}/results": results for place in places},
+        **{f"{place}/ledger": (*LEDGER_COLUMNS, *map(check_column, specs)) for place in places},
+        **{f"/{name}": columns for name, (columns, _) in descriptions(file).items()},
     }
     for group, columns in groups.items():
         for c in columns:
-            _check_column(_dataset(file, f"{group}/{c.name}"), n, c.dtype)
+            _check(held, f"{group}/{c.name}", (n,), c.dtype)
+    for place, (name, spec) in product(places, specs.items()):
+        if f"{place}/histories" in file:
+            _check(held, f"{place}/histories/{name}", (n, *spec.shape), spec.dtype)
     return n
 
 
-def check_histories(file: h5py.File, specs: dict[str, HistorySpec], n: int) -> None:
-    """Check that histories, if the file includes them, have the shapes and types that its attributes state.
-
-    Raises
-    ------
-    KeyError, ValueError
-        With the dataset that is missing or wrong.
-    """
-    for place, (name, spec) in product(map(place_of, points(file)), specs.items()):
-        if "histories" not in file[place]:
-            continue
-        dataset = _dataset(file, f"{place}/histories/{name}")
-        if dataset.shape != (n, *spec.shape) or dataset.dtype != np.dtype(spec.dtype):
-            raise ValueError(f"{dataset.name} has the shape {dataset.shape} and type {dataset.dtype}")
+def _dataset(held: Mapping[str, Stored], path: str) -> Stored:
+    if path not in held:
+        raise ValueError(f"{path} is missing, or not a dataset")
+    return held[path]
 
 
-def _dataset(file: h5py.File, path: str) -> h5py.Dataset:
-    dataset = file.get(path)
-    if not isinstance(dataset, h5py.Dataset):
-        raise ValueError(f"/{path.strip('/')} is missing, or not a dataset")
-    return dataset
+def _check(held: Mapping[str, Stored], path: str, shape: tuple[int, ...], dtype: str) -> None:
+    found = _dataset(held, path)
+    if found.shape != shape or not found.type.equal(_stored_type(dtype)):
+        raise ValueError(f"{path} is {found}, not {shape} of {np.dtype(dtype)}")
 
 
-def _check_column(dataset: h5py.Dataset, n: int, dtype: str) -> None:
-    if dataset.dtype != np.dtype(dtype) or dataset.shape != (n,):
-        raise ValueError(f"{dataset.name} is {dataset.shape} of {dataset.dtype}, not {(n,)} of {np.dtype(dtype)}")
+@cache
+def _stored_type(dtype: str) -> h5t.TypeID:
+    return h5t.py_create(np.dtype(dtype))

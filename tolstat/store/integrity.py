@@ -97,7 +97,7 @@ def seal(file: h5py.File) -> None:
 
 
 def is_sealed(file: h5py.File, values: list[tuple[str, str, str]]) -> bool:
-    """Whether the attributes of a file, as `layout.check` returns them, match their checksum."""
+    """Whether the attributes of a file, as `layout.check` finds them, match their checksum."""
     return _read(file) == _digest(values)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import h5py
 import numpy as np
@@ -33,8 +33,33 @@ WHAT_IF = "what_if"
 """Group whose sets have the names of their loads as texts."""
 
 
-def check(file: h5py.File, compressed: str = HISTORIES) -> list[tuple[str, str, str]]:
-    """Check the layout of a whole file, and read its attributes in the same walk.
+class Stored(NamedTuple):
+    """Shape and HDF5 type of a dataset."""
+
+    shape: tuple[int, ...]
+    type: h5t.TypeID
+
+    def __str__(self) -> str:
+        return f"{self.shape} of {self.type.dtype}"
+
+
+class Layout(NamedTuple):
+    """What one walk through a file finds.
+
+    Attributes
+    ----------
+    values : list of (str, str, str)
+        What `values` returns.
+    datasets : dict of str to Stored
+        Datasets by path, such as ``/results/status``.
+    """
+
+    values: list[tuple[str, str, str]]
+    datasets: dict[str, Stored]
+
+
+def check(file: h5py.File, compressed: str = HISTORIES) -> Layout:
+    """Check the layout of a whole file; its attributes are read in the same walk.
 
     Parameters
     ----------
@@ -43,33 +68,34 @@ def check(file: h5py.File, compressed: str = HISTORIES) -> list[tuple[str, str, 
     compressed : str
         Name of the groups whose datasets may be compressed; empty for the root.
 
-    Returns
-    -------
-    list of (str, str, str)
-        What `values` returns.
-
     Raises
     ------
     ValueError
         With the first object that is linked from elsewhere, or stored otherwise than this package does.
     """
     size = file.id.get_filesize()
-    found = []
+    found = Layout([], {})
     for path, held in objects(file):
         if isinstance(held, h5d.DatasetID):
-            inside = path.split("/")[-2] == compressed
-            named = inside or (path.split("/")[1], path.split("/")[-1]) == (WHAT_IF, "load")
-            _check_dataset(path, held, size, inside, named)
+            parts = path.split("/")
+            inside = parts[-2] == compressed
+            named = inside or (parts[1], parts[-1]) == (WHAT_IF, "load")
+            found.datasets[path] = _check_dataset(path, held, size, inside, named)
         for name, attribute in _attributes(held):
-            if attribute.get_type().get_class() not in (h5t.STRING, h5t.INTEGER, h5t.FLOAT):
+            stored = attribute.get_type()
+            if stored.get_class() not in (h5t.STRING, h5t.INTEGER, h5t.FLOAT):
                 raise ValueError(f"attribute {name} of {path} is neither text nor number")
-            found.append((path, name, _value(attribute)))
+            found.values.append((path, name, _value(attribute, stored)))
     return found
 
 
 def values(file: h5py.File) -> list[tuple[str, str, str]]:
     """Path, name and value as text of each attribute of a file, in an order that does not depend on how it was made."""
-    return [(path, name, _value(attribute)) for path, held in objects(file) for name, attribute in _attributes(held)]
+    return [
+        (path, name, _value(attribute, attribute.get_type()))
+        for path, held in objects(file)
+        for name, attribute in _attributes(held)
+    ]
 
 
 def objects(holder: h5py.Group) -> Iterator[tuple[str, ObjectID]]:
@@ -108,23 +134,29 @@ def _inside(
 
 def _attributes(held: ObjectID | h5f.FileID) -> Iterator[tuple[str, h5a.AttrID]]:
     """Yield the attributes of an object by name, sorted, but for those of dimension scales."""
-    for k in range(h5a.get_num_attrs(held)):
-        attribute = h5a.open(held, index=k)  # in the order of names
-        if (name := attribute.name) not in OF_SCALES:
-            yield name.decode("utf-8"), attribute
+    names: list[bytes] = []
+    h5a.iterate(held, names.append)
+    for name in sorted(names):
+        if name not in OF_SCALES:
+            yield name.decode("utf-8"), h5a.open(held, name)
 
 
-def _value(attribute: h5a.AttrID) -> str:
+def _value(attribute: h5a.AttrID, stored: h5t.TypeID) -> str:
     """Value of an attribute as text, independent of how HDF5 stores it: texts of fixed and variable length agree."""
-    held = np.empty(attribute.shape, dtype=attribute.dtype)
-    attribute.read(held)
+    if stored.get_class() == h5t.STRING and not stored.is_variable_str() and stored.get_strpad() == h5t.STR_NULLPAD:
+        # nearly all attributes: their bytes are read as they are, since h5py takes as long again to make a dtype
+        held = np.zeros(attribute.shape, f"S{stored.get_size()}")
+        attribute.read(held, mtype=stored)
+    else:
+        held = np.empty(attribute.shape, dtype=attribute.dtype)
+        attribute.read(held)
     plain = held.tolist()
     if isinstance(plain, bytes):
         return plain.rstrip(b"\0").decode("utf-8")
     return plain if isinstance(plain, str) else repr(plain)
 
 
-def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool, texts: bool) -> None:
+def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool, texts: bool) -> Stored:
     made = held.get_create_plist()
     layout = made.get_layout()
     if made.get_external_count() or layout == h5d.VIRTUAL:
@@ -132,14 +164,15 @@ def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool, 
     filters = [made.get_filter(k)[0] for k in range(made.get_nfilters())]
     stored_type = held.get_type()
     itemsize = stored_type.get_size()  # h5py takes ten times as long to make a dtype
-    nbytes = itemsize * math.prod(held.shape)
+    found = Stored(held.shape, stored_type)
+    nbytes = itemsize * math.prod(found.shape)
     if compressed and layout == h5d.CHUNKED:
         if filters != FILTERS:
             raise ValueError(f"{path} is not compressed as histories are")
         chunk = itemsize * math.prod(made.get_chunk())
         if max(nbytes, chunk) > MAX_COMPRESSION * held.get_storage_size():
             raise ValueError(f"{path} is incomplete")
-        return
+        return found
     if layout != h5d.CONTIGUOUS or filters:
         raise ValueError(f"{path} is not stored contiguously")
     kind = stored_type.get_class()
@@ -148,3 +181,4 @@ def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool, 
     offset, stored = held.get_offset(), held.get_storage_size()
     if offset is None or stored < nbytes or offset + stored > size:
         raise ValueError(f"{path} reaches beyond the end of the file")
+    return found

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
+from h5py import h5d, h5ds, h5p, h5s, h5t
 from numpy.typing import NDArray
 
 from tolstat.common import draw_records, selected_results
@@ -16,7 +17,7 @@ from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Options
 from tolstat.store import meanings
-from tolstat.store.integrity import attempt_hash, errors_hash, seal
+from tolstat.store.integrity import attempt_hash, errors_hash
 from tolstat.store.meanings import Meanings
 from tolstat.store.provenance import git_commit, versions
 from tolstat.store.result_file import (
@@ -26,7 +27,9 @@ from tolstat.store.result_file import (
     descriptions,
     link_rows,
     place_of,
+    put,
     put_attributes,
+    put_text,
     text,
 )
 
@@ -121,7 +124,7 @@ def fill(
     design: NDArray[np.void] | None,
     origin: Iterable[NDArray[np.void]] | None = None,
 ) -> None:
-    """Fill an empty file with everything but histories, all rows pending.
+    """Fill an empty file with everything but histories, all rows pending; who calls seals it (`integrity`).
 
     Parameters
     ----------
@@ -165,7 +168,6 @@ def fill(
     for group in dict.fromkeys((file, *at_points)):
         for name in GROUPS.keys() & group.keys():
             put_attributes(group[name], {"description": GROUPS[name]})
-    seal(file)
 
 
 def _mark_nominal(file: h5py.File, first: bool) -> None:
@@ -242,29 +244,35 @@ def create_table(
         link_rows(file, group)
     else:
         group[scale.name.rpartition("/")[2]] = scale
+    extent = h5s.create_simple((n,))
+    kinds = {dtype: _kind(dtype, blank=blocks is None) for dtype in {c.dtype for c in columns}}
     for c in columns:
-        blank = np.nan if np.dtype(c.dtype).kind == "f" else 0
-        dataset = group.create_dataset(
-            c.name, (n,), c.dtype, dcpl=_allocated(c.dtype, blank if blocks is None else None)
-        )
-        dataset.dims[0].attach_scale(row)
-        put_attributes(dataset, {"units": c.unit, "description": c.description})
+        held = h5d.create(group.id, c.name.encode(), kinds[c.dtype][0], extent, kinds[c.dtype][1])
+        h5ds.attach_scale(held, row.id, 0)
+        put_text(held, "units", c.unit)
+        put_text(held, "description", c.description)
         if c.name in codes:
-            meanings.put(dataset, codes[c.name])
+            meanings.put(h5py.Dataset(held), codes[c.name])
     first = 0
     for block in blocks or ():
-        for c in columns:
-            group[c.name][first : first + len(block)] = c.of(block)
+        put(group, np.arange(first, first + len(block)), {c.name: c.of(block) for c in columns})
         first += len(block)
     if blocks is not None and first != n:
         raise ValueError(f"{first} rows of {name} given, {n} expected")
 
 
-def _allocated(dtype: str | None, fill: float | None = None) -> h5py.h5p.PropDCID:
+def _kind(dtype: str, blank: bool) -> tuple[h5t.TypeID, h5p.PropDCID]:
+    """HDF5 type and creation properties of a column; with `blank`, floats are NaN and integers 0 when it is created."""
+    missing = np.nan if np.dtype(dtype).kind == "f" else 0
+    return h5t.py_create(np.dtype(dtype), logical=True), _allocated(dtype, missing if blank else None)
+
+
+def _allocated(dtype: str | None, fill: float | None = None) -> h5p.PropDCID:
     """Creation properties of a dataset that is allocated, and filled with `fill` if given, when it is created."""
-    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
+    properties = h5p.create(h5p.DATASET_CREATE)
+    properties.set_obj_track_times(False)  # as h5py has it: the same file has the same bytes
+    properties.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    properties.set_fill_time(h5d.FILL_TIME_NEVER if fill is None else h5d.FILL_TIME_ALLOC)
     if fill is not None:
         properties.set_fill_value(np.array(fill, dtype))
     return properties

@@ -134,7 +134,7 @@ class Reader(CheckedTables):
         self.path = path
         self._handle = Handle(file)
         attrs = file.attrs
-        checks.check_schema(path, file)
+        held = checks.check_schema(path, file)
         self._read_study_attributes()
         self.created = text(attrs, "created")
         self.git_commit = text(attrs, "git_commit")
@@ -150,7 +150,7 @@ class Reader(CheckedTables):
         self.case_names: tuple[str, ...] = tuple(design["cases"])
         self.variants = tuple(Variant(**variant) for variant in design["variants"])
         self.history_specs = checks.history_specs(file)
-        self.n = checks.check_tables(file)
+        self.n = checks.check_tables(file, held, self.columns, self.history_specs)
         self._left_out = np.zeros(self.n, bool)
         first = checks.integer(file, "first_row", 0)
         self.rows = range(first, first + self.n)
@@ -158,7 +158,6 @@ class Reader(CheckedTables):
         if self.rows.stop > self.campaign_rows:
             raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
         checks.check_number(self.sampling, self.campaign_rows)
-        checks.check_histories(file, self.history_specs, self.n)
         self.point = next(iter(self.points)) if len(self.points) == 1 else None
         self._campaign = campaign_digest(file)
 

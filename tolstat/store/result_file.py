@@ -8,12 +8,14 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from h5py import h5a, h5d, h5g, h5s, h5t
 from numpy.typing import NDArray
 
 from tolstat.common import draw_records, tables
@@ -62,12 +64,25 @@ def campaign_digest(file: h5py.File) -> str:
 def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:
     """Write attributes; texts are fixed-length UTF-8, which MATLAB and Fortran can read, except very long ones."""
     for name, value in values.items():
-        data: Any = value
-        dtype = None
         if isinstance(value, str) and len(value.encode()) <= MAX_FIXED_TEXT:
-            data = value.encode()
-            dtype = h5py.string_dtype("utf-8", max(1, len(data)))
-        holder.attrs.create(name, data, dtype=dtype)
+            put_text(holder.id, name, value)
+        else:
+            holder.attrs.create(name, value)
+
+
+def put_text(held: h5d.DatasetID | h5g.GroupID, name: str, value: str) -> None:
+    """Write a text of at most `MAX_FIXED_TEXT` bytes as an attribute, without h5py's objects: each column has two."""
+    data, own = value.encode(), name.encode()
+    size = max(1, len(data))
+    stored = _text_type(size)
+    if h5a.exists(held, own):
+        h5a.delete(held, own)
+    h5a.create(held, own, stored, h5s.create(h5s.SCALAR)).write(np.array(data, f"S{size}"), mtype=stored)
+
+
+@lru_cache(256)
+def _text_type(size: int) -> h5t.TypeID:
+    return h5t.py_create(h5py.string_dtype("utf-8", size), logical=True)
 
 
 def link_rows(file: h5py.Group, group: h5py.Group) -> None:
@@ -117,11 +132,22 @@ def get(dataset: h5py.Dataset, rows: NDArray[np.intp]) -> NDArray[Any]:
     return np.asarray(dataset[begin : rows.max() + 1][rows - begin])
 
 
-def put(dataset: h5py.Dataset, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
-    """Overwrite the `rows` of a column with `values`, (m,); consecutive rows are written in one piece."""
+def put(group: h5py.Group, rows: NDArray[np.intp], columns: Mapping[str, NDArray[Any]]) -> None:
+    """Overwrite the `rows` of columns of a group with values, (m,) each; consecutive rows are written in one piece.
+
+    The functions of HDF5 are called directly: a block of joints has a hundred columns, and h5py's objects would take
+    most of the time.
+    """
+    if not (len(rows) and columns):
+        return
+    opened = [(h5d.open(group.id, name.encode()), values) for name, values in columns.items()]
+    there = opened[0][0].get_space()  # columns of a group have one length
     ends = [*(np.flatnonzero(np.diff(rows) != 1) + 1), len(rows)]
     for begin, end in pairwise([0, *ends]):
-        dataset[rows[begin] : rows[end - 1] + 1] = values[begin:end]
+        some = h5s.create_simple((end - begin,))
+        there.select_hyperslab((int(rows[begin]),), (end - begin,))
+        for held, values in opened:
+            held.write(some, there, np.ascontiguousarray(values[begin:end]))
 
 
 def open_hdf5(path: Path, mode: str) -> h5py.File:

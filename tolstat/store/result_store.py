@@ -24,7 +24,7 @@ from tolstat.common.files import atomic_write, check_disk_space, make_parent, re
 from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store import left_out
 from tolstat.store.histories import HISTORY_BYTES, parts_folder
-from tolstat.store.integrity import attempt_hash, history_checks, results_hash
+from tolstat.store.integrity import attempt_hash, history_checks, results_hash, seal
 from tolstat.store.new_file import attributes, fill, size_of_new, study_attributes
 from tolstat.store.reader import Reader
 from tolstat.store.result_file import copy_open, get, is_at, put, put_attributes, replace, store_error, text
@@ -93,6 +93,7 @@ class ResultStore(Reader):
                 design = study.design[held.start : held.stop] if study.variants else None
                 attrs = attributes(study, specs, dimensions or {}, options, fidelity)
                 fill(file, attrs, held, blocks, design, origin)
+                seal(file)
         except FileExistsError as error:
             raise store_error(
                 path, "exists already", "resume it with its own study, or give another file: --out OTHER.h5"
@@ -152,12 +153,12 @@ class ResultStore(Reader):
         try:
             if self.history_specs:
                 self._parts.add(rows, simulation.histories)
-            for column in self.columns:
-                if column.name != "status":
-                    self._put(column.name, rows, column.of(results))
+            kept = {c.name: c.of(results) for c in self.columns}
+            status = {"status": kept.pop("status")}
+            put(self._held()["results"], rows, kept)
             self._put_checksums(rows, simulation)
             self._sync()
-            self._put("status", rows, results["status"])
+            put(self._held()["results"], rows, status)
             self._sync()
             self._check_path()
         except OSError as error:
@@ -252,9 +253,9 @@ class ResultStore(Reader):
             for one, slots in each:
                 held = file[one._held().name]
                 ledger, attempt = held["ledger"], np.full(slots.size, len(retries), np.int32)
-                put(ledger["attempt"], slots, attempt)
-                put(ledger["attempt_check"], slots, attempt_hash(get(ledger["errors_check"], slots), attempt))
-                put(held["results/status"], slots, np.full(slots.size, Status.PENDING, np.uint8))
+                check = attempt_hash(get(ledger["errors_check"], slots), attempt)
+                put(ledger, slots, {"attempt": attempt, "attempt_check": check})
+                put(held["results"], slots, {"status": np.full(slots.size, Status.PENDING, np.uint8)})
                 if "histories" in held:
                     del held["histories"]
 
@@ -281,9 +282,6 @@ class ResultStore(Reader):
             remedy = "free disk space for a second copy, and run the same command again; finished joints are kept"
             raise store_error(self.path, f"cannot be replaced: {why}", remedy) from error
 
-    def _put(self, name: str, rows: NDArray[np.intp], values: NDArray[Any]) -> None:
-        put(self._held()["results"][name], rows, values)
-
     def _check_path(self) -> None:
         """Restore the file if it was deleted or replaced; its contents exist as long as it is open.
 
@@ -305,11 +303,11 @@ class ResultStore(Reader):
 
     def _put_checksums(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
         ledger = self._held()["ledger"]
-        for name in self.history_specs:
-            checks = history_checks(simulation.histories[name], self.row(rows))
-            put(ledger[f"{name}_check"], rows, checks)
+        histories, own = simulation.histories, self.row(rows)
+        checks: dict[str, Any] = {f"{name}_check": history_checks(histories[name], own) for name in self.history_specs}
         errors, attempt = (get(ledger[name], rows) for name in ("errors_check", "attempt"))
-        put(ledger["results_check"], rows, results_hash(errors, attempt, simulation.results, self.columns))
+        checks["results_check"] = results_hash(errors, attempt, simulation.results, self.columns)
+        put(ledger, rows, checks)
 
     def _sync(self) -> None:
         self._file.flush()
@@ -324,5 +322,5 @@ class ResultStore(Reader):
 
     def _make_pending(self, rows: NDArray[np.intp]) -> None:
         if rows.size:
-            self._put("status", rows, np.full(rows.size, Status.PENDING, np.uint8))
+            put(self._held()["results"], rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
             self._sync()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
@@ -108,15 +109,26 @@ def _read(group: h5py.Group, store: Reader) -> tuple[NDArray[np.intp], dict[str,
 
 
 def write(store: ResultStore, verification: Verification, name: str = VERIFY) -> None:
-    """Write a verification to a group of a result file, replacing an earlier one.
+    """Write a verification to a group of a result file, replacing an earlier one; otherwise as `write_all`."""
+    write_all([(store, verification)], name)
+
+
+def write_all(found: Sequence[tuple[ResultStore, Verification]], name: str = VERIFY) -> None:
+    """Write verifications at operating points of one file, replacing earlier ones; the file is replaced once for all.
 
     Raises
     ------
     StoreError
         When there is no room for a second copy of the file.
     """
-    where = store._held().name
-    store._replace(lambda file: _write(file[where], name, verification, store.columns))
+    places = [(store._held().name, verification) for store, verification in found]
+    store = found[0][0]
+
+    def change(file: h5py.File) -> None:
+        for where, verification in places:
+            _write(file[where], name, verification, store.columns)
+
+    store._replace(change)
 
 
 def _write(holder: h5py.Group, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:

@@ -40,6 +40,7 @@ _SETTINGS: Any = {
     "axes.titlesize": 11.0,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # where it is put, so that nothing is measured to find out
     "axes.labelsize": 10.0,
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,

@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
 
 from tolstat.common.files import atomic_write
 
@@ -107,7 +108,24 @@ def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> Non
     if high < 100.0 * low:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
+    axis.set_minor_locator(_NearView())
     axis.set_minor_formatter(NullFormatter())
+
+
+class _NearView(LogLocator):
+    """Minor marks in the view: those beyond it, up to a decade on either side, would be made but not drawn."""
+
+    def __init__(self) -> None:
+        super().__init__(subs=None)
+
+    def __call__(self) -> NDArray[np.float64]:
+        assert self.axis is not None
+        low, high = sorted(self.axis.get_view_interval())
+        marks = np.asarray(super().__call__(), float)
+        near: NDArray[np.float64] = marks[
+            (marks > 0.8 * low) & (marks < 1.25 * high)
+        ]  # those half a pixel outside, too
+        return near
 
 
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:

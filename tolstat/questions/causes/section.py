@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tolstat.common.aside import Aside
+from tolstat.common.aside import mapped
+from tolstat.common.errors import TolstatError
 from tolstat.common.loads import BUSHING_LOADS, unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
@@ -58,16 +59,23 @@ def _causes(
     with asked.noting("causes are left out"):
         view.check_sample(allow_weights=False)
         jobs = [partial(causes_of, view, load, log=load in logarithmic, joints=JOINTS) for load in view.leading]
-        # all but the first in forks of this process, which simulate no joints and draw nothing
-        begun = [Aside(job, k > 0 and asked.processes > 1) for k, job in enumerate(jobs)]
-        for load, job in zip(view.leading, begun, strict=True):
+        tried = mapped([partial(_tried, job) for job in jobs], min(asked.processes, 2))
+        for load, job, found in zip(view.leading, jobs, tried, strict=True):
             with asked.noting(f"no causes of {load}"):
-                causes.append(job.result())
+                causes.append(found or job())  # which raises what it raised before
         bushings = [load for load in view.leading if load in BUSHING_LOADS]
         if asked.replay and bushings and not is_design:
             with asked.noting("nothing against the shaft angle"):
                 against = against_angle(view, bushings, asked.replay, logarithmic)
     return causes, against
+
+
+def _tried(job: Callable[[], Causes]) -> Causes | None:
+    """Result of a job; None where it cannot be had."""
+    try:
+        return job()
+    except TolstatError:
+        return None
 
 
 def _section(causes: Sequence[Causes], against: Sequence[AgainstAngle], logarithmic: Container[str]) -> Section:

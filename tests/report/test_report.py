@@ -194,6 +194,30 @@ def test_sweep_page_shows_unsettled_and_failed_joints():
 
 
 @pytest.mark.slow
+def test_two_processes_write_the_same_files(tmp_path):
+    path = synthetic.store(tmp_path, failed=2)
+    one, two = (report.build(path, tmp_path / str(k), accepted=0.1, processes=k) for k in (1, 2))
+    assert (one.table, one.notes) == (two.table, two.notes)
+    assert [file.name for file in one.files] == [file.name for file in two.files]
+    assert len(one.files) == 5
+    assert [file.read_bytes() for file in one.files] == [file.read_bytes() for file in two.files]
+
+
+@pytest.mark.slow
+def test_numbers_need_neither_pandas_nor_matplotlib(tmp_path):
+    path = synthetic.store(tmp_path)
+    code = (
+        "import sys, pathlib; from tolstat import report; from tolstat.store import Reader\n"
+        "path = pathlib.Path(sys.argv[1])\n"
+        "with Reader.open(path) as store:\n"
+        "    found = report._numbers(store.view(), path.with_suffix(''), 80, float('nan'))\n"
+        "print(len(found.files), 'pandas' in sys.modules, 'matplotlib' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.split() == ["3", "False", "False"]
+
+
+@pytest.mark.slow
 def test_report_of_a_random_view(tmp_path):
     path = synthetic.store(tmp_path, failed=2)
     made = report.build(path, width=None)

@@ -15,7 +15,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from tolstat.common.files import atomic_write
 
@@ -118,14 +117,11 @@ class _NearView(LogLocator):
     def __init__(self) -> None:
         super().__init__(subs=None)
 
-    def __call__(self) -> NDArray[np.float64]:
+    def __call__(self) -> Any:
         assert self.axis is not None
         low, high = sorted(self.axis.get_view_interval())
         marks = np.asarray(super().__call__(), float)
-        near: NDArray[np.float64] = marks[
-            (marks > 0.8 * low) & (marks < 1.25 * high)
-        ]  # those half a pixel outside, too
-        return near
+        return marks[(marks > 0.8 * low) & (marks < 1.25 * high)]  # matplotlib draws those half a pixel outside
 
 
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from tolstat.display import text
@@ -33,3 +35,18 @@ def test_both_ends_of_an_interval_have_one_unit(low, high, shown):
 def test_characters_that_cannot_be_seen_are_shown_by_their_code():
     assert visible("a\u202eb\x00\x1b[31m\u2066") == "a[U+202E]b[U+0000][U+001B][31m[U+2066]"
     assert visible("Übermaß –\tΔ\nعربي") == "Übermaß –\tΔ\nعربي"
+
+
+def test_tables_are_written_as_pandas_writes_them(tmp_path):
+    floats = [0.1, 1.0, -0.0, 1e16, 123456789.123456789, 1e-300, 2.0 / 3.0, np.nan, np.inf]
+    floats += np.random.default_rng(1).lognormal(0.0, 30.0, 500).tolist()
+    words = ['a "b", c', "=1+1", "@x", "", "two\nlines", "Δ", None, "-"]
+    n = len(floats)
+    frame = pd.DataFrame(
+        {"load": (words * n)[:n], "x, y": floats, "n": range(n), "some": [None, 1.5, True, "+"] * (n // 4) + [2]}
+    )
+    rows = text.columns_of(frame.astype(object).where(frame.notna(), None).to_dict("records"))
+    text.cells(frame).to_csv(tmp_path / "pandas.csv", index=False, encoding="utf-8", lineterminator="\n")
+    for table, name in ((frame, "frame"), (rows, "rows")):
+        path = text.csv(table, tmp_path / "stem", name)
+        assert path.read_bytes() == (tmp_path / "pandas.csv").read_bytes()

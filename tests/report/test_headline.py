@@ -79,8 +79,7 @@ MISLEADING = {
 
 @pytest.fixture(autouse=True)
 def _without_pictures(monkeypatch):
-    monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
-    monkeypatch.setattr("tolstat.questions.exceedance.rendering.figure", lambda view: None)
+    monkeypatch.setattr("tolstat.report._pictures", lambda view, stem, processes: [])
     monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
 
 

@@ -18,7 +18,7 @@ from tolstat.common.tables import BUSHINGS, Status
 from tolstat.display import style
 from tolstat.display.table import as_text
 from tolstat.joint.derived import DERIVED
-from tolstat.questions.exceedance import query, sweep
+from tolstat.questions.exceedance import curves_figure, query, sweep
 from tolstat.questions.exceedance import rendering as exceedance
 from tolstat.questions.exceedance.swept_axes import swept_axes
 from tolstat.report import joint_values
@@ -56,7 +56,7 @@ def test_dependent_samples_have_no_interval_and_the_note_says_why():
     assert query.limits(made)[["lower", "upper", "outer_upper"]].isna().all(axis=None)
     assert query.limits(made)["bound_upper"].notna().all()
     assert "independent samples only" in exceedance.note(made)
-    assert "95 % band" not in texts(exceedance.figure(made))
+    assert "95 % band" not in texts(curves_figure.figure(made))
 
 
 def test_quantiles_rise_with_the_share():
@@ -84,7 +84,7 @@ def test_unknown_load_names_what_there_is():
 
 def test_picture_states_study_numbers_units_and_limits():
     made = view(failed=3, unsettled=2, limits={"cross1.F": 700.0, "cross2.F": 705.0, "fork1.T": 500.0})
-    figure = exceedance.figure(made)
+    figure = curves_figure.figure(made)
     said = texts(figure)
     assert any(t.startswith("made up") for t in said)
     assert any("200 joints (random sampling), 3 failed, 2 not settled" in t for t in said)
@@ -130,8 +130,8 @@ def overlapping(figure):
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda: exceedance.figure(view(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in BUSHINGS})),
-        lambda: exceedance.figure(view(limits={f"cross{i}.T": 16.0 + i for i in (1, 2, 3, 4)})),
+        lambda: curves_figure.figure(view(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in BUSHINGS})),
+        lambda: curves_figure.figure(view(limits={f"cross{i}.T": 16.0 + i for i in (1, 2, 3, 4)})),
         lambda: sweep.figure(swept(limits={"cross1.F": 800.0})),
         lambda: sweep.figure(swept(9)),
     ],
@@ -146,7 +146,7 @@ def test_a_campaign_without_a_valid_joint_still_gets_a_page(status):
         results["status"] = status
 
     made = view(21, change=change)
-    assert texts(exceedance.figure(made)).count("no joint with a valid result") == 4
+    assert texts(curves_figure.figure(made)).count("no joint with a valid result") == 4
     assert query.curves(made).empty
     share = query.limits(made)["estimate"]
     assert share.isna().all()
@@ -158,7 +158,7 @@ def test_joints_that_are_all_alike_can_be_drawn():
         results["F_max"] = 640.0
 
     made = view(21, change=change)
-    assert len(exceedance.figure(made).axes) == 4
+    assert len(curves_figure.figure(made).axes) == 4
 
 
 def test_sweep_finds_its_axes_and_their_units():
@@ -191,6 +191,30 @@ def test_sweep_page_shows_unsettled_and_failed_joints():
     assert "not settled" in said
     assert "no result" in said
     assert said.count("pin*.diameter [mm]") == 4
+
+
+@pytest.mark.slow
+def test_two_processes_write_the_same_files(tmp_path):
+    path = synthetic.store(tmp_path, failed=2)
+    one, two = (report.build(path, tmp_path / str(k), accepted=0.1, processes=k) for k in (1, 2))
+    assert (one.table, one.notes) == (two.table, two.notes)
+    assert [file.name for file in one.files] == [file.name for file in two.files]
+    assert len(one.files) == 5
+    assert [file.read_bytes() for file in one.files] == [file.read_bytes() for file in two.files]
+
+
+@pytest.mark.slow
+def test_numbers_need_neither_pandas_nor_matplotlib(tmp_path):
+    path = synthetic.store(tmp_path)
+    code = (
+        "import sys, pathlib; from tolstat import report; from tolstat.store import Reader\n"
+        "path = pathlib.Path(sys.argv[1])\n"
+        "with Reader.open(path) as store:\n"
+        "    found = report._numbers(store.view(), path.with_suffix(''), 80, float('nan'))\n"
+        "print(len(found.files), 'pandas' in sys.modules, 'matplotlib' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.split() == ["3", "False", "False"]
 
 
 @pytest.mark.slow
@@ -266,7 +290,7 @@ def test_drawing_leaves_the_callers_settings_alone_and_needs_no_pyplot():
     code = (
         "import sys, matplotlib as m; before = m.rcParams.copy();"
         "from tests.report import test_report as t;"
-        "t.exceedance.figure(t.view(21));"
+        "t.curves_figure.figure(t.view(21));"
         "print(dict.__eq__(before, m.rcParams), 'matplotlib.pyplot' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)

@@ -26,8 +26,7 @@ from tolstat.common.tables import Status
 from tolstat.questions.accuracy import query as accuracy_tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.causes.tail import worst_joints
-from tolstat.questions.exceedance import query, sweep
-from tolstat.questions.exceedance import rendering as exceedance
+from tolstat.questions.exceedance import curves_figure, query, sweep
 from tolstat.store import Reader, integrity, new_file, result_file, verification
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
@@ -236,7 +235,7 @@ def test_reports_show_what_there_is() -> None:
     held = ["cross1.F", "cross2.F", "cross3.F", "cross4.F", "fork2.T"]
     assert list(query.quantiles(made)["load"].unique()) == held
     assert list(query.curves(made)["load"].unique()) == held
-    assert texts(exceedance.figure(made)).count("not kept by the study") == 2
+    assert texts(curves_figure.figure(made)).count("not kept by the study") == 2
     assert "cross1.T, cross2.T" in query.not_kept(made)
     assert query.limits(made)["estimate"].between(0, 1).all()
 

@@ -304,13 +304,16 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
     n, d = errors.shape
     p = _polynomials(errors).reshape(n, d * DEGREE)
     c = (p * left[:, None]).T @ p / n
-    spread = (p**2 * (left**2)[:, None]).T @ p**2 / n
+    square = p**2
+    spread = (square * (left**2)[:, None]).T @ square / n
+    del square  # as large as p
     same = np.kron(np.eye(d, dtype=bool), np.ones((DEGREE, DEGREE), dtype=bool))
     c[same] = spread[same] = 0.0
     blocks = (d, DEGREE, d, DEGREE)
     pairs = ((n * c**2 - spread) / (n - 1)).reshape(blocks).sum(axis=(1, 3)) / variance
-    weighted = ((p @ c) * p).reshape(n, d, DEGREE).sum(axis=2)
-    of_pairs = 2.0 * left[:, None] * weighted / variance
+    weighted = p @ c
+    weighted *= p
+    of_pairs = 2.0 * left[:, None] * weighted.reshape(n, d, DEGREE).sum(axis=2) / variance
     chance: FloatArray = 2.0 * (spread**2).reshape(blocks).sum(axis=(1, 3)) / (n * variance) ** 2
     return pairs, of_pairs, chance
 

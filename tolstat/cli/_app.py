@@ -280,8 +280,9 @@ def print_table(columns: Sequence[Column], frame: pd.DataFrame, wide: bool) -> N
     """Print a table on standard output, and on standard error the columns left out to fit the line."""
     from tolstat.display import table
 
-    typer.echo(table.as_text(columns, frame, width_of(wide)))
-    if missing := table.left_out(columns, frame, width_of(wide)):
+    shown, missing = table.fitted(columns, frame, width_of(wide))
+    typer.echo(shown)
+    if missing:
         say(missing)
 
 

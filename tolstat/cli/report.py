@@ -98,6 +98,6 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None, point: s
                 say(f"{file} has pending joints: the page shows the others, and none over the input angle (--replay)")
         if again and store.sampling["method"] in DRAWN and not held:
             announce_compilation()
-    with progress("page") as shown:
-        page.write_page(file, out, accepted, again, shown.stage, point, available_cores())
+        with progress("page") as shown:
+            page.write_page(store, out, accepted, again, shown.stage, point, available_cores())
     say(f"wrote {out}")

@@ -225,13 +225,13 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
     from tolstat.campaign.remedy import reasons
     from tolstat.store import Reader
 
-    if report:
-        with progress("report") as shown:
-            from tolstat.report import build
-
-            made = build(path, None, width_of(wide), shown.stage, processes=available_cores())
-        tell(made)
     with Reader.open(path) as store:
+        if report:
+            with progress("report") as shown:
+                from tolstat.report import build
+
+                made = build(store, None, width_of(wide), shown.stage, processes=available_cores())
+            tell(made)
         found = reasons(store, {one.point or "": one.status() for one in store.each()})
         for reason in found:
             say(reason.text)

@@ -40,6 +40,7 @@ _SETTINGS: Any = {
     "axes.titlesize": 11.0,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # where it is put, so that nothing is measured to find out
     "axes.labelsize": 10.0,
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,
@@ -106,7 +107,21 @@ def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> Non
     if high < 100.0 * low:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
+    axis.set_minor_locator(_NearView())
     axis.set_minor_formatter(NullFormatter())
+
+
+class _NearView(LogLocator):
+    """Minor marks in the view: those beyond it, up to a decade on either side, would be made but not drawn."""
+
+    def __init__(self) -> None:
+        super().__init__(subs=None)
+
+    def __call__(self) -> Any:
+        assert self.axis is not None
+        low, high = sorted(self.axis.get_view_interval())
+        marks = np.asarray(super().__call__(), float)
+        return marks[(marks > 0.8 * low) & (marks < 1.25 * high)]  # matplotlib draws those half a pixel outside
 
 
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:

@@ -16,12 +16,23 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Row = Mapping[Any, Any]
+Rows = Sequence[Row]
 WIDTH = 80
 """Characters in a line of a table, unless a wide one is asked for."""
 
 
-def _always(_: pd.DataFrame) -> bool:
+def _always(_: Rows) -> bool:
     return True
+
+
+def has(name: str) -> Callable[[Rows], bool]:
+    """`Column.shown` of a column that is shown if any row has a value, not NaN, of this name."""
+    return lambda rows: any(name in row and row[name] is not None and row[name] == row[name] for row in rows)
+
+
+def has_unresolved(rows: Rows) -> bool:
+    """`Column.shown` of a column on joints that failed or did not settle."""
+    return any(row["n_failed"] + row["n_unsettled"] for row in rows)
 
 
 class Column(NamedTuple):
@@ -32,11 +43,11 @@ class Column(NamedTuple):
     head : str
         Heading.
     cell : callable
-        Text of a cell, from its row of the frame.
+        Text of a cell, from its row.
     words : bool
         Whether cells are words, aligned to the left on the page.
     shown : callable
-        Whether the column has anything to show, from the whole frame.
+        Whether the column has anything to show, from all rows.
     rank : int
         Columns of the highest rank are left out first if a line of text is too long; those of rank 0 never.
     """
@@ -44,41 +55,46 @@ class Column(NamedTuple):
     head: str
     cell: Callable[[Row], str]
     words: bool = False
-    shown: Callable[[pd.DataFrame], bool] = _always
+    shown: Callable[[Rows], bool] = _always
     rank: int = 0
 
 
-def cells(columns: Sequence[Column], table: pd.DataFrame) -> list[list[str]]:
-    """Headings, then one row of cells for each row of a frame; without the columns that have nothing to show."""
-    used = [column for column in columns if column.shown(table)]
-    return [[c.head for c in used], *([c.cell(row) for c in used] for row in table.to_dict("records"))]
+def cells(columns: Sequence[Column], table: Rows | pd.DataFrame) -> list[list[str]]:
+    """Headings, then one row of cells for each row of a table; without the columns that have nothing to show."""
+    rows = _rows(table)
+    return _cells([column for column in columns if column.shown(rows)], rows)
 
 
-def as_text(columns: Sequence[Column], table: pd.DataFrame, width: int | None = WIDTH) -> str:
-    """Aligned text of a frame, in lines of at most `width` characters if it can be; None for all columns."""
-    return _text(fitting(columns, table, width), table)
+def as_text(columns: Sequence[Column], table: Rows | pd.DataFrame, width: int | None = WIDTH) -> str:
+    """Aligned text of a table, in lines of at most `width` characters if it can be; None for all columns."""
+    return fitted(columns, table, width)[0]
 
 
-def fitting(columns: Sequence[Column], table: pd.DataFrame, width: int | None = WIDTH) -> list[Column]:
-    """Columns that `as_text` shows."""
-    used = [column for column in columns if column.shown(table)]
-    while width is not None and max(map(len, _text(used, table).splitlines())) > width:
+def fitted(columns: Sequence[Column], table: Rows | pd.DataFrame, width: int | None = WIDTH) -> tuple[str, str]:
+    """Text as of `as_text`, and a sentence that names the columns that it leaves out; empty if there are none."""
+    rows = _rows(table)
+    able = used = [column for column in columns if column.shown(rows)]
+    shown = _text(used, rows)
+    while width is not None and max(map(len, shown.splitlines())) > width:
         last = max(used, key=lambda column: column.rank)
         if not last.rank:
             break
         used = [column for column in used if column is not last]
-    return used
+        shown = _text(used, rows)
+    heads = [column.head for column in able if column not in used]
+    return shown, f"with --wide also: {', '.join(heads)}" if heads else ""
 
 
-def left_out(columns: Sequence[Column], table: pd.DataFrame, width: int | None = WIDTH) -> str:
-    """Sentence that names the columns that `as_text` leaves out; empty if there are none."""
-    used = fitting(columns, table, width)
-    heads = [column.head for column in columns if column.shown(table) and column not in used]
-    return f"with --wide also: {', '.join(heads)}" if heads else ""
+def _rows(table: Rows | pd.DataFrame) -> Rows:
+    return table if isinstance(table, Sequence) else table.to_dict("records")
 
 
-def _text(used: Sequence[Column], table: pd.DataFrame) -> str:
-    return align(cells(used, table), [column.words for column in used])
+def _cells(used: Sequence[Column], rows: Rows) -> list[list[str]]:
+    return [[c.head for c in used], *([c.cell(row) for c in used] for row in rows)]
+
+
+def _text(used: Sequence[Column], rows: Rows) -> str:
+    return align(_cells(used, rows), [column.words for column in used])
 
 
 def plain(table: pd.DataFrame, ranked: Sequence[str] = ()) -> list[Column]:
@@ -95,8 +111,9 @@ def _short(x: Any) -> str:
     return ("-" if math.isnan(x) else f"{x:.5g}") if isinstance(x, float) else str(x)
 
 
-def as_block(title: str, columns: Sequence[Column], table: pd.DataFrame, verdicts: Sequence[str] = ()) -> Table:
-    """Block of the page with a frame; see `blocks.Table`."""
-    head, *rows = cells(columns, table)
-    words = [column.words for column in columns if column.shown(table)]
-    return Table(title, head, rows, frozenset({0} | {i for i, own in enumerate(words) if own}), verdicts)
+def as_block(title: str, columns: Sequence[Column], table: Rows | pd.DataFrame, verdicts: Sequence[str] = ()) -> Table:
+    """Block of the page with a table; see `blocks.Table`."""
+    rows = _rows(table)
+    used = [column for column in columns if column.shown(rows)]
+    head, *body = _cells(used, rows)
+    return Table(title, head, body, frozenset({0} | {i for i, own in enumerate(used) if own.words}), verdicts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from csv import writer
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,12 +36,27 @@ def cells(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**{str(name): table[name].map(cell) for name in words}) if words else table
 
 
-def csv(table: pd.DataFrame, stem: Path, what: str) -> Path:
-    """Write a frame as ``STEM_what.csv``; return its path."""
+def csv(table: Mapping[str, Sequence[Any]] | pd.DataFrame, stem: Path, what: str) -> Path:
+    """Write columns or a frame as ``STEM_what.csv``, NaN as an empty cell; return its path."""
     path = stem.with_name(f"{stem.name}_{what}.csv")
-    with atomic_write(path) as temporary:
-        cells(table).to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+    columns = table if isinstance(table, Mapping) else {str(name): table[name].tolist() for name in table}
+    with atomic_write(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        out = writer(stream, lineterminator="\n")
+        out.writerow(columns)
+        out.writerows(zip(*map(_written, columns.values()), strict=True))
     return path
+
+
+def columns_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Columns of rows that have the same names."""
+    return {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
+
+
+def _written(column: Sequence[Any]) -> list[Any]:
+    """Cells of a column as `csv` writes them."""
+    if str in set(map(type, column)):
+        column = [cell(x) for x in column]
+    return ["" if x is None or x != x else x for x in column]
 
 
 def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:

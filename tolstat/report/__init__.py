@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from tolstat.common.aside import Aside
 from tolstat.common.errors import Fault, InputError
@@ -23,9 +23,6 @@ from tolstat.display.table import WIDTH
 from tolstat.solver import fidelity
 from tolstat.store import Reader, viewed
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 class Report(NamedTuple):
@@ -90,7 +87,7 @@ def build(
         Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; names of files end in it. The worst of
         all by default.
     processes : int
-        Number of processes: with two, on Linux, the pictures of load exceedance are drawn in a fork of this one.
+        Number of processes: with two, on Linux, forks of this one write the numbers and one picture of load exceedance.
 
     Returns
     -------
@@ -136,38 +133,51 @@ def _noted(report: Report, note: str) -> Report:
 
 
 def _exceedance(view: View, stem: Path, width: int | None, accepted: float, processes: int) -> Report:
+    """Report of load exceedance: its numbers in a fork of the process while this one draws, which takes longer."""
+    view.counts, view.verification  # noqa: B018 - read once, for both
+    numbers = Aside(partial(_numbers, view, stem, width, accepted), processes > 1)
+    pictures = _pictures(view, stem, processes) if view.bushing_loads else []
+    found = numbers.result()
+    return found._replace(files=[*pictures, *found.files])
+
+
+def _pictures(view: View, stem: Path, processes: int) -> list[Path]:
     from tolstat.display import style
+    from tolstat.questions.exceedance.curves_figure import figure
+
+    made, path = figure(view), stem.with_name(f"{stem.name}_exceedance")
+    for ax in made.axes:
+        ax.yaxis.get_minorticklabels()  # makes the ticks, which take long, once for both pictures
+    vectors = Aside(partial(style.save, made, path, (".svg",)), processes > 1)
+    return [*style.save(made, path, (".png",)), *vectors.result()]
+
+
+def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Report:
     from tolstat.questions.capability import query as capability
     from tolstat.questions.capability import rendering as capabilities
     from tolstat.questions.exceedance import query, rendering
     from tolstat.report.headline import headline
 
     files, shown, more = [], "no largest load is kept; the results that are: tolstat export", ""
-    pictures = None
-    if view.bushing_loads:
-        figure = rendering.figure(view)
-        pictures = Aside(partial(style.save, figure, stem.with_name(f"{stem.name}_exceedance")), processes > 1)
     if view.shown_loads:
-        files.append(text.csv(query.curves(view), stem, "exceedance"))
-        quantiles = query.quantiles(view)
-        files.append(text.csv(quantiles, stem, "quantiles"))
-        shown, more = _fitted(rendering.quantile_columns(), rendering.by_load(quantiles), width)
+        files.append(text.csv(query.curve_columns(view), stem, "exceedance"))
+        quantiles = query.quantile_rows(view)
+        files.append(text.csv(text.columns_of(quantiles), stem, "quantiles"))
+        shown, more = table.fitted(rendering.quantile_columns(), rendering.by_load(quantiles), width)
     verdict = headline(view, accepted)
     if view.limits:
-        limits = query.limits(view)
-        files.append(text.csv(limits, stem, "limits"))
-        shown, more = _fitted(rendering.LIMITS, limits, width)
-        points = query.at_points(view)
-        if len(points):
-            shown += f"\n\n{rendering.AT_POINTS}\n{_fitted(rendering.at_points(view), points, width)[0]}"
+        limits = query.limit_rows(view)
+        files.append(text.csv(text.columns_of(limits), stem, "limits"))
+        shown, more = table.fitted(rendering.LIMITS, limits, width)
+        if points := query.point_rows(view):
+            shown += f"\n\n{rendering.AT_POINTS}\n{table.as_text(rendering.at_points(view), points, width)}"
     if verdict is not None:
         sentence = text.sentence(verdict.sentence)
         shown = f"{sentence if width is None else textwrap.fill(sentence, width)}\n\n{shown}"
         if verdict.answer and not view.weighted and view.known is None and view.count(*VALID):
-            kept = capabilities.together(capability.limits(view))
+            kept = capabilities.together(capability.limit_rows(view))
             shown += f"\n\nyield: {kept.value} {kept.words}"
     notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]
-    files = [*(pictures.result() if pictures else ()), *files]
     return Report(shown, "\n".join(note for note in notes if note), files)
 
 
@@ -178,7 +188,7 @@ def _sweep(view: View, stem: Path, width: int | None) -> Report:
     files = style.save(sweep.figure(view), stem.with_name(f"{stem.name}_sweep")) if view.bushing_loads else []
     files.append(text.csv(sweep.table(view), stem, "sweep"))
     short = sweep.worst(view)
-    shown, more = _fitted(
+    shown, more = table.fitted(
         table.plain(short, [str(name) for name in short.columns if "." in str(name)][1:]), short, width
     )
     return Report(shown, "\n".join(note for note in (more, view.head(), _accuracy(view)) if note), files)
@@ -196,18 +206,13 @@ def _cases(store: Reader, stem: Path, width: int | None) -> Report:
     full = cases.table(store)
     files = [text.csv(full, stem, "cases")]
     counts, worst = store.counts(), cases.worst(full)
-    shown, more = _fitted(table.plain(worst, ["status", "alpha [deg]", "motion"]), worst, width)
+    shown, more = table.fitted(table.plain(worst, ["status", "alpha [deg]", "motion"]), worst, width)
     notes = "\n".join(
         [*([more] if more else []), f"{counts.done} of {counts.total} joints, {counts.shortfall}", *cases.advice(full)]
     )
     if full["note"].any():
         files.append(_text(cases.markdown(full), stem, "cases.md"))
     return Report(shown, notes, files)
-
-
-def _fitted(columns: Sequence[table.Column], frame: pd.DataFrame, width: int | None) -> tuple[str, str]:
-    """Text of a table, and the sentence on its columns that are left out."""
-    return table.as_text(columns, frame, width), table.left_out(columns, frame, width)
 
 
 def _text(content: str, stem: Path, ending: str) -> Path:

@@ -16,7 +16,6 @@ from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.joints import query as joints
-from tolstat.questions.what_if import rendering as what_if
 from tolstat.store.view import View
 from tolstat.store.worst import point_of
 
@@ -83,7 +82,7 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
     counts = view.counts
     if not counts.done:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
-    records = exceedance.limits(view).to_dict("records")
+    records = exceedance.limit_rows(view)
     found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
     unresolved = _causes(view) if _matter([_decisive(view, records)]) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
@@ -195,8 +194,11 @@ def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
         notes += (_untold(view, records),)
     elif several and worst["count"] and not np.isnan(worst["estimate"]):
         said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
-    better = what_if.advice(view, row["load"], accepted) if answer == "no" else ""
-    said += f". {better}" if better else ""
+    if answer == "no":
+        from tolstat.questions.what_if import rendering as what_if  # draws, which other verdicts need not wait for
+
+        better = what_if.advice(view, row["load"], accepted)
+        said += f". {better}" if better else ""
     return Headline(answer, WORDS[answer], said, notes, worst["load"])
 
 
@@ -246,7 +248,7 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
         if row["load"] == ALL_LIMITS and worst["count"] and not np.isnan(worst["estimate"]):
             said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
         return Headline("", share_of(row), said, notes, worst["load"])
-    found = capabilities.together(capability.limits(view))
+    found = capabilities.together(capability.limit_rows(view))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     return Headline("", found.value, found.words, notes, exceedance.most_exceeded(view, records)["load"])

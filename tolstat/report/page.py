@@ -13,8 +13,7 @@ from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
 from tolstat.display.asked import Asked, silent
 from tolstat.display.blocks import Facts, Listing, Page, Section
-from tolstat.questions.causes import section as causes
-from tolstat.report import html, joint_values, verdict
+from tolstat.questions.causes import ahead
 from tolstat.solver import fidelity
 from tolstat.store import viewed
 from tolstat.store.integrity import DIGEST
@@ -80,6 +79,8 @@ def write_page(
             raise StoreError(str(Fault(str(view.path), "lists its joints one by one", remedy)))
         made = compose(view.at(point), Asked(view.path, accepted, replay, stage=stage, processes=processes))
         stage("page: pictures")  # drawn from the view
+        from tolstat.report import html
+
         html.write(made, Path(out), processes)
     return Path(out)
 
@@ -89,6 +90,9 @@ def compose(view: View, asked: Asked) -> Page:
 
     What cannot be evaluated is left out, and a note in the first section says why.
     """
+    ahead.begin(view, asked)
+    from tolstat.report import joint_values, verdict  # draw, and take long to import: joints are being simulated
+
     asked.notes.extend(
         note for note in (fidelity.sentence(view.store.options, view.store.fidelity), _stopped(view)) if note
     )
@@ -96,7 +100,6 @@ def compose(view: View, asked: Asked) -> Page:
         point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
         remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
         asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
-    causes.begin(view, asked)
     sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
     facts = Facts(tuple(_facts(view.store)))
     text = Listing("The study as it was run", view.store.study_text)

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Card, Decision, Panel, Panels, Section, Table, Text
-from tolstat.display.table import Column, as_block
+from tolstat.display.table import Column, Rows, as_block, has
 from tolstat.questions.accuracy import rendering as accuracy
 from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
-from tolstat.questions.exceedance.rendering import AT_POINTS, LIMIT_DASH, LIMITS, above, at_points
+from tolstat.questions.exceedance.curves_figure import LIMIT_DASH
+from tolstat.questions.exceedance.rendering import AT_POINTS, LIMITS, above, at_points
 from tolstat.questions.show import section as show
 from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, verdict
 from tolstat.store.methods import METHODS
@@ -41,29 +40,29 @@ def limits(view: View, asked: Asked) -> list[Section]:
     """Share of the joints above each limit; none without limits, and for joints that are no sample of a production."""
     if not (view.sampled and view.limits):
         return []
-    table = exceedance.limits(view)
-    verdicts = [verdict(row, asked.accepted) for row in table.to_dict("records")]
-    words = dict(zip(table["load"], (WORDS.get(v, "") for v in verdicts), strict=True))
+    rows = exceedance.limit_rows(view)
+    verdicts = [verdict(row, asked.accepted) for row in rows]
+    words = {row["load"]: WORDS.get(said, "") for row, said in zip(rows, verdicts, strict=True)}
     kept = Column("kept by itself", lambda row: words[row["load"]], shown=lambda _: asked.judges)
     block = as_block(
-        "Joints above each limit, in numbers", (LIMITS[0], kept, *LIMITS[1:]), table, verdicts if asked.judges else ()
+        "Joints above each limit, in numbers", (LIMITS[0], kept, *LIMITS[1:]), rows, verdicts if asked.judges else ()
     )
     said = (
         f"{row['load']} above {text.value(row['level'], row['unit'])}: {text.percent(row['estimate'])}, "
         f"95 % interval {text.span(row['lower'], row['upper'])}"
-        for row in table.to_dict("records")
+        for row in rows
     )
     panel = Panel(
         "forest",
         "Share of the joints above each limit",
         "; ".join(said),
-        partial(_forest, table=table, accepted=asked.accepted),
-        (4.9, drawing.rows_height(len(table))),
-        max(1.4, drawing.rows_left(_above(table))),
+        partial(_forest, rows=rows, accepted=asked.accepted),
+        (4.9, drawing.rows_height(len(rows))),
+        max(1.4, drawing.rows_left(_above(rows))),
     )
     how = [Text(line, small=True) for line in _how(view, asked)]
-    points = exceedance.at_points(view)
-    each = [as_block(AT_POINTS.capitalize(), at_points(view), points)] if len(points) else []
+    points = exceedance.point_rows(view)
+    each = [as_block(AT_POINTS.capitalize(), at_points(view), points)] if points else []
     return [Section("limits", "Each limit", [Panels([panel], beside=how), block, *each])]
 
 
@@ -76,21 +75,17 @@ def _points(view: View) -> list[Table]:
         point = part.store.points[part.points[0]]
         row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
         if part.sampled and not part.weighted and part.known is None and part.limits and part.count(*VALID):
-            found = capabilities.together(capability.limits(part))
+            found = capabilities.together(capability.limit_rows(part))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
-    return [as_block("Operating points", POINTS, pd.DataFrame(rows))]
-
-
-def _has(name: str) -> Callable[[pd.DataFrame], bool]:
-    return lambda table: name in table and bool(table[name].notna().any())
+    return [as_block("Operating points", POINTS, rows)]
 
 
 POINTS = (
     Column("point", lambda row: str(row["point"])),
     Column("misalignment, speed, torque", lambda row: str(row["operation"])),
-    Column("of the time", lambda row: text.percent(row["share"]), shown=_has("share")),
-    Column("keep all limits there", lambda row: str(row["kept"]), shown=_has("kept")),
+    Column("of the time", lambda row: text.percent(row["share"]), shown=has("share")),
+    Column("keep all limits there", lambda row: str(row["kept"]), shown=has("kept")),
 )
 """Columns of the table of operating points."""
 
@@ -118,16 +113,16 @@ def _cards(view: View, found: Headline | None) -> list[Card]:
     """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
     if found is not None and not view.weighted and view.known is None and view.count(*VALID):
-        table = capability.limits(view)
+        rows = capability.limit_rows(view)
         if found.answer:
-            together = capabilities.together(table)
+            together = capabilities.together(rows)
             cards.append(Card(together.value, together.words, "Yield"))
-        if predicted := capabilities.delivery(table):
-            last = table.iloc[-1]
+        if predicted := capabilities.delivery(rows):
+            last = rows[-1]
             interval = text.ends(last["next_lower"], last["next_upper"], ".0f")
             cards.append(Card(interval, predicted, "95 % prediction interval"))
     if found is not None and found.load and found.load not in found.words:
-        worst = next(row for row in exceedance.limits(view).to_dict("records") if row["load"] == found.load)
+        worst = next(row for row in exceedance.limit_rows(view) if row["load"] == found.load)
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"
         low, high = ends(worst)
         interval = "no interval" if np.isnan(low) else f"total interval {text.span(low, high)}"
@@ -178,20 +173,19 @@ def _how(view: View, asked: Asked) -> list[str]:
     return paragraphs
 
 
-def _above(table: pd.DataFrame) -> list[str]:
+def _above(rows: Rows) -> list[str]:
     """Each limit as a label: ``cross1.F > 1500 N``."""
-    return [f"{row['load']} > {text.value(row['level'], row['unit'])}" for row in table.to_dict("records")]
+    return [f"{row['load']} > {text.value(row['level'], row['unit'])}" for row in rows]
 
 
-def _forest(ax: Axes, table: pd.DataFrame, accepted: float) -> None:
+def _forest(ax: Axes, rows: Rows, accepted: float) -> None:
     """Estimate, interval and total interval of each limit, on an axis from the least to the largest of them."""
-    rows = table.to_dict("records")
     spans = [ends(row) if not np.isnan(ends(row)[0]) else (row["bound_lower"], row["bound_upper"]) for row in rows]
-    n = max(int(table["n"].max()), 1)
-    shown = np.array([*table["estimate"], *np.ravel(spans)], float)
+    n = max(1, *(row["n"] for row in rows))
+    shown = np.array([*(row["estimate"] for row in rows), *np.ravel(spans)], float)
     shown = np.array([*shown[shown >= 0.5 / n], *([accepted] if accepted > 0 else ())])
     high = min(1.4 * shown.max(initial=0.5 / n), 1.0)
-    drawing.rows(ax, _above(table))
+    drawing.rows(ax, _above(rows))
     style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
     low = ax.get_xlim()[0]
     for i, (row, span) in enumerate(zip(rows, spans, strict=True)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -213,39 +213,35 @@ def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
         File slots, ascending; none pending.
     processes : int
         Number of processes; with 1 the joints are simulated when they are asked for.
-
-    Raises
-    ------
-    InputError
-        As `read`.
     """
     if processes > 1 and not is_compiled():
         warm_up()  # one process compiles
-    jobs = [_job(store, slots[part]) for part in blocks(len(slots))]
-    number = min(max(1, processes - 1), len(jobs))
-    parts = [Aside(partial(_all, jobs[first::number]), processes > 1) for first in range(number)]
-    store.ahead = Ahead(slots, parts)
+    parts = [slots[part] for part in blocks(len(slots))]
+    number = min(max(1, processes - 1), len(parts))
+    store.ahead = Ahead(
+        slots, [Aside(partial(_all, store, parts[first::number]), processes > 1) for first in range(number)]
+    )
 
 
-def _all(jobs: list[Callable[[], Again]]) -> list[Again]:
+def _all(store: Reader, parts: list[NDArray[np.intp]]) -> list[Again]:
     warm_up()
-    return [job() for job in jobs]
+    return [_simulated(store, part) for part in parts]
 
 
 def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
     """Loads of joints that are simulated again, (m, samples, 8, 6), and `Revolutions.apart`."""
     found = None if store.ahead is None else store.ahead.of(slots)
-    loads, off = found or _job(store, slots)()
+    loads, off = found or _simulated(store, slots)
     return loads, float(np.max(off, initial=0.0))
 
 
-def _job(store: Reader, slots: NDArray[np.intp]) -> Callable[[], Again]:
-    """Read from the file what it takes to simulate joints again, and return the function that does."""
+def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
+    """Read from the file what it takes to simulate joints again, and do so."""
     params = perturb(joint_of(store, int(slots[0])), store.operation, pick(store.errors, slots))
     attempts = pick(store.attempt, slots)
     stored = pick(store.results, slots)[["F_max", "T_max"]].copy()
     settings = [(here, options_of(store, int(slots[here[0]]))) for here in _alike(attempts)]
-    return partial(_simulate, params, settings, stored, int(store.options["steps_per_rev"]))
+    return _simulate(params, settings, stored, int(store.options["steps_per_rev"]))
 
 
 def _alike(attempts: NDArray[np.int32]) -> list[NDArray[np.intp]]:

@@ -235,12 +235,12 @@ class View:
         """Several loads; see `load`."""
         return [self.load(name) for name in names]
 
-    @property
+    @cached_property
     def kept_loads(self) -> tuple[str, ...]:
         """Loads that the study keeps."""
         return tuple(name for name in LOADS if selected_results.holds(self.columns, name))
 
-    @property
+    @cached_property
     def bushing_loads(self) -> tuple[str, ...]:
         """Loads of `loads.BUSHING_LOADS` that the study keeps."""
         return tuple(name for name in BUSHING_LOADS if name in self.kept_loads)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
@@ -15,7 +14,12 @@ from tolstat.common.tables import Status
 from tolstat.store.verification import Verification
 from tolstat.store.view import View
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 TOTAL = "numerical error"
+COLUMNS = ("load", "error", "joints", "median", "usual", "worst")
+"""Columns of `distribution`."""
 
 
 def _results(verification: Verification) -> dict[str, np.ndarray[tuple[int], np.dtype[np.void]]]:
@@ -44,24 +48,33 @@ def distribution(verification: Verification) -> pd.DataFrame:
         One row per kind of load kept and check: ``load`` (``F``: the worst of its bushings in each joint), ``error``
         (name of the check or `TOTAL`), ``joints``, ``median``, ``usual`` (95 % of the joints are below) and ``worst``.
     """
+    import pandas as pd
+
+    return pd.DataFrame(distribution_rows(verification), columns=COLUMNS)
+
+
+def distribution_rows(verification: Verification) -> list[dict[str, Any]]:
+    """Rows of the table `distribution`."""
     rows = []
     found, held = errors(verification), _held(verification)
     for k in np.unique(KIND_OF[held]):
         kind = KINDS[k]
         for name, values in found.items():
             n, *spread = accuracy.spread(accuracy.by_kind(values)[:, k])
-            rows.append([kind, name, n, *spread])
-    return pd.DataFrame(rows, columns=["load", "error", "joints", "median", "usual", "worst"])
+            rows.append(dict(zip(COLUMNS, (kind, name, n, *spread), strict=True)))
+    return rows
 
 
 def by_observable(verification: Verification) -> pd.DataFrame:
     """Distribution of the errors over the joints as in `distribution`, for each observable kept."""
+    import pandas as pd
+
     rows = []
     for name, values in errors(verification).items():
         for k in np.flatnonzero(_held(verification)):
             n, *spread = accuracy.spread(values[:, k])
             rows.append([OBSERVABLES[k], name, n, *spread])
-    return pd.DataFrame(rows, columns=["load", "error", "joints", "median", "usual", "worst"])
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def joints(verification: Verification) -> pd.DataFrame:
@@ -73,6 +86,8 @@ def joints(verification: Verification) -> pd.DataFrame:
         ``row``, ``check``, ``status`` (of the check), ``load``, ``unit``, ``campaign`` and ``value`` (SI), ``error``:
         the campaign's value minus the check's, relative to the largest load of the kind.
     """
+    import pandas as pd
+
     base = accuracy.loads(verification.base)
     parts = []
     for name, check in verification.checks.items():

@@ -8,7 +8,7 @@ from tolstat.analysis.accuracy import FIDELITY, REFERENCE
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.table import Column
-from tolstat.questions.accuracy.query import TOTAL, distribution
+from tolstat.questions.accuracy.query import TOTAL, distribution_rows
 from tolstat.store.verification import Verification
 
 
@@ -48,14 +48,12 @@ def basis(verification: Verification) -> str:
 
 def note(verification: Verification) -> str:
     """Sentence on the numerical error of the largest loads."""
-    table = distribution(verification)
-    total = table[table["error"] == TOTAL]
-    shown = total["load"].isin(["F", "T"])
-    total = total[shown] if shown.any() else total
+    total = [row for row in distribution_rows(verification) if row["error"] == TOTAL]
+    shown = [row for row in total if row["load"] in ("F", "T")] or total
     words = [
-        f"{kind} {_small(median)}, at worst {_small(worst)}"
-        for kind, median, worst in zip(total["load"], total["median"], total["worst"], strict=True)
-        if not np.isnan(worst)
+        f"{row['load']} {_small(row['median'])}, at worst {_small(row['worst'])}"
+        for row in shown
+        if not np.isnan(row["worst"])
     ]
     noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
     said = f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}"

@@ -14,7 +14,7 @@ from tolstat.analysis.exceedance import unresolved_matter
 from tolstat.analysis.rating_life import A1
 from tolstat.common.tables import PINS
 from tolstat.display import style, text
-from tolstat.display.table import Column, Row
+from tolstat.display.table import Column, Row, has, has_unresolved
 from tolstat.questions.bearing_life.lives import JOINT, Lives
 from tolstat.questions.bearing_life.query import ANY, SHARES
 
@@ -75,17 +75,17 @@ BELOW = (
     Column(
         "95 % interval",
         lambda row: text.span(row["lower"], row["upper"]),
-        shown=lambda table: bool(table["lower"].notna().any()),
+        shown=has("lower"),
     ),
     Column(
         "total interval",
         lambda row: text.span(row["total_lower"], row["total_upper"]),
-        shown=lambda table: bool(table["total_lower"].notna().any()),
+        shown=has("total_lower"),
     ),
     Column(
         "without a life above, below",
         lambda row: text.span(row["bound_lower"], row["bound_upper"]),
-        shown=lambda table: bool((table["n_failed"] + table["n_unsettled"]).any()),
+        shown=has_unresolved,
         rank=1,
     ),
 )

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from tolstat.analysis import capability, exceedance, extreme
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
 from tolstat.store import error_budget
+from tolstat.store.once import once
 from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NOT_NORMAL = 0.01
 """p-value of the test of normality below which the index of a normal load tells no share above the limit."""
@@ -42,6 +45,14 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
         NaN where the load has a long tail (`capability.LONGEST_TAIL`), both indices where unresolved joints matter
         (`analysis.exceedance.unresolved_matter`).
     """
+    import pandas as pd
+
+    return pd.DataFrame(limit_rows(view, confidence, delivery))
+
+
+@once
+def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> Sequence[Mapping[str, Any]]:
+    """Rows of the table `limits`, for reports without pandas."""
     rows = []
     for load in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
         assert load.limit is not None
@@ -58,7 +69,7 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
         if exceedance.unresolved_matter(c.above.count, c.above.n, c.above.n_failed + c.above.n_unsettled):
             row |= dict.fromkeys(names, np.nan)
         rows.append(row)
-    return pd.DataFrame(rows)
+    return rows
 
 
 def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidence: float = 0.95) -> pd.DataFrame:
@@ -88,6 +99,8 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
     ValueError
         When the tail has too few joints (`TooThinError`), or N is too small to lie in it.
     """
+    import pandas as pd
+
     rows = []
     for name in names:
         load = view.load(name)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import pandas as pd
+from typing import TYPE_CHECKING, NamedTuple
 
 from tolstat.analysis import exceedance
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
-from tolstat.display.table import Column, Row
+from tolstat.display.table import Column, Row, Rows
 from tolstat.questions.capability.query import NOT_NORMAL
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def _with_ends(row: Row, key: str, form: str) -> str:
@@ -68,13 +69,13 @@ class Yield(NamedTuple):
     decides: bool
 
 
-def together(table: pd.DataFrame) -> Yield:
-    """Share of the joints that keep all limits, from the last row of `query.limits`."""
-    row = table.iloc[-1]
+def together(rows: Rows) -> Yield:
+    """Share of the joints that keep all limits, from the last of `query.limit_rows`."""
+    row = rows[-1]
     n, above = int(row["n"]), int(row["count"])
     unresolved = int(row["n_failed"] + row["n_unsettled"])
     valid, low, high = n - unresolved, row["good_lower"], row["good_upper"]
-    keep = f"keep all {len(table) - 1} limits" if len(table) > 2 else "keep the limit"
+    keep = f"keep all {len(rows) - 1} limits" if len(rows) > 2 else "keep the limit"
     kind, known = "total interval", not math.isnan(low)
     if not known:
         low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
@@ -86,10 +87,10 @@ def together(table: pd.DataFrame) -> Yield:
     return Yield(text.percent(row["good"]), f"of the joints {keep} ({counted}; {interval})", high - low < WIDEST)
 
 
-def delivery(table: pd.DataFrame) -> str:
-    """What the last row of `query.limits` predicts of the next `DELIVERY` joints; empty without an interval."""
-    limits = "at least one limit" if len(table) > 2 else "the limit"
-    return "" if math.isnan(table["next_lower"].iloc[-1]) else f"of the next {DELIVERY} joints exceed {limits}"
+def delivery(rows: Rows) -> str:
+    """What the last of `query.limit_rows` predicts of the next `DELIVERY` joints; empty without an interval."""
+    limits = "at least one limit" if len(rows) > 2 else "the limit"
+    return "" if math.isnan(rows[-1]["next_lower"]) else f"of the next {DELIVERY} joints exceed {limits}"
 
 
 def note(table: pd.DataFrame) -> str:

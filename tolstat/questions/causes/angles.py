@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat import sampling
@@ -21,6 +20,9 @@ from tolstat.questions.causes.query import scattering
 from tolstat.store import revolutions
 from tolstat.store.revolutions import FloatArray, Revolutions
 from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 JOINTS = 1000
 """Default number of joints evaluated, the first settled ones: some 2 s if they are simulated again."""
@@ -70,6 +72,8 @@ class AgainstAngle(NamedTuple):
 
     def table(self) -> pd.DataFrame:
         """One row per angle and error: ``theta`` (rad), ``load``, ``unit``, ``std``, ``error``, ``share``, ends."""
+        import pandas as pd
+
         k, d = len(self.angles), len(self.names)
         return pd.DataFrame(
             {

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from tolstat.common.loads import unit_text
-from tolstat.display.table import Column, Row
+from tolstat.display.table import Column, Row, Rows, has
 from tolstat.display.text import ends, records
 
 if TYPE_CHECKING:
@@ -40,16 +39,16 @@ def columns(causes: Causes) -> list[Column]:
     p < `SIGNIFICANT`.
     """
     if causes.from_design:
-        total = Column("in all, %", partial(_interval, name="total", factor=100), shown=_has("total"))
+        total = Column("in all, %", partial(_interval, name="total", factor=100), shown=has("total"))
     else:  # given data yield bounds only
-        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=has_narrow_bounds, rank=3)
+        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=_has_narrow_bounds, rank=3)
     return [
         Column("error", lambda row: str(row["error"])),
-        Column("alone, %", partial(_interval, name="first", factor=100), shown=_has("first")),
+        Column("alone, %", partial(_interval, name="first", factor=100), shown=has("first")),
         total,
-        Column("rank coefficient", partial(_interval, name="srrc"), shown=_has("srrc")),
-        Column("tail: larger", partial(_tail, name="direction"), shown=_has("direction"), rank=2),
-        Column("tail: farther out", partial(_tail, name="size"), shown=_has("size"), rank=1),
+        Column("rank coefficient", partial(_interval, name="srrc"), shown=has("srrc")),
+        Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
+        Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
     ]
 
 
@@ -59,8 +58,8 @@ def has_narrow_bounds(table: pd.DataFrame) -> bool:
     return bool((part["total_upper"] - part["total_lower"]).median() < 0.5)  # false without bounds (NaN)
 
 
-def _has(name: str) -> Callable[[pd.DataFrame], bool]:
-    return lambda table: bool(table[name].notna().any())
+def _has_narrow_bounds(rows: Rows) -> bool:
+    return bool(rows) and has_narrow_bounds(pd.DataFrame(rows))
 
 
 def heading(causes: Causes) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -12,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from tolstat.common.aside import mapped
 from tolstat.common.errors import TolstatError
 from tolstat.common.loads import BUSHING_LOADS, unit_text
 from tolstat.common.tables import VALID
@@ -20,27 +20,13 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.display.table import as_block
 from tolstat.questions.causes import angles_figure, pairs_section, rendering, tail_section
-from tolstat.questions.causes.angles import AgainstAngle, against_angle, evaluated
+from tolstat.questions.causes.angles import AgainstAngle, against_angle
 from tolstat.questions.causes.query import Causes, causes_of
-from tolstat.store import revolutions
 from tolstat.store.view import View
 
 JOINTS = 20_000
 """Maximum number of joints (the first ones) used for causes: more add little and take memory."""
 ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)"
-
-
-def begin(view: View, asked: Asked) -> None:
-    """Begin to simulate again the joints whose loads over the revolution the page shows; see `revolutions.ahead`."""
-    if not asked.replay or len(view.points) > 1 or view.method == "sweep" or revolutions.held(view.store):
-        return
-    with suppress(TolstatError):  # the sections say what is wrong
-        slots = [view.slots(tail_section.drawn(view, load)) for load in view.leading if load in BUSHING_LOADS]
-        if slots:
-            with suppress(TolstatError):
-                nominal, samples = evaluated(view, asked.replay)
-                slots += [nominal, view.slots(samples)]
-            revolutions.ahead(view.store, np.unique(np.concatenate(slots)), asked.processes)
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
@@ -72,14 +58,24 @@ def _causes(
     against: list[AgainstAngle] = []
     with asked.noting("causes are left out"):
         view.check_sample(allow_weights=False)
-        for load in view.leading:
+        jobs = [partial(causes_of, view, load, log=load in logarithmic, joints=JOINTS) for load in view.leading]
+        tried = mapped([partial(_tried, job) for job in jobs], min(asked.processes, 2))
+        for load, job, found in zip(view.leading, jobs, tried, strict=True):
             with asked.noting(f"no causes of {load}"):
-                causes.append(causes_of(view, load, log=load in logarithmic, joints=JOINTS))
+                causes.append(found or job())  # which raises what it raised before
         bushings = [load for load in view.leading if load in BUSHING_LOADS]
         if asked.replay and bushings and not is_design:
             with asked.noting("nothing against the shaft angle"):
                 against = against_angle(view, bushings, asked.replay, logarithmic)
     return causes, against
+
+
+def _tried(job: Callable[[], Causes]) -> Causes | None:
+    """Result of a job; None where it cannot be had."""
+    try:
+        return job()
+    except TolstatError:
+        return None
 
 
 def _section(causes: Sequence[Causes], against: Sequence[AgainstAngle], logarithmic: Container[str]) -> Section:

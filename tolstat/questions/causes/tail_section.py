@@ -8,20 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.loads import BUSHING_LOADS, unit_text
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.questions.causes import angles_figure
+from tolstat.questions.causes.ahead import DRAWN
 from tolstat.questions.causes.angles import AgainstAngle, modulus
 from tolstat.questions.causes.tail import Tail, worst_joints
 from tolstat.store import revolutions
 from tolstat.store.view import View
 
-JOINTS, DRAWN = 8, 3
-"""Numbers of worst joints listed and drawn for each load."""
+JOINTS = 8
+"""Number of worst joints listed for each load."""
 ANGLES = 180
 """Number of input angles drawn, if the histories have as many samples."""
 SPREAD = "5 to 95 %"
@@ -77,11 +77,6 @@ def section(view: View, loads: Sequence[str], against: Sequence[AgainstAngle], h
     at = " --point POINT" if len(view.points) > 1 else ""
     blocks.append(Text(f"To simulate one of them again: tolstat replay FILE --row ROW{at} --out trace.csv", small=True))
     return Section("worst", "The worst joints", blocks)
-
-
-def drawn(view: View, load: str) -> NDArray[np.intp]:
-    """Samples of the worst joints whose loads over the revolution are drawn, ascending."""
-    return np.unique(worst_joints(view, load, DRAWN).samples)
 
 
 def _table(tail: Tail) -> Table:

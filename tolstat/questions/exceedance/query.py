@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
 from tolstat.common.loads import ALL_LIMITS, BUSHING_LOADS, load_of, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
+from tolstat.store.once import once
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
 COVERED = 0.99
@@ -56,7 +58,15 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `SampleLoad.supports`.
     """
-    return pd.DataFrame([_above_limit(view, view.load(name), confidence) for name in view.limits])
+    import pandas as pd
+
+    return pd.DataFrame(limit_rows(view, confidence))
+
+
+@once
+def limit_rows(view: View, confidence: float = 0.95) -> Sequence[Mapping[str, Any]]:
+    """Rows of the table `limits`: plain ones, since pandas takes longer to import than a report to be written."""
+    return [_above_limit(view, view.load(name), confidence) for name in view.limits]
 
 
 def most_exceeded(view: View, rows: Sequence[Mapping[Any, Any]]) -> Mapping[Any, Any]:
@@ -77,7 +87,7 @@ def _above_limit(view: View, load: SampleLoad, confidence: float) -> dict[str, A
     assert level is not None
     head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
     budget = _error_budget(view, load, level, confidence)
-    row = {**head, **asdict(load.above(level, confidence)), "confidence": confidence, **budget}
+    row = {**head, **vars(load.above(level, confidence)), "confidence": confidence, **budget}
     # the load with its numerical error, where that is known
     top = (error_budget.shifted(view, load) or (load, load))[1]
     row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
@@ -98,14 +108,22 @@ def at_points(view: View) -> pd.DataFrame:
         the name of each point of the view the share there; NaN where the limit does not hold, or weighted joints do not
         support it. No rows for a view of one point.
     """
+    import pandas as pd
+
+    return pd.DataFrame(point_rows(view), columns=["load", "unit", "level", *view.points])
+
+
+def point_rows(view: View) -> list[dict[str, Any]]:
+    """Rows of the table `at_points`."""
     rows = []
     for name, level in view.limits.items():
         at, plain = view.narrowed(name)
         if len(at.points) > 1:
             loads = {part.points[0]: part.load(plain) for part in at.parts}
             shares = {p: own.above(level).estimate if own.supports(level) else np.nan for p, own in loads.items()}
-            rows.append({"load": name, "unit": load_of(name).unit, "level": level} | shares)
-    return pd.DataFrame(rows, columns=["load", "unit", "level", *view.points])
+            blank = dict.fromkeys(view.points, np.nan)
+            rows.append({"load": name, "unit": load_of(name).unit, "level": level} | blank | shares)
+    return rows
 
 
 def _error_budget(view: View, load: SampleLoad, level: float, confidence: float) -> dict[str, float]:
@@ -135,12 +153,19 @@ def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
         One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.quantile.Quantile`,
         ``confidence``. Loads in SI units.
     """
+    import pandas as pd
+
+    return pd.DataFrame(quantile_rows(view, confidence))
+
+
+def quantile_rows(view: View, confidence: float = 0.95) -> list[dict[str, Any]]:
+    """Rows of the table `quantiles`."""
     rows = []
     for load in view.loads(view.shown_loads):
         head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
         for share in SHARES:
             rows.append({**head, **load.quantile(share, confidence)._asdict(), "confidence": confidence})
-    return pd.DataFrame(rows)
+    return rows
 
 
 def tolerance_limits(view: View) -> dict[str, float]:
@@ -161,14 +186,21 @@ def curves(view: View, confidence: float = 0.95) -> pd.DataFrame:
         ``load``, ``unit``, then the fields of `analysis.exceedance.Exceedance`; SI units, at most
         `MAX_LEVELS` levels per load.
     """
-    parts = []
+    import pandas as pd
+
+    return pd.DataFrame(curve_columns(view, confidence))
+
+
+def curve_columns(view: View, confidence: float = 0.95) -> dict[str, list[Any]]:
+    """Columns of the table `curves`."""
+    columns: dict[str, list[Any]] = {name: [] for name in ("load", "unit", *(exceedance.CURVE.names or ()))}
     for load in view.loads(view.shown_loads):
         table = curve(load, confidence, MAX_LEVELS)
-        part = pd.DataFrame({field: table[field] for field in exceedance.CURVE.names or ()})
-        part.insert(0, "load", load.name)
-        part.insert(1, "unit", load.unit)
-        parts.append(part)
-    return pd.concat(parts, ignore_index=True)
+        columns["load"] += [load.name] * len(table)
+        columns["unit"] += [load.unit] * len(table)
+        for field in exceedance.CURVE.names or ():
+            columns[field] += table[field].tolist()
+    return columns
 
 
 def curve(load: SampleLoad, confidence: float, max_levels: int) -> NDArray[np.void]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
@@ -14,8 +13,8 @@ from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Reader, Section, Table, Text
-from tolstat.display.table import as_block
-from tolstat.questions.exceedance import query, rendering, sweep
+from tolstat.display.table import Rows, as_block
+from tolstat.questions.exceedance import curves_figure, query, rendering, sweep
 from tolstat.store.recorded import joint_of
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -33,7 +32,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
         return []
     blocks: list[Block] = [Panels([_leading_panel(view, name) for name in view.leading])] if view.leading else []
     blocks.append(Text(_note(view), small=True))
-    limits = query.limits(view)
+    limits = query.limit_rows(view)
     blocks.append(Reader(query.readings(view), _read_first(view, limits)))
     blocks.append(_quantiles(view))
     if view.limits and view.sampled and view.numerical_error:
@@ -42,11 +41,9 @@ def sections(view: View, asked: Asked) -> list[Section]:
     return [Section("exceedance", "Which load is exceeded by which share", blocks)]
 
 
-def _read_first(view: View, limits: pd.DataFrame) -> str:
+def _read_first(view: View, limits: Rows) -> str:
     """Load that the reader begins with: that of the limit which the verdict names; without limits a leading load."""
-    if limits.empty:
-        return view.most_exceeded
-    return str(query.most_exceeded(view, limits.to_dict("records"))["load"])
+    return str(query.most_exceeded(view, limits)["load"]) if limits else view.most_exceeded
 
 
 def _note(view: View) -> str:
@@ -98,18 +95,18 @@ def _leading_panel(view: View, name: str) -> Panel:
 
 def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
     """One load with its band, limit and nominal joint; other loads as thin lines, and the band for all x, switched."""
-    table = query.curve(load, 0.95, rendering.DRAWN_LEVELS)
+    table = query.curve(load, 0.95, curves_figure.DRAWN_LEVELS)
     if not len(table):
         drawing.empty(ax, "no joint with a valid result")
         return
     known = [other for other in view.loads(others) if other.valid.size]
     thin = {other.name: query.curve(other, 0.95, THIN_LEVELS) for other in known}
     levels = np.concatenate([table["level"], *(own["level"] for own in thin.values())])
-    low, high = rendering.axis_range(levels, [] if load.limit is None else [load.limit])
-    floor = 0.5 * rendering.least(view, table)
+    low, high = curves_figure.axis_range(levels, [] if load.limit is None else [load.limit])
+    floor = 0.5 * curves_figure.least(view, table)
     ax.set_xlim(low, high)
     style.share_axis(ax, floor)
-    rendering.steps(ax, table, 0, low, floor)
+    curves_figure.steps(ax, table, 0, low, floor)
     x = np.concatenate([[low], table["level"][1:]])
     if view.iid and not view.weighted:
         half = simultaneous(load.valid.size)
@@ -122,7 +119,7 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
         drawn = ax.step(along, shares, where="post", color=style.FAINT, lw=0.7, ls=dash)
         drawing.switched(drawn[0], "others")
     if load.limit is not None:
-        rendering.limit_lines(ax, {load.limit: [1, 2, 3, 4]}, load.unit)
+        curves_figure.limit_lines(ax, {load.limit: [1, 2, 3, 4]}, load.unit)
     if low <= load.nominal <= high:
         style.mark(ax, load.nominal, 1.0, style.COLOURS[0])
     ax.xaxis.set_major_locator(MaxNLocator(5 if load.unit != "1" else 3))
@@ -133,7 +130,7 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
 
 def _quantiles(view: View) -> Table:
     """Quantiles of every load with their intervals, and its tolerance limit."""
-    table = rendering.by_load(query.quantiles(view))
+    table = rendering.by_load(query.quantile_rows(view))
     kind = "over lots" if view.lots is not None else "over replicates" if view.replicates > 1 else "of order statistics"
     title = f"Quantiles with 95 % intervals {kind}, and one-sided tolerance limits (Wilks)"
     columns = rendering.quantile_columns(query.tolerance_limits(view))

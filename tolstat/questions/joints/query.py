@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from tolstat import sampling
 from tolstat.analysis import overrepresentation
 from tolstat.campaign.remedy import remedy
 from tolstat.common.tables import FAILED, UNSETTLED, Status
 from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MAX_JOINTS = 20_000
 """Number of joints (the first ones) whose errors are compared."""
@@ -49,6 +51,8 @@ def their_errors(view: View) -> pd.DataFrame | None:
     InputError, StoreError
         When the study cannot be read.
     """
+    import pandas as pd
+
     if view.weighted or view.study.groups:
         return None
     samples = np.flatnonzero(view.status[:MAX_JOINTS] != Status.PENDING)

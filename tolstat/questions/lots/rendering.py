@@ -8,7 +8,7 @@ import numpy as np
 
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import drawing, style, text
-from tolstat.display.table import Column
+from tolstat.display.table import Column, has
 from tolstat.questions.lots.query import Lots
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ COLUMNS = (
     Column("worst lot", lambda row: text.percent(row["worst"]), rank=1),
     Column("correlation", lambda row: text.formed(row["correlation"], ".2f"), rank=5),
     Column("above in delivery", text.delivery),
-    Column("bad deliveries", lambda row: text.percent(row["bad"]), shown=lambda table: not table["bad"].isna().all()),
+    Column("bad deliveries", lambda row: text.percent(row["bad"]), shown=has("bad")),
 )
 """Columns of the table of `query.lots_of`; bad deliveries with an accepted share."""
 OBSERVED, EXPECTED, ALONE = "lots simulated", "expected of a new lot", "if joints did not depend on their lot"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pandas as pd
 
 from tolstat.display import text
-from tolstat.display.table import Column, Row
+from tolstat.display.table import Column, Row, has
 
 
 def columns(table: pd.DataFrame) -> tuple[Column, ...]:
@@ -34,13 +34,13 @@ def columns(table: pd.DataFrame) -> tuple[Column, ...]:
     unresolved = Column(
         "with unresolved joints",
         lambda row: text.span(row["bound_lower"], row["bound_upper"]),
-        shown=lambda frame: bool((frame["bound_upper"] > frame["bound_lower"]).any()),
+        shown=lambda rows: any(row["bound_upper"] > row["bound_lower"] for row in rows),
         rank=2,
     )
     total = Column(
         "with numerical error",
         lambda row: text.span(row["total_lower"], row["total_upper"]),
-        shown=lambda frame: bool(frame["total_lower"].notna().any()),
+        shown=has("total_lower"),
         rank=1,
     )
     more = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ from matplotlib.patches import Patch
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Panel
-from tolstat.display.table import Column, Row
+from tolstat.display.table import Column, Row, has
 from tolstat.questions.what_if import query
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF
 
@@ -40,16 +39,16 @@ _KINDS = {"offset", "tilt", "diameter", "clearance", "position"}
 def columns(found: WhatIf) -> list[Column]:
     """Columns of `rows`: a line, its tolerance, and the share above the level after each step, with its interval."""
     steps = [
-        Column(head, partial(_share, step=step), shown=_has(step), rank=_RANKS[step]) for step, head in _HEADS.items()
+        Column(head, partial(_share, step=step), shown=has(step), rank=_RANKS[step]) for step, head in _HEADS.items()
     ]
     return [
         Column("line", lambda row: str(row["line"]), words=True),
         Column("tolerance", lambda row: row["size"] or "-", rank=3),
         *steps,
         Column("finer, coarser", lambda row: str(row["by"]), words=True, rank=4),
-        Column("half: change, %", partial(_change, step=HALF), shown=_has(HALF), rank=6),
-        Column("alone, %", partial(_index, name="above_alone"), shown=_has("above_alone"), rank=8),
-        Column("in all, %", partial(_index, name="above_in_all"), shown=_has("above_in_all"), rank=7),
+        Column("half: change, %", partial(_change, step=HALF), shown=has(HALF), rank=6),
+        Column("alone, %", partial(_index, name="above_alone"), shown=has("above_alone"), rank=8),
+        Column("in all, %", partial(_index, name="above_in_all"), shown=has("above_in_all"), rank=7),
     ]
 
 
@@ -304,10 +303,6 @@ def _floor(found: WhatIf, accepted: float) -> float:
     """Lower end of an axis of shares: below all shares that are not zero, and below the accepted share."""
     least = [value for value in [*found.table["share"], found.share, accepted] if value > 0.0]
     return 0.6 * max(min(least, default=1.0), 0.5 / max(found.n, 1))
-
-
-def _has(name: str) -> Callable[[pd.DataFrame], bool]:
-    return lambda table: name in table and bool(table[name].notna().any())
 
 
 def _share(row: Row, step: str) -> str:

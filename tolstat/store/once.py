@@ -1,0 +1,27 @@
+"""Small results of a view, such as the shares above its limits, that several parts of a report ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
+
+from tolstat.store.view import View
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def once(function: Callable[Concatenate[View, P], T]) -> Callable[Concatenate[View, P], T]:
+    """Decorate a function of a view whose result is kept as long as the view; nobody may change it."""
+    kept: WeakKeyDictionary[View, dict[Any, T]] = WeakKeyDictionary()
+
+    @wraps(function)
+    def found(view: View, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        own, key = kept.setdefault(view, {}), (args, tuple(sorted(kwargs.items())))
+        if key not in own:
+            own[key] = function(view, *args, **kwargs)
+        return own[key]
+
+    return found

@@ -34,6 +34,17 @@ def test_fewer_than_thirty_lots_have_no_interval_and_lots_without_a_bad_joint_ha
     assert (found.lower, found.upper) == (pytest.approx(0.025 ** (1 / 50)), 1.0)
 
 
+def test_interval_covers_where_few_lots_have_the_bad_joints():
+    rng = np.random.default_rng(7)
+    above = np.stack([of_beta(0.02, 0.2, 50, 20, rng) for _ in range(800)], axis=1)
+    found = lots.interval(above, np.full(50, 20))
+    assert np.mean(found.upper < 0.02) < 0.01  # with Student's t alone 0.06 to 0.08
+    assert np.mean(found.lower > 0.02) < 0.035
+    assert np.median(found.upper - found.lower) < 0.08  # and yet it says something
+    one = lots.interval(above[:, 3], [20] * 50)
+    assert (one.lower, one.upper) == pytest.approx((found.lower[3], found.upper[3]), rel=0.05)
+
+
 def test_correlation_is_one_for_lots_of_one_kind_and_zero_where_lots_are_alike():
     assert lots.interval([0, 20] * 20, [20] * 40).correlation == 1.0
     assert abs(lots.interval(RNG.binomial(20, 0.3, 4000), [20] * 4000).correlation) < 0.01

@@ -1,7 +1,9 @@
 """Joints of one lot depend on one another: intervals over lots, and what the next delivery may hold.
 
 Lots are independent of each other, joints of one lot are not. Intervals of shares come from the lots' shares (Student's
-t on the logit of their mean), and predictions from the beta-binomial law: the share of a lot is a beta variate.
+t on the logit of their mean), and predictions from the beta-binomial law: the share of a lot is a beta variate. Where
+few lots have the joints above a limit, lots that are worse may not have been seen: there, the interval contains that of
+the beta-binomial law, too.
 """
 
 from __future__ import annotations
@@ -20,11 +22,16 @@ from tolstat.analysis.quantile import of_sample as quantile_of_sample
 LEAST = 30
 """Number of lots from which on intervals over lots hold; with fewer there are none."""
 FEW = 20
-"""Number of joints on a side of a level below which an interval contains that of independent joints, too."""
+"""Number of joints on a side of a level below which an interval contains that of independent joints, too, and effective
+number below which it contains that of the beta-binomial law."""
+STEP = 0.1
+"""Distance of the mean shares, on the logit scale, at which the posterior density of that law is computed."""
 MOST_LEVELS = 2000
 """Number of loads at which the interval of a quantile is looked for; its ends are rounded outwards to one of these."""
 GRID, REACH = 33, 5.0
 """Points of each parameter of the posterior distribution, and its half width in standard errors of the mean share."""
+SPREADS = np.linspace(-8.0, 5.0, GRID)
+"""Logits of the correlation of two joints of a lot in the grid."""
 NEGLIGIBLE = 1e-5
 """Posterior probability below which a point of the grid is left out."""
 
@@ -66,7 +73,8 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> S
     -------
     Shares
         Where no joint is above a limit, or each, the share of lots with such a joint bounds that of the joints: its end
-        is Clopper and Pearson's for lots. NaN for fewer than `LEAST` lots.
+        is Clopper and Pearson's for lots. Where the joints on a side of the limit, (sum of k)² / sum of k² over the
+        lots, are effectively fewer than `FEW`, the interval contains `_credible`, too. NaN for fewer than `LEAST` lots.
     """
     from scipy.special import expit, logit, stdtrit
 
@@ -78,8 +86,14 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> S
         p = k.sum(axis=0) / total
         between = ((k - p * n) ** 2).sum(axis=0) * lots / (lots - 1.0)
         half = stdtrit(lots - 1, 0.5 * (1.0 + confidence)) * np.sqrt(between) / total / (p * (1.0 - p))
-        lower, upper = expit(logit(p) - half), expit(logit(p) + half)
+        lower, upper = np.asarray(expit(logit(p) - half)), np.asarray(expit(logit(p) + half))
         none = float(exceedance.clopper_pearson(0, lots, confidence)[1])
+        sides = np.stack([k, n - k])
+        effective = (sides.sum(axis=1) ** 2 / (sides**2).sum(axis=1)).min(axis=0)
+        few = (p > 0.0) & (p < 1.0) & (effective < FEW)
+        if few.any() and lots >= LEAST:
+            own = _credible(k[:, few], n[:, few], confidence)
+            lower[few], upper[few] = np.minimum(lower[few], own[0]), np.maximum(upper[few], own[1])
         lower = np.where(p == 0.0, 0.0, np.where(p == 1.0, 1.0 - none, lower))
         upper = np.where(p == 1.0, 1.0, np.where(p == 0.0, none, upper))
         # analysis of variance of the joints, 0 or 1, with lots of different size
@@ -90,6 +104,28 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> S
     if lots < LEAST:
         lower, upper = np.full_like(p, np.nan), np.full_like(p, np.nan)
     return Shares(p, lower, upper, correlation, lots)
+
+
+def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArray, FloatArray]:
+    """Credible interval of the mean share of m limits, k of n joints in each lot, both (lots, m), as `law_of` has it.
+
+    All limits share the grid of means, so that the density is computed once for each pair of k and n.
+    """
+    from scipy.special import expit, logit
+
+    p = k.sum(axis=0) / n.sum(axis=0)
+    means = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP)
+    mean, r = np.meshgrid(expit(means), expit(SPREADS), indexing="ij")
+    a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
+    pairs, which = np.unique(np.stack([k.ravel(), n.ravel()]), axis=1, return_inverse=True)
+    times = np.zeros((k.shape[1], pairs.shape[1]))
+    np.add.at(times, (np.tile(np.arange(k.shape[1]), len(k)), which.ravel()), 1.0)
+    log = times @ np.array([_log_pmf(*pair, a, b).ravel() for pair in pairs.T]) + _log_prior(mean, r).ravel()
+    density = np.exp(log - log.max(axis=1, keepdims=True)).reshape(len(log), *mean.shape).sum(axis=2)
+    below = np.cumsum(density, axis=1) / density.sum(axis=1, keepdims=True)
+    tail = 0.5 * (1.0 - confidence)
+    ends = np.array([np.interp([tail, 1.0 - tail], own, means + 0.5 * STEP) for own in below])
+    return expit(ends[:, 0]), expit(ends[:, 1])
 
 
 def curve_of(
@@ -238,16 +274,20 @@ def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     spread = max(float(np.nan_to_num(shares.correlation)), 0.05)
     error = np.sqrt((1.0 + (n.mean() - 1.0) * spread) / (n.sum() * p * (1.0 - p)))
     means = logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
-    spreads = np.linspace(-8.0, 5.0, GRID)
-    mean, r = (own.ravel() for own in np.meshgrid(expit(means), expit(spreads)))
+    mean, r = (own.ravel() for own in np.meshgrid(expit(means), expit(SPREADS)))
     a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
-    log = 0.5 * np.log(mean * (1.0 - mean)) + np.log(r * (1.0 - r))  # densities of the two logits
+    log = _log_prior(mean, r)
     for (one, of), count in zip(pairs, times, strict=True):
         log += count * _log_pmf(one, of, a, b)
     weight = np.exp(log - log.max())
     weight /= weight.sum()
     kept = weight > NEGLIGIBLE
     return Law(a[kept], b[kept], weight[kept] / weight[kept].sum(), (int(k.sum()), int(n.sum())))
+
+
+def _log_prior(mean: FloatArray, correlation: FloatArray) -> FloatArray:
+    """Logarithm of the prior density of the logits of mean and correlation: Jeffreys' of a share, and uniform."""
+    return np.asarray(0.5 * np.log(mean * (1.0 - mean)) + np.log(correlation * (1.0 - correlation)))
 
 
 def _log_pmf(k: ArrayLike, n: ArrayLike, a: FloatArray, b: FloatArray) -> FloatArray:

@@ -120,7 +120,7 @@ def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArr
     pairs, which = np.unique(np.stack([k.ravel(), n.ravel()]), axis=1, return_inverse=True)
     times = np.zeros((k.shape[1], pairs.shape[1]))
     np.add.at(times, (np.tile(np.arange(k.shape[1]), len(k)), which.ravel()), 1.0)
-    log = times @ np.array([_log_pmf(*pair, a, b).ravel() for pair in pairs.T]) + _log_prior(mean, r).ravel()
+    log = times @ np.array([_log_pmf(one, of, a, b).ravel() for one, of in pairs.T]) + _log_prior(mean, r).ravel()
     density = np.exp(log - log.max(axis=1, keepdims=True)).reshape(len(log), *mean.shape).sum(axis=2)
     below = np.cumsum(density, axis=1) / density.sum(axis=1, keepdims=True)
     tail = 0.5 * (1.0 - confidence)

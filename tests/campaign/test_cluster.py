@@ -27,10 +27,11 @@ from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import Counts, Reader
 
 pytest.importorskip("distributed")
-psutil = pytest.importorskip("psutil", reason="distributed requires it")
 
 from tolstat.campaign.executors import cluster as cluster_module
 from tolstat.campaign.executors.cluster import check, map_on_cluster
+
+psutil = pytest.importorskip("psutil", reason="distributed requires it")
 
 
 class Cluster(NamedTuple):

@@ -25,6 +25,10 @@ from tolstat.store import integrity, result_file
 LIMIT_S = 30
 """Processor seconds of a command."""
 WALL_S = 600.0
+LEAVES_S = 10.0
+"""Time in which the processes that a command started must end after it."""
+LEFT_BEHIND = 97
+"""Exit code of a command whose processes had to be killed after it."""
 LIMIT_BYTES = 1 << 30
 ODD: tuple[Any, ...] = (
     *(None, True, -1, 0, 1, 2**31, 2**33, 10**9, 10**400, 1e300, -1e300, 0.5, float("nan"), float("inf")),
@@ -146,10 +150,10 @@ def call(words: Sequence[object], folder: Path) -> Ended:
         if ended:
             break
         if time.monotonic() - begun > WALL_S:
-            os.kill(pid, signal.SIGKILL)
+            os.killpg(pid, signal.SIGKILL)
         time.sleep(0.002)
     own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    code = os.waitstatus_to_exitcode(state)
+    code = LEFT_BEHIND if _left_behind(pid) else os.waitstatus_to_exitcode(state)
     said, told = (path.read_text(encoding="utf-8", errors="replace") for path in (out, err))
     said = re.sub(r'.*"wall_s".*\n', "", said)  # the one number that is another in each run
     return Ended(code, said, told, time.monotonic() - begun, 1024 * (usage.ru_maxrss - own))
@@ -172,8 +176,21 @@ def run(words: Sequence[str], copied: Path) -> Ended:
     return ended
 
 
+def _left_behind(group: int) -> bool:
+    """Whether processes of a command outlive it; they are killed."""
+    begun = time.monotonic()
+    with contextlib.suppress(ProcessLookupError):
+        while time.monotonic() - begun < LEAVES_S:
+            os.killpg(group, 0)
+            time.sleep(0.002)
+        os.killpg(group, signal.SIGKILL)
+        return True
+    return False
+
+
 def _be_command(words: list[str], out: Path, err: Path, folder: Path) -> None:
     code = 99
+    os.setsid()
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
         limit = pages * resource.getpagesize() + LIMIT_BYTES

@@ -225,7 +225,8 @@ def fault(ended: Ended, usual: Ended) -> str:
         return f"{ended.memory >> 20} MiB"
     if ended.code == 2:
         return "" if "error: " in ended.err and "hint: " in ended.err else "no message"
-    told = "damaged" in ended.err or "pending" in ended.err
+    on_page = "is damaged:" in ended.out and "is damaged:" not in usual.out
+    told = on_page or "damaged" in ended.err or "pending" in ended.err
     return "" if ended.out == usual.out or told else "silent difference"
 
 

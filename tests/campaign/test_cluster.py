@@ -31,6 +31,8 @@ pytest.importorskip("distributed")
 from tolstat.campaign.executors import cluster as cluster_module
 from tolstat.campaign.executors.cluster import check, map_on_cluster
 
+psutil = pytest.importorskip("psutil", reason="distributed requires it")
+
 
 class Cluster(NamedTuple):
     """A scheduler and two workers."""
@@ -63,6 +65,7 @@ def reference(path: Path) -> dict[str, bytes]:
     return datasets(path)
 
 
+@pytest.mark.slow
 def test_a_killed_dask_worker_changes_no_byte(tmp_path: Path, cluster: Cluster) -> None:
     path = tmp_path / "a.h5"
 
@@ -78,6 +81,7 @@ def test_a_killed_dask_worker_changes_no_byte(tmp_path: Path, cluster: Cluster) 
     assert datasets(path) == reference(tmp_path / "b.h5")
 
 
+@pytest.mark.slow
 def test_a_cluster_of_this_machine_finds_bad_joints(tmp_path: Path) -> None:
     study, path = fakes.Study(), tmp_path / "a.h5"
     values = fakes.draw(study)["pin1.offset_t"]
@@ -88,6 +92,7 @@ def test_a_cluster_of_this_machine_finds_bad_joints(tmp_path: Path) -> None:
         assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
 
 
+@pytest.mark.slow
 def test_the_first_blocks_that_fail_are_no_fault_of_the_cluster(tmp_path: Path) -> None:
     """A worker gets ready without them, so that the cluster goes on; this machine shows which joints crash."""
     study, path, bad = fakes.Study(n=12), tmp_path / "a.h5", [0, 4, 8]
@@ -123,6 +128,7 @@ def test_other_versions_are_refused() -> None:
     check({"numpy": "1"}, {"numpy": "1", "scipy": "3"}, "a worker")
 
 
+@pytest.mark.slow
 def test_a_worker_with_other_versions_is_refused(cluster: Cluster) -> None:
     with pytest.raises(InputError, match=r"the worker tcp.* has other software versions\n    process: \d+ here, \d+"):
         list(map_on_cluster(Work(abs), range(9), cluster.address, 2, process_number))
@@ -138,6 +144,7 @@ def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
         list(map_on_cluster(Work(abs), range(9), "tcp://127.0.0.1:1", 2, process_number))
 
 
+@pytest.mark.slow
 def test_stop_finishes_what_is_begun(cluster: Cluster) -> None:
     seen: list[int] = []
     begin = time.monotonic()
@@ -219,7 +226,10 @@ if __name__ == "__main__":
 
 @pytest.mark.slow
 def test_a_cluster_of_this_machine_listens_on_the_loopback_only() -> None:
-    with cluster_module._client(None, 1) as client:
-        addresses = [client.scheduler.address, *client.scheduler_info()["workers"]]
-    assert addresses
-    assert all(address.startswith(f"tcp://{cluster_module.LOOPBACK}:") for address in addresses)
+    here = psutil.Process()
+    before = {one.laddr for one in here.net_connections("tcp")}
+    with cluster_module._client(None, 1):
+        sockets = [one for process in (here, *here.children(recursive=True)) for one in process.net_connections("tcp")]
+    listening = {one.laddr for one in sockets if one.status == psutil.CONN_LISTEN} - before
+    assert len(listening) >= 3, "scheduler, nanny and worker"
+    assert {address.ip for address in listening} == {"127.0.0.1"}

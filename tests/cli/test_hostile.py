@@ -96,7 +96,9 @@ def test_a_search_for_faults_finds_them(tmp_path: Path) -> None:
         (usual._replace(code=-11), "signal 11 after"),
         (usual._replace(code=1, err="Traceback (most recent call last)"), "exit code 1"),
         (usual._replace(code=2, err="oh"), "no message"),
+        (usual._replace(code=corruption.LEFT_BEHIND), "exit code 97"),
         (usual._replace(memory=1 << 31), "2048 MiB"),
     ):
         assert corruption.fault(wrong, usual).startswith(said)
     assert not corruption.fault(usual._replace(out="{}", err="the results of 1 joint are damaged"), usual)
+    assert corruption.fault(usual._replace(out='{"pending": 0}'), usual) == "silent difference"

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
 
+from tests.support.environment import environment
 from tolstat.common import aside
 from tolstat.common.aside import CAN_FORK, Aside, mapped
 
@@ -51,3 +54,25 @@ def test_what_fails_raises_where_the_result_is_asked_for() -> None:
     other = Aside(lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         other.result()
+
+
+@pytest.mark.skipif(not CAN_FORK, reason="no fork here")
+def test_no_process_outlives_one_that_is_killed() -> None:
+    """The pipe of standard output is open as long as any of the three processes lives."""
+    command = [sys.executable, "-c", KILLED]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment(), start_new_session=True) as process:
+        try:
+            assert process.communicate(timeout=30) == (b"", None)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
+    assert process.returncode == -signal.SIGKILL
+
+
+KILLED = """
+import os, signal
+from tolstat.common.aside import Aside
+others = [Aside(lambda: bytes(10**6)) for _ in range(2)]
+assert all(other._end.poll(60) for other in others)
+os.kill(os.getpid(), signal.SIGKILL)
+"""

@@ -1,7 +1,8 @@
 """Corrupted result files through the commands: each must end with correct data, or with exit code 2 and one message.
 
-``python -m tests.measure.corruption FILE 1000`` corrupts a copy of FILE, a result file of 220 joints, in 1000 ways,
-passes each to one of the commands below in turn and prints every traceback, signal, hang and silent difference.
+``python -m tests.measure.corruption FILE 1000 [FIRST [COMMAND ...]]`` corrupts a copy of FILE, a result file of 220
+joints, in 1000 ways, the first of them number FIRST (0), passes each to every command below, or to those named, and
+prints every traceback, signal, hang and silent difference. What a command writes is compared, too.
 """
 
 from __future__ import annotations
@@ -25,17 +26,17 @@ COMMANDS = (
 )
 
 
-def main(path: Path, count: int, first: int = 0) -> None:
+def main(path: Path, count: int, first: int = 0, *names: str) -> None:
     """Corrupt a file `count` times; print the faults and how many commands ended how."""
+    commands = [words for words in COMMANDS if not names or words[0] in names]
     with tempfile.TemporaryDirectory() as folder:
-        corruption.warm(path, Path(folder), COMMANDS)
-        for k, words in enumerate(COMMANDS):
-            numbers = range(first + k, first + count, len(COMMANDS))
-            found, kinds = corruption.search(path, Path(folder) / "x", numbers, [words])
-            print(" ".join(words), kinds, flush=True)
+        corruption.warm(path, Path(folder), commands)
+        for words in commands:
+            found, kinds = corruption.search(path, Path(folder) / "x", range(first, first + count), [words])
+            print(" ".join(words), kinds, f"faults {len(found)}", flush=True)
             for one in found:
                 print(f"  {one.fault}: {one.corruption}\n{one.ended.err[-1500:]}", flush=True)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), *map(int, sys.argv[3:]))
+    main(Path(sys.argv[1]), int(sys.argv[2]), *map(int, sys.argv[3:4]), *sys.argv[4:])

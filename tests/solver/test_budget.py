@@ -70,13 +70,23 @@ def test_the_repetition_alone_continues_the_budget(params: Params, monkeypatch: 
 
 @pytest.mark.slow
 def test_a_refinement_takes_what_is_left(params: Params, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A joint that rattles; without the finer steps it has the results of the uniform ones."""
+    """A joint that rattles: a budget that would do for the finer steps does not do after the uniform ones."""
     options = Options(max_revs=4)
     table = params(alpha=np.radians(15), speed=3000 * np.pi / 30, torque=20.0)
-    plain = simulate_rows(table, options._replace(max_refinements=0)).results[0]
-    whole = simulate_rows(table, options).results[0]
-    work = int(whole["newton_iterations"] + whole["steps"] / 5)
-    assert work > 3 * plain["newton_iterations"]
-    allow(monkeypatch, int(plain["newton_iterations"]) + work // 4)
-    row = simulate_rows(table, options).results[0]
-    assert row["status"] in (Status.NOT_RESOLVED, *FAILED)
+    uniform = int(simulate_rows(table, options._replace(max_refinements=0)).results["newton_iterations"][0])
+    spent: list[int] = []
+    resolved = simulation._resolved
+
+    def counted(steps, joints, settings, left, *others):
+        before = int(left[0])
+        yield from resolved(steps, joints, settings, left, *others)
+        spent.append(before - int(left[0]))
+
+    monkeypatch.setattr(simulation, "_resolved", counted)
+    whole = simulate_rows(table, options).results
+    needed = uniform + sum(spent)
+    assert needed > 3 * uniform
+    allow(monkeypatch, needed - uniform // 2)
+    assert simulate_rows(table, options).results[0]["status"] in (Status.NOT_RESOLVED, *FAILED)
+    allow(monkeypatch, needed + 1)
+    assert simulate_rows(table, options).results.tobytes() == whole.tobytes()

@@ -1,9 +1,11 @@
-"""Files from outside: whatever stands in them is read, or refused with faults that have a remedy."""
+"""Files from outside: whatever stands in them is read to finite numbers, or refused with faults that have a remedy."""
 
 from __future__ import annotations
 
 import json
+import math
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,13 +16,13 @@ from tests.support import synthetic
 from tolstat import joint, study
 from tolstat.common import strict
 from tolstat.common.errors import InputError
-from tolstat.study import costs
+from tolstat.study import costs, scaling
 from tolstat.study.study import SECTIONS as OF_STUDY
 
 FILES = int(os.environ.get("TOLSTAT_FUZZ", "40"))
-"""Files of each kind; the long run has 10000."""
+"""Files of each kind; the long run has 10000, each time others."""
 FUZZ = settings(
-    max_examples=FILES, deadline=None, derandomize=True, database=None,
+    max_examples=FILES, deadline=None, derandomize="TOLSTAT_FUZZ" not in os.environ, database=None, print_blob=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
 
@@ -90,6 +92,15 @@ def check(error: InputError) -> None:
     assert all(fault.place and fault.found and fault.remedy for fault in error.faults)
 
 
+def numbers(value: object) -> Iterator[float]:
+    """All numbers of nested tables and lists."""
+    if isinstance(value, dict | list | tuple):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from numbers(one)
+    elif isinstance(value, float):
+        yield value
+
+
 @FUZZ
 @given(text=files())
 def test_a_study_is_read_or_refused(tmp_path: Path, text: str) -> None:
@@ -101,6 +112,7 @@ def test_a_study_is_read_or_refused(tmp_path: Path, text: str) -> None:
         check(error)
     else:
         assert 0 < read.samples <= 10**9
+        assert all(map(math.isfinite, numbers([read.joint.model_dump(), read.operation.model_dump(), read.limits])))
 
 
 @FUZZ
@@ -109,18 +121,22 @@ def test_a_case_is_read_or_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "a.toml"
     path.write_text(text.replace("[sampling]", "[errors]").replace("n = 60", ""), encoding="utf-8", newline="")
     try:
-        study.load_case(path)
+        read = study.load_case(path)
     except InputError as error:
         check(error)
+    else:
+        assert all(map(math.isfinite, numbers([read.joint.model_dump(), read.operation.model_dump(), read.errors])))
 
 
 @FUZZ
 @given(over=tables, key=st.sampled_from(("material", "cross", "fork", "contact", "x")))
 def test_a_joint_is_read_or_refused(over: dict[str, object], key: str) -> None:
     try:
-        joint.load("cirelli2021", {key: over}, "a.toml")
+        read = joint.load("cirelli2021", {key: over}, "a.toml")
     except InputError as error:
         check(error)
+    else:
+        assert all(map(math.isfinite, numbers(read.model_dump())))
 
 
 COLUMNS = st.lists(st.lists(st.one_of(quantities, st.sampled_from(WORDS)), max_size=3), max_size=5)
@@ -136,21 +152,54 @@ def test_measured_errors_are_read_or_refused(
     text = synthetic.HEAD + '[tolerances]\npin1.offset_e = { distribution = "measured", file = "a.csv", column = "x", '
     (tmp_path / "a.toml").write_text(text + 'unit = "mm" }\n[sampling]\nn = 9\n', encoding="utf-8")
     try:
-        study.load(tmp_path / "a.toml")
+        read = study.load(tmp_path / "a.toml")
     except InputError as error:
         check(error)
+    else:
+        parts = read.tolerances["pin1.offset_e"].values
+        assert 0 < len(parts) <= len(rows)
+        assert all(map(math.isfinite, parts))
+
+
+COSTS = st.dictionaries(
+    st.sampled_from(("pin1.offset_t", "pin*.offset_t", "pin[23].offset_t", "hole1.diameter", "*", "x")),
+    st.dictionaries(
+        st.sampled_from(("cost", "fixed", "at", "power", "least", "most", "keep", "x")), scalars, max_size=4
+    ),
+    max_size=3,
+)
 
 
 @FUZZ
-@given(rows=COLUMNS, kind=st.sampled_from(("toml", "csv")), table=tables)
+@given(rows=COLUMNS, kind=st.sampled_from(("toml", "csv", "table")), table=COSTS)
 def test_costs_are_read_or_refused(tmp_path: Path, rows: list[list[str]], kind: str, table: dict[str, object]) -> None:
-    path = tmp_path / f"costs.{kind}"
-    lines = ["tolerance,cost,at", *map(",".join, rows)] if kind == "csv" else [section("pin1", table, False)]
-    path.write_text("\n".join(lines), encoding="utf-8", newline="")
+    (tmp_path / "a.toml").write_text(synthetic.STUDY, encoding="utf-8")
+    tolerances = scaling.tolerances(study.load(tmp_path / "a.toml"))
+    path = tmp_path / f"costs.{kind.replace('table', 'csv')}"
+    lines = [f"{json.dumps(key)} = {toml(value)}" for key, value in table.items()]
+    if kind == "csv":
+        lines = ["tolerance,cost,at", *map(",".join, rows)]
+    if kind == "table":
+        names = tuple(costs.CostEntry.model_fields)
+        lines = [",".join(("tolerance", *names))]
+        lines += [",".join([key, *(str(entry.get(name, "")) for name in names)]) for key, entry in table.items()]
+    path.write_text("\n".join(lines), encoding="utf-8", errors="ignore", newline="")
     try:
-        costs.of([], path)
+        read = costs.of(tolerances, path)
     except InputError as error:
         check(error)
+    else:
+        assert len(read) == len(tolerances)
+        assert all(math.isfinite(cost.at(factor)) for cost in read for factor in cost.reach)
+
+
+@pytest.mark.parametrize("entry", ['{ cost = 9, at = "1e300 mm", power = 10 }', '{ cost = 1e308, at = "1 mm" }'])
+def test_costs_beyond_all_numbers_are_refused(tmp_path: Path, entry: str) -> None:
+    (tmp_path / "a.toml").write_text(synthetic.STUDY, encoding="utf-8")
+    (tmp_path / "costs.toml").write_text(f'"pin*.offset_t" = {entry}', encoding="utf-8")
+    with pytest.raises(InputError, match="costs more than a number can hold") as raised:
+        costs.of(scaling.tolerances(study.load(tmp_path / "a.toml")), tmp_path / "costs.toml")
+    check(raised.value)
 
 
 def refused(tmp_path: Path, text: str) -> str:

@@ -25,6 +25,10 @@ from tolstat.store import integrity, result_file
 LIMIT_S = 30
 """Processor seconds of a command."""
 WALL_S = 600.0
+LEAVES_S = 10.0
+"""Time in which the processes that a command started must end after it."""
+LEFT_BEHIND = 97
+"""Exit code of a command whose processes had to be killed after it."""
 LIMIT_BYTES = 1 << 30
 ODD: tuple[Any, ...] = (
     *(None, True, -1, 0, 1, 2**31, 2**33, 10**9, 10**400, 1e300, -1e300, 0.5, float("nan"), float("inf")),
@@ -146,17 +150,47 @@ def call(words: Sequence[object], folder: Path) -> Ended:
         if ended:
             break
         if time.monotonic() - begun > WALL_S:
-            os.kill(pid, signal.SIGKILL)
+            os.killpg(pid, signal.SIGKILL)
         time.sleep(0.002)
     own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    code = os.waitstatus_to_exitcode(state)
+    code = LEFT_BEHIND if _left_behind(pid) else os.waitstatus_to_exitcode(state)
     said, told = (path.read_text(encoding="utf-8", errors="replace") for path in (out, err))
     said = re.sub(r'.*"wall_s".*\n', "", said)  # the one number that is another in each run
     return Ended(code, said, told, time.monotonic() - begun, 1024 * (usage.ru_maxrss - own))
 
 
+def run(words: Sequence[str], copied: Path) -> Ended:
+    """Pass a file to a command; what the command wrote is part of its output.
+
+    A page is text; a result file is exported.
+    """
+    folder = copied.parent
+    ended = call([copied if word == "FILE" else word for word in words], folder)
+    page, whole = folder / "page.html", copied if words[0] == "extend" else folder / "whole.h5"
+    if page.exists():
+        ended = ended._replace(out=ended.out + page.read_text(encoding="utf-8"))
+    if ended.code == 0 and words[0] in ("extend", "merge"):
+        after = call(["export", whole, "--csv", "-", "--quiet"], folder)
+        memory = max(ended.memory, after.memory)
+        ended = after._replace(out=ended.out + after.out, err=ended.err + after.err, memory=memory)
+    return ended
+
+
+def _left_behind(group: int) -> bool:
+    """Whether processes of a command outlive it; they are killed."""
+    begun = time.monotonic()
+    with contextlib.suppress(ProcessLookupError):
+        while time.monotonic() - begun < LEAVES_S:
+            os.killpg(group, 0)
+            time.sleep(0.002)
+        os.killpg(group, signal.SIGKILL)
+        return True
+    return False
+
+
 def _be_command(words: list[str], out: Path, err: Path, folder: Path) -> None:
     code = 99
+    os.setsid()
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
         limit = pages * resource.getpagesize() + LIMIT_BYTES
@@ -191,7 +225,8 @@ def fault(ended: Ended, usual: Ended) -> str:
         return f"{ended.memory >> 20} MiB"
     if ended.code == 2:
         return "" if "error: " in ended.err and "hint: " in ended.err else "no message"
-    told = "damaged" in ended.err or "pending" in ended.out + ended.err
+    on_page = "is damaged:" in ended.out and "is damaged:" not in usual.out
+    told = on_page or "damaged" in ended.err or "pending" in ended.err
     return "" if ended.out == usual.out or told else "silent difference"
 
 
@@ -222,7 +257,7 @@ def search(
     usual = {}
     for words in commands:
         _fresh(path, folder)
-        usual[tuple(words)] = call([copied if word == "FILE" else word for word in words], folder)
+        usual[tuple(words)] = run(words, copied)
         assert usual[tuple(words)].code in (0, 1), usual[tuple(words)]
     found, kinds = [], {"same": 0, "refused": 0, "told": 0, "meant": 0}
     for number in numbers:
@@ -230,7 +265,7 @@ def search(
             _fresh(path, folder)
             rng = np.random.default_rng(number)
             done = corrupt(copied, rng)
-            ended = call([copied if word == "FILE" else word for word in words], folder)
+            ended = run(words, copied)
             wrong = fault(ended, usual[tuple(words)])
             meant = wrong == "silent difference" and done.startswith(("mutated", "odd_number"))
             if wrong and not meant:

@@ -40,7 +40,7 @@ class Aside(Generic[T]):
         if forks and CAN_FORK:
             context = multiprocessing.get_context("fork")
             self._end, other = context.Pipe(duplex=False)
-            self._process = context.Process(target=_send, args=(function, other), daemon=True)
+            self._process = context.Process(target=_send, args=(function, other, self._end), daemon=True)
             self._process.start()
             other.close()
 
@@ -62,7 +62,8 @@ class Aside(Generic[T]):
         return self._found[0]
 
 
-def _send(function: Callable[[], object], end: Connection) -> None:
+def _send(function: Callable[[], object], end: Connection, parents: Connection) -> None:
+    parents.close()  # so that sending fails where the parent was killed: nobody else reads, and this process ends
     try:
         end.send(function())
     except BaseException:  # the parent evaluates the function again, and raises what there is to raise

@@ -92,6 +92,14 @@ class Cost(NamedTuple):
         most = min([REACH[1], *(e.most / self.width for e in self.entries if e.most is not None)])
         return min(least, 1.0), max(most, 1.0)
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether the cost is finite over the reach; it is largest and smallest at its ends."""
+        try:
+            return all(math.isfinite(self.at(factor)) for factor in self.reach)
+        except OverflowError:
+            return False
+
 
 def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
     """Cost of each tolerance.
@@ -134,7 +142,14 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
         toml = path.suffix != ".csv"
         raise InputError(strict.with_lines(faults, str(path), read_input(path)) if toml else faults)
     kept = CostEntry(cost=0.0, keep=True)
-    return [Cost(t.width, tuple(found.get(name, kept) for name in t.names)) for t in tolerances]
+    read = [Cost(t.width, tuple(found.get(name, kept) for name in t.names)) for t in tolerances]
+    if faults := [
+        Fault(f"{path}: {tolerance.pattern}", "costs more than a number can hold", "give a smaller cost, at or power")
+        for tolerance, cost in zip(tolerances, read, strict=True)
+        if not cost.is_finite
+    ]:
+        raise InputError(faults)
+    return read
 
 
 def _read_csv(path: Path) -> dict[str, dict[str, Any]]:

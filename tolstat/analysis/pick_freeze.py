@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.exceedance import FloatArray, clopper_pearson
-from tolstat.analysis.sensitivity import WIDER, normal_half
+from tolstat.analysis.sensitivity import normal_half
 from tolstat.common.shown import shown
 
 FEWEST = 50
 """Minimum number of points for an index."""
+WIDER = 1.2
+"""Factor on standard errors: those of few points are too small (measured)."""
 
 
 @shown
@@ -63,7 +65,7 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     confidence : float
         Confidence level of the intervals. Indices are ratios of two means over the points: intervals are Fieller's
         (1954), whose upper end is further away where the variance comes from few points. Their standard errors are
-        taken `sensitivity.WIDER` times as large.
+        taken `WIDER` times as large.
 
     Returns
     -------

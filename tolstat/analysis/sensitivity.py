@@ -17,10 +17,12 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.ranks import ranks
 from tolstat.common.shown import shown
 
-WIDER = 1.2
+WIDER = 1.4
 """Factor on standard errors of shares of a variance: too small for few joints and for skew loads (measured)."""
 FEWEST = 50
 """Minimum number of joints for an index."""
+WIDER_BY_FEW = 50.0
+"""Standard errors are taken 1 + 50/n times as large: fits of few joints look better than they are (measured)."""
 DEGREE = 3
 """Degree in each error of the polynomials that model the interaction of two errors."""
 MOST = 20_000
@@ -334,8 +336,9 @@ def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:
 
 def _error(influence: FloatArray, chance: FloatArray) -> NDArray[np.float64]:
     """Standard errors. The influence function of noisy coefficients counts chance variance twice: subtract it once."""
-    plain = influence.var(axis=0) / len(influence)
-    return np.asarray(np.sqrt(np.maximum(plain - chance, chance)))
+    n = len(influence)
+    plain = influence.var(axis=0) / n
+    return np.asarray((1.0 + WIDER_BY_FEW / n) * np.sqrt(np.maximum(plain - chance, chance)))
 
 
 def normal_half(confidence: float) -> float:

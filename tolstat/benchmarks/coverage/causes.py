@@ -16,7 +16,6 @@ Rng = np.random.Generator
 WEIGHTS = np.array([1.0, 0.5, 0.0])
 """Weights of the three errors in the loads."""
 LONG = "the variance of a load with a long tail is that of few joints; `causes --run` decomposes its logarithm"
-FEW = "its error is estimated from few joints"
 BENT = "few joints for a load with several bends in an error"
 
 
@@ -225,6 +224,5 @@ def _angles(n: int, m: int = 24) -> Experiment:
         own = sensitivity.over_revolution(x, y)[1]
         return [Found(*f) for f in zip(own.lower, own.upper, truth, strict=True)]
 
-    known = FEW if n < 500 else ""
-    asked = (Asked("index over the revolution", f"error {k + 1}", n, known=known) for k in range(3))
+    asked = (Asked("index over the revolution", f"error {k + 1}", n) for k in range(3))
     return Experiment(tuple(asked), once)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.benchmarks.coverage.run import MOST, Coverage
-from tolstat.benchmarks.coverage.statistics import CONTROL, STATISTICS
+from tolstat.benchmarks.coverage.statistics import CONTROL, NONE, STATISTICS
 from tolstat.benchmarks.coverage.trial import Row
 from tolstat.display.text import align
 
@@ -123,7 +123,11 @@ def _legend(found: Coverage) -> str:
 
 def _verdict(found: Coverage, bullet: str = "") -> list[str]:
     """Sentences: which rows miss, whether the bench finds the wrong estimator."""
-    missing = [row for row in found.rows if found.misses(row) and row.asked.statistic != CONTROL]
+    missing = [
+        row
+        for row in found.rows
+        if found.misses(row) and row.asked.statistic != CONTROL and STATISTICS[row.asked.statistic].claim != NONE
+    ]
     told = [f"{bullet}{_sentence(row)}" for row in missing]
     controls = [row for row in found.rows if row.asked.statistic == CONTROL]
     parts = []

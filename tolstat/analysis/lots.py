@@ -24,7 +24,7 @@ LEAST = 30
 FEW = 20
 """Number of joints on a side of a level below which an interval contains that of independent joints, too, and effective
 number below which it contains that of the beta-binomial law."""
-STEP = 0.1
+STEP = 0.2
 """Distance of the mean shares, on the logit scale, at which the posterior density of that law is computed."""
 MOST_LEVELS = 2000
 """Number of loads at which the interval of a quantile is looked for; its ends are rounded outwards to one of these."""
@@ -115,7 +115,7 @@ def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArr
 
     p = k.sum(axis=0) / n.sum(axis=0)
     means = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP)
-    mean, r = np.meshgrid(expit(means), expit(SPREADS), indexing="ij")
+    mean, r = np.meshgrid(expit(means), expit(SPREADS[::2]), indexing="ij")
     a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
     pairs, which = np.unique(np.stack([k.ravel(), n.ravel()]), axis=1, return_inverse=True)
     times = np.zeros((k.shape[1], pairs.shape[1]))
@@ -153,16 +153,16 @@ def curve_of(
     each = [exceedance.curve_of(part, table["level"], confidence, iid=False) for part in parts]
     n, valid = np.array([part.n for part in parts]), np.array([part.valid.size for part in parts])
     shape = (len(parts), len(table))
-    counted = {
-        "estimate": (np.reshape([own["count"] for own in each], shape)[valid > 0], valid[valid > 0]),
-        "bound_lower": (np.reshape([own["bound_lower"] for own in each], shape) * n[:, None], n),
-        "bound_upper": (np.reshape([own["bound_upper"] for own in each], shape) * n[:, None], n),
-    }
+    counted = {"estimate": (np.reshape([own["count"] for own in each], shape)[valid > 0], valid[valid > 0])}
+    if (valid < n).any():
+        for name in ("bound_lower", "bound_upper"):
+            counted[name] = ((np.reshape([own[name] for own in each], shape) * n[:, None]).round(), n)
+    shares = {name: interval(above, joints, confidence) for name, (above, joints) in counted.items()}
     ends = {"estimate": ("lower", "upper"), "bound_lower": ("outer_lower", ""), "bound_upper": ("", "outer_upper")}
     for name, (low, high) in ends.items():
-        above, joints = counted[name]
-        found = interval(above.round(), joints, confidence)
-        total = above.sum(axis=0).round()
+        own = name if name in counted else "estimate"
+        (above, joints), found = counted[own], shares[own]
+        total = above.sum(axis=0)
         few = np.minimum(total, joints.sum() - total) < FEW
         for end, value, outermost in ((low, found.lower, np.minimum), (high, found.upper, np.maximum)):
             if end:

@@ -17,12 +17,12 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.ranks import ranks
 from tolstat.common.shown import shown
 
-WIDER = 1.4
-"""Factor on standard errors of shares of a variance: too small for few joints and for skew loads (measured)."""
+WIDER = 1.2
+"""Factor on standard errors of shares of a variance, which are too small (measured)."""
+FEW = 16.0
+"""Standard errors are taken 1 + 16/m times as large if effectively m joints make up a load's variance (measured)."""
 FEWEST = 50
 """Minimum number of joints for an index."""
-WIDER_BY_FEW = 50.0
-"""Standard errors are taken 1 + 50/n times as large: fits of few joints look better than they are (measured)."""
 DEGREE = 3
 """Degree in each error of the polynomials that model the interaction of two errors."""
 MOST = 20_000
@@ -129,12 +129,12 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     """
     errors, loads = _checked(x, y)
     centred = (loads - loads.mean(axis=0)).reshape(len(loads), -1)
-    variance = centred.var(axis=0)
+    variance, wider = centred.var(axis=0), _wider(centred**2)
     found = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
     for i, column in enumerate(errors.T):
         if np.ptp(column) > 0:
             own = _fit(column, centred)
-            found[0, i], found[1, i] = own.share, _error(own.influence, own.chance)
+            found[0, i], found[1, i] = own.share, _error(own.influence, own.chance) * wider
     estimate, error = found.reshape(2, errors.shape[1], *loads.shape[1:])
     return _with_ends(estimate, error, variance.reshape(loads.shape[1:]), confidence, iid)
 
@@ -171,7 +171,7 @@ def over_revolution(
     errors, loads = _checked(x, y)
     n, centred = len(loads), (loads - loads.mean(axis=0)).reshape(len(loads), -1)
     variance, square = centred.var(axis=0), centred**2
-    whole = variance.sum()
+    whole, wider, overall = variance.sum(), _wider(square), _wider(square.sum(axis=1))
     # chance contributions at two angles are correlated as the loads at these angles are
     alike = ((centred.T @ centred / n) ** 2).sum() / whole**2 if whole > 0 else np.nan
     local = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
@@ -179,11 +179,11 @@ def over_revolution(
     for i, column in enumerate(errors.T):
         if np.ptp(column) > 0 and whole > 0:
             fit = _fit(column, centred)
-            local[0, i], local[1, i] = fit.share, _error(fit.influence, fit.chance)
+            local[0, i], local[1, i] = fit.share, _error(fit.influence, fit.chance) * wider
             share, influence = np.nan_to_num(fit.share), np.nan_to_num(fit.influence)
             found[0, i] = variance @ share / whole
             own = (influence @ variance + square @ (share - found[0, i])) / whole
-            found[1, i] = _error(own, alike * _chance(found[0, i], fit.degrees, n))
+            found[1, i] = _error(own, alike * _chance(found[0, i], fit.degrees, n)) * overall
     return (
         _with_ends(local[0], local[1], variance, confidence, iid),
         _with_ends(found[0], found[1], np.asarray(variance.mean()), confidence, iid),
@@ -228,7 +228,8 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     first = np.array([fit.share[0] for fit in fits])
     influence = np.column_stack([fit.influence[:, 0] for fit in fits])
     chance = np.array([fit.chance[0] for fit in fits])
-    alone = _with_ends(first, _error(influence, chance), np.asarray(e.var()), confidence, iid)
+    wider = _wider(e**2)
+    alone = _with_ends(first, _error(influence, chance) * wider, np.asarray(e.var()), confidence, iid)
     # subtract significant effects of single errors, which would be noise in the estimates of pairs
     main = sum((fit.mean[:, 0] for fit, s, c in zip(fits, first, chance, strict=True) if s > 2 * c**0.5), 0.0 * e)
     pairs, of_pairs, chance_of_pairs = _interactions(errors, e - main, e.var())
@@ -237,9 +238,9 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     own = influence + influence_of_pairs
     everything = influence.sum(axis=1) + 0.5 * influence_of_pairs.sum(axis=1)
     rest = 1.0 - first.sum() - 0.5 * pairs.sum()
-    errors_lower = _error(own, chance + chance_of_pairs.sum(axis=1))
+    errors_lower = _error(own, chance + chance_of_pairs.sum(axis=1)) * wider
     without = chance.sum() - chance + 0.5 * chance_of_pairs.sum() - chance_of_pairs.sum(axis=1)
-    errors_upper = _error(own - everything[:, None], without)
+    errors_upper = _error(own - everything[:, None], without) * wider
     z = normal_half(confidence) if iid else np.nan
     np.fill_diagonal(pairs, np.nan)
     lower = np.clip(estimate - z * errors_lower, 0, 1)
@@ -336,9 +337,17 @@ def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:
 
 def _error(influence: FloatArray, chance: FloatArray) -> NDArray[np.float64]:
     """Standard errors. The influence function of noisy coefficients counts chance variance twice: subtract it once."""
-    n = len(influence)
-    plain = influence.var(axis=0) / n
-    return np.asarray((1.0 + WIDER_BY_FEW / n) * np.sqrt(np.maximum(plain - chance, chance)))
+    plain = influence.var(axis=0) / len(influence)
+    return np.asarray(np.sqrt(np.maximum(plain - chance, chance)))
+
+
+def _wider(square: FloatArray) -> FloatArray:
+    """Factor on standard errors, (...), by squared deviations of loads, (n, ...): large for few joints and skew loads.
+
+    Effectively (sum of squares)² / sum of their squares joints make up a variance, a third of them if loads are normal.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(1.0 + FEW * (square**2).sum(axis=0) / square.sum(axis=0) ** 2)
 
 
 def normal_half(confidence: float) -> float:

@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.store.test_store import new_store, simulation
-from tests.support import fakes, synthetic
+from tests.support import corruption, fakes, synthetic
 from tolstat import cli
 from tolstat.common.errors import InputError, StoreError
 from tolstat.store import Reader, ResultStore, integrity, result_file, verification
@@ -280,6 +280,17 @@ def test_a_result_file_names_regular_files_of_its_own_folder_only(measured: Path
     assert time.monotonic() - begun < 5
     assert "hunter2" not in str(raised.value)
     assert "root:" not in str(raised.value)
+
+
+@pytest.mark.parametrize("text", ["\x1b[2J\u202e", "[tolerances", "tolerances = 3\nsweep = 1\nfatigue = []"])
+@pytest.mark.parametrize("words", [["export", "--statistics", "-"], ["report"], ["fatigue"], ["sorting"]])
+def test_a_study_that_is_no_study_ends_in_one_message(tmp_path: Path, text: str, words: list[str]) -> None:
+    path = synthetic.store(tmp_path)
+    put_study(path, text)
+    ended = corruption.call([words[0], path, *words[1:]], tmp_path)
+    assert ended.code in (0, 2), ended.err
+    assert "Traceback" not in ended.err
+    assert ended.code == 0 or str(path) in ended.err
 
 
 def test_contents_of_files_that_a_result_file_names_are_not_quoted(measured: Path) -> None:

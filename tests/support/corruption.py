@@ -267,7 +267,8 @@ def search(
             done = corrupt(copied, rng)
             ended = run(words, copied)
             wrong = fault(ended, usual[tuple(words)])
-            meant = wrong == "silent difference" and done.startswith(("mutated", "odd_number"))
+            differs = wrong == "exit code 1" and words[0] == "replay" and "Traceback" not in ended.err
+            meant = (differs or wrong == "silent difference") and done.startswith(("mutated", "odd_number"))
             if wrong and not meant:
                 found.append(Found(f"{number}: {done}", " ".join(words), wrong, ended))
             same = ended.out == usual[tuple(words)].out

@@ -68,6 +68,21 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     return data
 
 
+def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
+    """Read a section of a TOML text that a file holds; empty if there is none.
+
+    Raises
+    ------
+    InputError
+        When the text is not TOML, or the section is no table.
+    """
+    found = read_toml(place, text).get(name, {})
+    if not isinstance(found, dict):
+        remedy = f"the file is damaged, or of another program: run its study again with a table [{name}]"
+        raise InputError([Fault(str(place), f"holds a study whose {name} is no table", remedy)])
+    return found
+
+
 def depth(data: object) -> int:
     """Number of tables and lists inside each other."""
     depth, level = 0, [data]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.files import only_below
-from tolstat.common.strict import validate
+from tolstat.common.strict import read_section, validate
 from tolstat.store.recorded import joint_of
 from tolstat.study import Study, load, subset_of
 from tolstat.study.model import Solver
@@ -78,7 +77,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
 
 def mentions(store: Reader, keys: Collection[str], section: str) -> bool:
     """Whether a section of a file's study, as it is written, has one of some keys; the study itself is not read."""
-    return _has(tomllib.loads(store.study_text).get(section, {}), keys)
+    return _has(read_section(store.path, store.study_text, section), keys)
 
 
 def _has(table: Mapping[str, Any], keys: Collection[str]) -> bool:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, read_section, refuse
 from tolstat.common.tables import CHANNELS
 from tolstat.study import stress_point
 from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve
@@ -148,7 +148,7 @@ def of_text(text: str, place: str) -> Fatigue:
     InputError
         With every fault.
     """
-    return read(tomllib.loads(text).get("fatigue", {}), place)
+    return read(read_section(Path(place), text, "fatigue"), place)
 
 
 def _inner(table: object, key: str) -> Mapping[str, Any]:

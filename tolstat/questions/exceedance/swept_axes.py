@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.strict import read_section
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.store import recorded
@@ -51,7 +51,8 @@ def swept_axes(view: View) -> list[Axis]:
     list of Axis
         Empty when nothing varies.
     """
-    errors, patterns = view.errors(np.arange(view.n)), _patterns(tomllib.loads(view.store.study_text).get("sweep", {}))
+    patterns = _patterns(read_section(view.store.path, view.store.study_text, "sweep"))
+    errors = view.errors(np.arange(view.n))
     columns = {(field.name, field.unit): errors[field.name] for field in ERROR_FIELDS}
     if len(view.parts) == 1:  # of several operating points none is swept
         own = recorded.operating_points(view.store, slice(view.store.first_sample, None))

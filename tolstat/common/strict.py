@@ -78,7 +78,7 @@ def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
     """
     found = read_toml(place, text).get(name, {})
     if not isinstance(found, dict):
-        remedy = f"the file is damaged, or of another program: run its study again with a table [{name}]"
+        remedy = "the file is damaged: run its study again into another one"
         raise InputError([Fault(str(place), f"holds a study whose {name} is no table", remedy)])
     return found
 

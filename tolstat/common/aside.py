@@ -1,7 +1,7 @@
 """Functions evaluated in other processes while this one goes on: forks of it, which need no start and no copies.
 
 Where there is no fork that is safe (outside Linux), functions are evaluated here. Results do not depend on that. A fork
-may read a result file that is open here for reading: HDF5 reads at given places (pread), so processes share no position.
+may read a result file that is open here for reading: HDF5 reads at given places (pread), they share no position.
 """
 
 from __future__ import annotations

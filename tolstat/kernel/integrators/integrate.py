@@ -38,8 +38,6 @@ ERROR_TO_GROW = 0.1
 """Estimated error, in units of the tolerance, below which a step may be doubled."""
 MAX_RATIO = 2.0
 """Largest ratio of a step to the one before, for the stability of BDF2 and with error control."""
-START_LEVEL = 4
-"""Level of the first sub-step of BDF2, 1/2^4 of the step: without earlier points it is implicit Euler."""
 
 bdf2_predict = bdf2.predict
 alpha_predict, alpha_accept = generalized_alpha.predict, generalized_alpha.accept
@@ -196,11 +194,8 @@ def build_advance(newton):
 
     Returns
     -------
-    substeps : jitted function (t, h, level, par, options, work, state) -> bool
-        Take one step of the output grid, at first in sub-steps of h / 2^level; False when the smallest one failed, or
-        no attempt is left.
     advance : jitted function (t, h, par, options, work, state) -> bool
-        The same, at first as a whole; the first step of BDF2 at `START_LEVEL`.
+        Take one step of the output grid; False when the smallest sub-step failed, or no attempt is left.
     """
 
     @njit_inner
@@ -213,9 +208,9 @@ def build_advance(newton):
         return error <= 1, error
 
     @njit_inner
-    def substeps(t, h, level, par, options, work, state):
+    def advance(t, h, par, options, work, state):
         whole = 1 << options.max_halvings  # progress is counted in sub-steps of the smallest size
-        done = 0
+        done = level = 0
         while done < whole:
             if options.method == BDF2 or options.rtol > 0:
                 level = admissible_level(level, h, state.memory[H_OLD], options)
@@ -236,14 +231,7 @@ def build_advance(newton):
                     return False
         return True
 
-    @njit_inner
-    def advance(t, h, par, options, work, state):
-        level = 0
-        if options.method == BDF2 and state.memory[H_OLD] == 0:
-            level = min(START_LEVEL, options.max_halvings)
-        return substeps(t, h, level, par, options, work, state)
-
-    return substeps, advance
+    return advance
 
 
 def build_integrator(residual, factorise, solve, size=scaled_size, small=at_rounding):
@@ -271,4 +259,4 @@ def build_integrator(residual, factorise, solve, size=scaled_size, small=at_roun
         Take one step of the output grid; False when the smallest sub-step failed, or no attempt is left.
     """
     newton = build_newton(residual, factorise, solve, size, small)
-    return newton, build_advance(newton)[1]
+    return newton, build_advance(newton)

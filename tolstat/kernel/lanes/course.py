@@ -6,7 +6,7 @@ lane's joint; `control` and `motion` are read joint by joint.
 """
 
 from tolstat.common.tables import MAX_ITERATIONS
-from tolstat.kernel.integrators.integrate import START_LEVEL, admissible_level, next_substep_level
+from tolstat.kernel.integrators.integrate import admissible_level, next_substep_level
 from tolstat.kernel.integrators.mesh import cells_of, next_level, note_cell
 from tolstat.kernel.integrators.state import AHEAD, H_OLD, STAGED_STEP
 from tolstat.kernel.integrators.trbdf2 import GAMMA
@@ -94,7 +94,7 @@ def start_motion(lane, par, options, control, motion):
         for i in range(N_DOF):
             motion.q1[i, lane] = motion.q0[i, lane]
         control.phase[lane], control.factorised[lane], control.k[lane] = STEP, 0.0, 1
-        control.level[lane] = min(START_LEVEL, options.max_halvings)
+        control.level[lane] = 0
         if follows_error(options):
             control.phase[lane], control.k[lane] = PART, 0  # `start_cells` continues from here
         else:

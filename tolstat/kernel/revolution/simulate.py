@@ -75,7 +75,7 @@ def factorise_static(t, q, v, a, cv, ca, par, options, work):
 
 
 newton = integrate.build_newton(residual, factorise, solve)
-substeps, advance = integrate.build_advance(newton)
+advance = integrate.build_advance(newton)
 static_newton = integrate.build_newton(residual, factorise_static, solve, small=near)
 hold, relax, equilibrium = build_equilibrium(residual, newton, static_newton, integrate.scaled_size, rigid_guess)
 revolution = build_quasistatic(hold, relax, record)

@@ -27,8 +27,8 @@ KEPT = tuple(f"cross{i}.F_max" for i in (1, 2, 3, 4))
 AT_POINTS = ("results", "ledger", "histories", "verify")
 
 
-def fake(**changes):
-    return fakes.Study(points=POINTS, output=fakes.Output("full", results=KEPT), **changes)
+def fake(points=POINTS, **changes):
+    return fakes.Study(points=points, output=fakes.Output("full", results=KEPT), **changes)
 
 
 def run(plan, path, check=False, **given):
@@ -145,9 +145,7 @@ def test_a_duty_cycle_of_one_file_is_that_of_a_file_for_each_point(tmp_path, who
     path, times, speeds = tmp_path / "duty.h5", (0.5, 0.3, 0.2), (1.0, -2.0, 4.0)
     points = [p._replace(share=t, operation=p.operation.model_copy(update={"speed": s}))
               for p, t, s in zip(POINTS, times, speeds, strict=True)]  # fmt: skip
-    shutil.copy(whole, path)
-    with ResultStore.open_to_write(path) as store:
-        store.update_study(replace(fake(), points=tuple(points)))
+    run(fake(tuple(points)), path)
     with Reader.open(path) as store:
         view, chosen = store.view(), ["cross1.F_t", "fork2.T"]
         one = load_cycles([view], names=chosen, samples=3)

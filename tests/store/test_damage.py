@@ -208,6 +208,7 @@ CONTENTS = {
             {"": POINT | wrong}
             for wrong in ({"alpha": 2.0}, {"speed": 0.0}, {"torque": "x"}, {"share": 2.0}, {"x": 1.0})
         ),
+        {"": POINT},
     ],
     "options": [{}, {"steps_per_rev": 10**9}, {"method": "rk4"}, {"fidelity": 1}, {"newton_tol": "1e-6"}, {"warp": 9}],
     "sampling": [{}, {"seed": -1}, {"seed": 1.5}, {"n": 10**9}, {"method": "magic"}, {"nominal_first": 1}],
@@ -218,7 +219,7 @@ CONTENTS = {
     "design": [{}, {"cases": 3, "variants": []}, {"cases": [], "variants": [{"family": 1}]}],
     "histories": [{"a/b": [[3], "f4", "N", "x"]}, {"loads": 3}, {"loads": [[3], "O", "N", "x"]}],
     "identity": [[], {"output.results": 3}],
-    "joint": [3, []],
+    "joint": [3, [], {"cross": {"R": "3 m"}}, {"material": {"E": 1}}, {"wheel": 3}],
 }
 
 

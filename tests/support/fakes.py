@@ -37,6 +37,7 @@ from tolstat.common.tables import (
 from tolstat.joint import Operation
 from tolstat.solver import stationary
 from tolstat.store import Counts
+from tolstat.study.design import flat
 from tolstat.study.model import Sampling
 from tolstat.study.points import Point
 
@@ -161,8 +162,10 @@ class Study:
 
     def identity(self) -> dict[str, Any]:
         """Return what decides the numbers."""
-        solver = {"solver.steps_per_rev": self.solver.steps_per_rev}
-        return solver | {"sampling.n": self.n, "sampling.seed": self.seed} | self.output.identity()
+        operations = {point.name: point.operation.model_dump() for point in self.points}
+        parts = {"joint": self.joint, "operation": operations.get("", operations)}
+        settings = {"solver.steps_per_rev": self.solver.steps_per_rev} | dict(flat(parts))
+        return settings | {"sampling.n": self.n, "sampling.seed": self.seed} | self.output.identity()
 
 
 def draw(study: Study) -> np.ndarray:

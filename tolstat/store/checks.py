@@ -19,10 +19,11 @@ from h5py import h5t
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.common.loads import split
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec
-from tolstat.joint import Operation
+from tolstat.joint import AFFECT_NOTHING, Operation
 from tolstat.store import integrity, layout, metadata
 from tolstat.store.layout import Stored
 from tolstat.store.result_file import FILETYPE, check_column, descriptions, place_of, store_error, text
+from tolstat.study.design import flat
 from tolstat.study.points import Point
 
 DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError, RuntimeError, OSError)
@@ -106,14 +107,36 @@ def points(file: h5py.File) -> dict[str, Point]:
     Raises
     ------
     KeyError, ValueError, TypeError
-        When it does not describe operating points.
+        When it does not describe operating points, or others than the campaign has.
     """
     found = {}
     for name, values in metadata.read(file, "points").items():
         share = values.pop("share")
+        _check_identity(file, f"operation.{name}." if name else "operation.", values)
         own = {key: float(value) for key, value in values.items()}
         found[name] = Point(name, Operation.model_construct(None, **own), math.nan if share is None else float(share))
     return found
+
+
+def joint(file: h5py.File) -> dict[str, Any]:
+    """Read the attribute ``joint``: the nominal joint, as a study gives it.
+
+    Raises
+    ------
+    KeyError, ValueError, TypeError
+        When it is not the joint of the campaign.
+    """
+    held: dict[str, Any] = metadata.read(file, "joint")
+    _check_identity(file, "joint.", {key: value for key, value in held.items() if key not in AFFECT_NOTHING})
+    return held
+
+
+def _check_identity(file: h5py.File, place: str, held: Mapping[str, Any]) -> None:
+    """Check that the settings of an attribute are those of the campaign below the key `place`."""
+    identity = metadata.read(file, "identity")
+    for key, value in flat(held, place):
+        if identity[key] != value:
+            raise ValueError(f"{key} is {identity[key]} in the attribute identity and {value} beside it")
 
 
 def limits(file: h5py.File, points: Mapping[str, Point]) -> dict[str, float]:

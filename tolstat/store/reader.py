@@ -375,7 +375,7 @@ class Reader(CheckedTables):
         self.study_text = text(attrs, "study")
         self.points = checks.points(self._file)
         self.limits = checks.limits(self._file, self.points)
-        self.joint: dict[str, Any] = metadata.read(self._file, "joint")
+        self.joint = checks.joint(self._file)
 
     def _reopen(self) -> bool:
         """Switch to the file that has replaced this one and includes the histories; return whether there is one."""

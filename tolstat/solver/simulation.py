@@ -271,11 +271,12 @@ def simulate_together(
 
     batch, tally = lanes(options), _tally()
     max_size = max(1, MAX_KEPT_SAMPLES // options.steps_per_rev) if keep else len(params)
+    memory = make_samples(min(max_size, len(params)) if keep else 0, options.steps_per_rev)
     for here in _groups(params, max_size):
         part = np.ascontiguousarray(params[here])
         batch.par.n_stations = part["n_stations"][0]
         words = part.view(np.float64).reshape(len(part), -1)
-        samples = make_samples(len(part) if keep else 0, options.steps_per_rev)
+        samples = memory[: len(part)]
         own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
         out = np.zeros(len(part), KERNEL_RESULT).view(np.recarray)
         rows, allowed = part.view(np.recarray), left[here]

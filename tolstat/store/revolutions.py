@@ -224,7 +224,6 @@ def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
 
 
 def _all(store: Reader, parts: list[NDArray[np.intp]]) -> list[Again]:
-    warm_up()
     return [_simulated(store, part) for part in parts]
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 import llvmlite
 import numba
 from numba.core.caching import Cache, FunctionCache
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from tolstat.kernel.simd.cache_folder import SUFFIX, tell
@@ -96,3 +97,12 @@ class CheckedCache(FunctionCache):
         super().__init__(py_func)
         locator = self._impl.locator
         self._cache_file = CheckedFiles(locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp())
+
+    def load_overload(self, sig, target_context):
+        """Load a version of the kernel; None if there is none.
+
+        Numba first registers all functions that it can compile, which takes as long as loading all kernels. Code that
+        is compiled needs its runtime only, and what is to be compiled registers them then.
+        """
+        rtsys.initialize(target_context)
+        return self._load_overload(sig, target_context)

@@ -7,14 +7,18 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import TolstatError
+from tolstat.common.errors import Fault, StoreError, TolstatError
 from tolstat.common.loads import BUSHING_LOADS
+from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
-from tolstat.questions.causes.angles import evaluated
-from tolstat.questions.causes.tail import worst_joints
+from tolstat.questions.causes.tail import worst_samples
 from tolstat.store import revolutions
 from tolstat.store.view import View
 
+JOINTS = 1000
+"""Default number of joints evaluated, the first settled ones: some 2 s if they are simulated again."""
+MIN_JOINTS = 100
+"""Minimum number of joints for shares to be given."""
 DRAWN = 3
 """Number of the worst joints drawn for each load."""
 
@@ -34,4 +38,24 @@ def begin(view: View, asked: Asked) -> None:
 
 def drawn(view: View, load: str) -> NDArray[np.intp]:
     """Samples of the worst joints whose loads over the revolution are drawn, ascending."""
-    return np.unique(worst_joints(view, load, DRAWN).samples)
+    return np.unique(worst_samples(view, load, DRAWN))
+
+
+def evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """File slots of the nominal joint, (1,), if it settled, else (0,); and the samples that `against_angle` evaluates.
+
+    Raises
+    ------
+    StoreError
+        As `against_angle`.
+    """
+    view.check_drawn()
+    view.check_sample(allow_weights=False)
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
+    samples = np.flatnonzero(view.status == Status.OK)[:joints]
+    if len(samples) < MIN_JOINTS:
+        too_few = f"has {len(samples)} settled joints to evaluate"
+        raise StoreError(str(Fault(str(view.path), too_few, f"{MIN_JOINTS} are needed: run more joints")))
+    return view.nominal_slots[view.nominal["status"] == Status.OK], samples

@@ -15,7 +15,8 @@ from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import BUSHINGS, Status
+from tolstat.common.tables import BUSHINGS
+from tolstat.questions.causes.ahead import JOINTS, evaluated
 from tolstat.questions.causes.query import scattering
 from tolstat.store import revolutions
 from tolstat.store.revolutions import FloatArray, Revolutions
@@ -24,10 +25,6 @@ from tolstat.store.view import View
 if TYPE_CHECKING:
     import pandas as pd
 
-JOINTS = 1000
-"""Default number of joints evaluated, the first settled ones: some 2 s if they are simulated again."""
-MIN_JOINTS = 100
-"""Minimum number of joints for shares to be given."""
 SPREAD = (0.05, 0.5, 0.95)
 """Shares of the joints at which quantiles of the load are shown."""
 
@@ -126,26 +123,6 @@ def against_angle(
     errors = view.errors(samples, sampling.columns(view.study))
     x = scattering(sampling.components(view.study, errors))
     return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
-
-
-def evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """File slots of the nominal joint, (1,), if it settled, else (0,); and the samples that `against_angle` evaluates.
-
-    Raises
-    ------
-    StoreError
-        As `against_angle`.
-    """
-    view.check_drawn()
-    view.check_sample(allow_weights=False)
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
-    samples = np.flatnonzero(view.status == Status.OK)[:joints]
-    if len(samples) < MIN_JOINTS:
-        too_few = f"has {len(samples)} settled joints to evaluate"
-        raise StoreError(str(Fault(str(view.path), too_few, f"{MIN_JOINTS} are needed: run more joints")))
-    return view.nominal_slots[view.nominal["status"] == Status.OK], samples
 
 
 def modulus(found: Revolutions, load: str) -> FloatArray:

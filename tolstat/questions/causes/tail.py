@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import sampling
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import LOADS
@@ -89,11 +88,22 @@ def worst_joints(view: View, by: str, n: int = 10) -> Tail:
         When the study is not that of the file.
     """
     narrowed, name = view.narrowed(by)
-    values, unit = _values(narrowed, name)
-    samples = np.flatnonzero(np.isin(narrowed.status, SIMULATED) & np.isfinite(values))
-    samples = samples[np.argsort(-values[samples], kind="stable")][:n]
+    samples, values, unit = _largest(narrowed, name, n)
     points = _points(narrowed, name, samples)
-    return Tail(by, unit, samples, _with_errors(narrowed, samples, values[samples], points))
+    return Tail(by, unit, samples, _with_errors(narrowed, samples, values, points))
+
+
+def worst_samples(view: View, by: str, n: int) -> NDArray[np.intp]:
+    """Samples of the joints that `worst_joints` finds, without their errors."""
+    return _largest(*view.narrowed(by), n)[0]
+
+
+def _largest(view: View, by: str, n: int) -> tuple[NDArray[np.intp], NDArray[np.float64], str]:
+    """Samples of the `n` joints with the largest values, the largest first; these values, and their unit."""
+    values, unit = _values(view, by)
+    samples = np.flatnonzero(np.isin(view.status, SIMULATED) & np.isfinite(values))
+    samples = samples[np.argsort(-values[samples], kind="stable")][:n]
+    return samples, values[samples], unit
 
 
 def _points(view: View, by: str, samples: NDArray[np.intp]) -> list[str]:
@@ -108,6 +118,8 @@ def _with_errors(
     view: View, samples: NDArray[np.intp], values: NDArray[np.float64], points: list[str]
 ) -> list[TailJoint]:
     """Combine the values of joints with their errors."""
+    from tolstat import sampling
+
     ascending, place = np.unique(samples, return_inverse=True)
     errors = view.errors(ascending, sampling.columns(view.study))[place]
     scores = sampling.normal_scores(view.study, errors)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import subprocess
-from collections.abc import Callable
+import time
 from functools import partial
 from typing import Any
 
@@ -31,7 +32,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     def note(name: str, _: Options) -> None:
         called.append(name)
 
-    noted: dict[str, Callable[[Options], None]] = {name: partial(note, name) for name in compilation.KERNELS}
+    noted = {name: one._replace(compile=partial(note, name)) for name, one in compilation.KERNELS.items()}
     monkeypatch.setattr(subprocess, "Popen", Process)
     monkeypatch.setattr(compilation, "missing", compilation.kernels)
     monkeypatch.setattr(simulation, "in_lanes", lambda _: True)
@@ -58,6 +59,30 @@ def test_explicit_steps_are_compiled_for_joints_that_need_them(calls: list[str],
         ["lockstep.lockstep", "starts.write_starts", "explicit.count_steps", "rainflow.count_joint"],
         ["simulate.simulate_joint", "explicit.explicit"],
     )
+
+
+def test_each_kernel_is_told_when_it_lies_in_the_cache(
+    calls: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def compile_slowly(name: str, _: Options) -> None:
+        time.sleep(0.05)
+        calls.append(name)
+
+    noted = {name: one._replace(compile=partial(compile_slowly, name)) for name, one in compilation.KERNELS.items()}
+    monkeypatch.setattr(compilation, "KERNELS", noted)
+    monkeypatch.setattr(compilation, "available_cores", lambda: 1)
+    monkeypatch.setattr(compilation, "POLL_S", 0.01)
+    monkeypatch.setattr(compilation, "_is_held", lambda name: name in calls)
+    monkeypatch.setattr(logging.getLogger("tolstat"), "propagate", True)
+    with caplog.at_level(logging.INFO, "tolstat"):
+        compilation.warm_up()
+    said = [record.getMessage().split(",")[0] for record in caplog.records]
+    assert said == [
+        "compiled: joints in lanes (48 %",
+        "compiled: single joints (86 %",
+        "compiled: starts of joints (95 %",
+        "compiled: load cycles (100 %",
+    ]
 
 
 def test_one_core_compiles_alone(calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +17,10 @@ from numpy.typing import NDArray
 from tolstat.common.cores import available_cores
 from tolstat.common.tables import PARAM, RESULT, Options
 from tolstat.solver import rainflow, refinement, simulation
+
+LOG = logging.getLogger("tolstat")
+POLL_S = 0.2
+"""Time between two looks for kernels that have been compiled, s."""
 
 
 def _outside() -> NDArray[np.void]:
@@ -57,18 +65,23 @@ def _rainflow(options: Options) -> None:
     rainflow.count(np.zeros((2, 8, 6)))
 
 
-KERNELS: dict[str, Callable[[Options], None]] = {
-    "lockstep.lockstep": _lockstep,
-    "simulate.simulate_joint": _alone,
-    "explicit.explicit": _explicit,
-    "starts.write_starts": _starts,
-    "explicit.count_steps": _count_steps,
-    "rainflow.count_joint": _rainflow,
-}
-"""Name of each kernel that Python calls in its cache, and a call that compiles it; those that take longest first."""
+class Kernel(NamedTuple):
+    """A kernel that Python calls: what it is for, a call that compiles it, and how long that takes, as a ratio."""
 
-SHARES = {"lockstep.lockstep": 10, "simulate.simulate_joint": 8, "explicit.explicit": 8, "starts.write_starts": 2}
-"""How long they take to compile, as ratios; others 1."""
+    what: str
+    compile: Callable[[Options], None]
+    share: int = 1
+
+
+KERNELS = {
+    "lockstep.lockstep": Kernel("joints in lanes", _lockstep, 10),
+    "simulate.simulate_joint": Kernel("single joints", _alone, 8),
+    "explicit.explicit": Kernel("explicit steps", _explicit, 8),
+    "starts.write_starts": Kernel("starts of joints", _starts, 2),
+    "explicit.count_steps": Kernel("number of explicit steps", _count_steps),
+    "rainflow.count_joint": Kernel("load cycles", _rainflow),
+}
+"""Kernels by their names in the cache; those that take longest first."""
 
 
 def kernels(options: Options, params: NDArray[np.void] | None = None) -> list[str]:
@@ -85,9 +98,13 @@ def kernels(options: Options, params: NDArray[np.void] | None = None) -> list[st
 
 def missing(options: Options, params: NDArray[np.void] | None = None) -> list[str]:
     """Names of those that do not lie in the cache."""
+    return [name for name in kernels(options, params) if not _is_held(name)]
+
+
+def _is_held(name: str) -> bool:
     from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
 
-    return [name for name in kernels(options, params) if not any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))]
+    return any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))
 
 
 def is_compiled(options: Options | None = None, params: NDArray[np.void] | None = None) -> bool:
@@ -104,8 +121,9 @@ def load() -> None:
 def warm_up(options: Options | None = None, params: NDArray[np.void] | None = None) -> None:
     """Compile the kernels that joints with `options` need, such as `params`, in two processes, or load them."""
     options = options or Options()
-    own, others = halves(missing(options, params))
-    with _compiling(others, options):
+    names = missing(options, params)
+    own, others = halves(names)
+    with _told(names), _compiling(others, options):
         compile_kernels(own, options)
     compile_kernels(kernels(options, params), options)
 
@@ -117,14 +135,14 @@ def halves(names: list[str]) -> tuple[list[str], list[str]]:
     for name in names:
         earlier = int(busy[1] < busy[0])
         parts[earlier].append(name)
-        busy[earlier] += SHARES.get(name, 1)
+        busy[earlier] += KERNELS[name].share
     return parts
 
 
 def compile_kernels(names: list[str], options: Options) -> None:
     """Compile or load these kernels of `KERNELS`."""
     for name in names:
-        KERNELS[name](options)
+        KERNELS[name].compile(options)
 
 
 @contextmanager
@@ -142,3 +160,30 @@ def _compiling(names: list[str], options: Options) -> Iterator[None]:
     finally:
         other.kill()
         other.wait()
+
+
+@contextmanager
+def _told(names: list[str]) -> Iterator[None]:
+    """Log each of these kernels when it is compiled, in whatever process: it lies in the cache then."""
+    if not names:
+        yield
+        return
+    ended = threading.Event()
+    watch = threading.Thread(target=_watch, args=(names, ended), daemon=True)
+    watch.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        watch.join()
+
+
+def _watch(names: list[str], ended: threading.Event) -> None:
+    begun, work, left = time.monotonic(), sum(KERNELS[name].share for name in names), list(names)
+    over = False
+    while left and not over:
+        over = ended.wait(POLL_S)
+        for name in [name for name in left if _is_held(name)]:
+            left.remove(name)
+            done = 1 - sum(KERNELS[name].share for name in left) / work
+            LOG.info("compiled: %s (%.0f %%, %.0f s)", KERNELS[name].what, 100 * done, time.monotonic() - begun)

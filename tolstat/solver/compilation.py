@@ -123,9 +123,10 @@ def warm_up(options: Options | None = None, params: NDArray[np.void] | None = No
     options = options or Options()
     names = missing(options, params)
     own, others = halves(names)
-    with _told(names), _compiling(others, options):
-        compile_kernels(own, options)
-    compile_kernels(kernels(options, params), options)
+    with _told(names):
+        with _compiling(others, options):
+            compile_kernels(own, options)
+        compile_kernels(kernels(options, params), options)
 
 
 def halves(names: list[str]) -> tuple[list[str], list[str]]:

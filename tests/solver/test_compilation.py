@@ -60,9 +60,7 @@ def test_explicit_steps_are_compiled_for_joints_that_need_them(calls: list[str],
     )
 
 
-def test_each_kernel_is_told_when_it_lies_in_the_cache(
-    calls: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_each_kernel_is_told_when_it_lies_in_the_cache(calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     def compile_slowly(name: str, _: Options) -> None:
         time.sleep(0.05)
         calls.append(name)

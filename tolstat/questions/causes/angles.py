@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tolstat import sampling
 from tolstat.analysis import sensitivity
 from tolstat.analysis.sensitivity import FirstOrder
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean

@@ -28,9 +28,9 @@ COLUMNS = [
     Column("failed", lambda row: row["failed"] or "", words=True, shown=table.has("failed")),
 ]
 LEGEND = (
-    "Processor: of all processes of a command. Memory: of the largest of them. File: what the command writes. Growth: "
-    "exponent of the time on the clock over the number of joints, from this number and the one before; 1 is in "
-    "proportion."
+    "Processor: of all processes of a command. Memory: of the largest of them, not of all together. File: what the "
+    "command writes. Growth: exponent of the processor time over the number of joints, from this number and the one "
+    "before; 1 is in proportion."
 )
 
 
@@ -71,7 +71,7 @@ def figure(rows: Sequence[Row], about: str) -> Figure:
     with style.settings():
         page = Figure(figsize=(11.0, 5.6))
         time, memory = page.subplots(1, 2)
-        page.subplots_adjust(left=0.075, right=0.985, top=0.745, bottom=0.205, wspace=0.17)
+        page.subplots_adjust(left=0.09, right=0.985, top=0.745, bottom=0.19, wspace=0.17)
         page.text(0.02, 0.965, "Commands over the number of joints", fontsize=15, fontweight="bold", va="top")
         page.text(0.02, 0.905, about, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
         _panel(time, rows, "wall", 1.0, "Time of a command", "time on the clock [s]")
@@ -91,9 +91,9 @@ def _panel(ax: Axes, rows: Sequence[Row], name: str, scale: float, title: str, l
         own = [row for row in rows if row.command == command]
         look: dict[str, Any] = {"color": style.COLOURS[k], "marker": MARKERS[k], "linestyle": style.DASHES[k]}
         ax.plot([r.joints for r in own], [scale * getattr(r, name) for r in own], ms=6.5, label=command, **look)
-    for axis in (ax.xaxis, ax.yaxis):
+    for axis, wide in ((ax.xaxis, 100.0), (ax.yaxis, 1000.0)):
         low, high = axis.get_view_interval()
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)))
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < wide * low else (1.0,)))
         axis.set_major_formatter(FuncFormatter(grouped))
         axis.set_minor_formatter(NullFormatter())
 

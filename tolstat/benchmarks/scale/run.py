@@ -136,9 +136,13 @@ def measure(setup: Setup, folder: Path | None, say: Callable[[str], None]) -> li
     for n in setup.joints:
         with tempfile.TemporaryDirectory(prefix="tolstat-scale-", dir=folder, ignore_cleanup_errors=True) as own:
             for word, (arguments, file) in commands(setup, n, Path(own)).items():
-                row, told = _measure(n, word, arguments, file)
+                first = next((row for row in rows if row.joints == n), None)
+                if first is not None and first.failed:  # its file may be incomplete
+                    row, why = Row(n, word, failed="not run"), f"{first.command} failed"
+                else:
+                    row, why = _measure(n, word, arguments, file)
                 rows.append(row)
-                how = f"{row.wall:.1f} s, {row.memory / 1e6:.0f} MB" if row.failed is None else f"{row.failed}: {told}"
+                how = f"{row.wall:.1f} s, {row.memory / 1e6:.0f} MB" if row.failed is None else f"{row.failed}: {why}"
                 say(f"{n} joints, {word}: {how}")
     return rows
 
@@ -162,7 +166,7 @@ def _measure(n: int, word: str, arguments: Sequence[str], file: Path | None) -> 
 
 
 def growth(rows: Sequence[Row]) -> list[float]:
-    """Exponent p of time on the clock t ~ n^p from each row and the same command at the number of joints n before.
+    """Exponent p of the processor time t ~ n^p, from each row and the same command at the number of joints n before.
 
     Returns
     -------
@@ -174,5 +178,5 @@ def growth(rows: Sequence[Row]) -> list[float]:
     for row in rows:
         last = before.get(row.command)
         before[row.command] = row
-        found.append(math.log(row.wall / last.wall) / math.log(row.joints / last.joints) if last else math.nan)
+        found.append(math.log(row.cpu / last.cpu) / math.log(row.joints / last.joints) if last else math.nan)
     return found

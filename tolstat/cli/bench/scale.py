@@ -44,10 +44,10 @@ def scale(
 
     Runs tolstat run, report (the page), causes and export --csv one after the other, each as a user does, and prints
     time, processor time of all processes, memory of the largest of them, and size of the file written. Growth is the
-    exponent of the time over the number of joints. Takes three minutes on two cores, and 4 kB of disk a joint. Use a
-    machine without other load. Exit code 1: a command failed.
+    exponent of the processor time over the number of joints. Takes three minutes on two cores, and 4 kB of disk a
+    joint. Use a machine without other load. Exit code 1: a command failed.
 
-    Example: tolstat bench scale studies/iso2768_f.toml --joints 1000,10000 --plot scale.svg
+    Example: tolstat bench scale studies/iso2768_f.toml --joints 1000,10000
     """
     from tolstat.benchmarks.scale import run
     from tolstat.common.cores import available_cores

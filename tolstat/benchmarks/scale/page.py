@@ -71,7 +71,7 @@ def figure(rows: Sequence[Row], about: str) -> Figure:
     with style.settings():
         page = Figure(figsize=(11.0, 5.6))
         time, memory = page.subplots(1, 2)
-        page.subplots_adjust(left=0.09, right=0.985, top=0.745, bottom=0.19, wspace=0.17)
+        page.subplots_adjust(left=0.085, right=0.965, top=0.745, bottom=0.19, wspace=0.19)
         page.text(0.02, 0.965, "Commands over the number of joints", fontsize=15, fontweight="bold", va="top")
         page.text(0.02, 0.905, about, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
         _panel(time, rows, "wall", 1.0, "Time of a command", "time on the clock [s]")

@@ -101,7 +101,7 @@ def test_every_page_is_in_the_index() -> None:
 def test_every_command_is_in_the_index_and_every_heading_of_the_help_in_the_readme() -> None:
     commands = {name.replace("_", "-") for names in cli.COMMANDS.values() for name in names} | set(bench.INSTRUMENTS)
     named = set(
-        re.findall(r"`tolstat ([a-z-]+(?: precision| coverage)?)[^`]*`", (DOCS / "index.md").read_text("utf-8"))
+        re.findall(r"`tolstat ([a-z-]+(?: precision| coverage| scale)?)[^`]*`", (DOCS / "index.md").read_text("utf-8"))
     )
     assert named - {"COMMAND"} == commands
     headings = re.findall(r"^\| \*\*(.*?)\*\* \|", README, flags=re.MULTILINE)

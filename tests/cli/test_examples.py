@@ -24,6 +24,7 @@ FEW = {"codes": 'codes = ["LSODA"]', "methods": 'methods = ["bdf2"]', "fidelitie
 SHORT = {
     "bench": ("--joints", "16"),
     "bench coverage": ("--seeds", "20"),
+    "bench scale": ("--joints", "200,400"),
     "lots": ("--lots", "30", "--joints", "2"),
     "rare": ("--n", "100", "--repeats", "1"),
     "selective": ("--n", "40"),

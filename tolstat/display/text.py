@@ -1,4 +1,4 @@
-"""Tables as aligned text, for standard output."""
+"""Tables as aligned text, for standard output, and as Markdown, for documents."""
 
 from __future__ import annotations
 
@@ -68,6 +68,11 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
         cells = (c.ljust(w) if own else c.rjust(w) for c, w, own in zip(row, widths, left, strict=True))
         lines.append("  ".join(cells).rstrip())
     return "\n".join(lines)
+
+
+def markdown(rows: Sequence[Sequence[str]]) -> str:
+    """Table in Markdown of rows of text, the first its headings."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], ["---"] * len(rows[0]), *rows[1:]))
 
 
 def multiple(largest: float, unit: str) -> tuple[float, str]:

@@ -12,6 +12,7 @@ from tolstat.benchmarks.coverage.run import MOST, Coverage
 from tolstat.benchmarks.coverage.statistics import CONTROL, NONE, STATISTICS
 from tolstat.benchmarks.coverage.trial import Row
 from tolstat.display.text import align
+from tolstat.display.text import markdown as as_markdown
 
 ENOUGH = 0.05
 """Share of the seeds that must have an interval for a case to count in the summary."""
@@ -92,7 +93,7 @@ def markdown(found: Coverage) -> str:
         about = STATISTICS[line.name]
         head_of = [f"{line.name} ({len(line.every)})", about.claim]
         rows.append([*head_of, *line.numbers(), about.refuses, about.where])
-    return "\n\n".join([_markdown(head, rows), _legend(found), *_verdict(found, "- ")])
+    return "\n\n".join([as_markdown([head, *rows]), _legend(found), *_verdict(found, "- ")])
 
 
 _CASE = ["statistic", "case", "joints", "given, %", "covered, %", "its interval", "above, %", "below, %", "width", ""]
@@ -152,8 +153,3 @@ def _sentence(row: Row) -> str:
 def _range(values: Sequence[float], form: str) -> str:
     low, high = f"{min(values):{form}}", f"{max(values):{form}}"
     return low if low == high else f"{low} to {high}"
-
-
-def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    made = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(row) + " |" for row in made)

@@ -18,7 +18,7 @@ from tolstat.benchmarks.points import build, cost, leaders
 from tolstat.benchmarks.precision.setup import Setup
 from tolstat.benchmarks.runs import Run
 from tolstat.common.files import atomic_write
-from tolstat.display import style, table
+from tolstat.display import style, table, text
 from tolstat.report import Report
 from tolstat.study import Study
 
@@ -253,9 +253,7 @@ def _ahead(points: pd.DataFrame, truth: pd.DataFrame, error: str) -> pd.DataFram
 
 
 def _markdown(table: pd.DataFrame) -> str:
-    rows = [list(table.columns), ["---"] * len(table.columns)]
-    rows += [[_text(x) for x in row] for row in table.itertuples(index=False)]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return text.markdown([list(table.columns), *([_text(x) for x in row] for row in table.itertuples(index=False))])
 
 
 def _text(x: Any) -> str:

@@ -130,9 +130,10 @@ def sort_out(values: ArrayLike, status: ArrayLike, ends: Ends | None = None) -> 
         raise ValueError(f"values {load.shape} and status {state.shape} must be of one length")
     valid, failed, unsettled = split(load, state)
     exact = np.sort(load[valid])
-    lower, upper = exact, exact
-    if ends is not None:
-        lower, upper = (np.sort(np.where(np.isfinite(end), end, load)[valid]) for end in ends)
+    lower, upper = (
+        exact if end is values else np.sort(np.where(np.isfinite(end), end, load)[valid])
+        for end in ends or (values, values)
+    )
     return Sample(exact, lower, upper, int(failed.sum()), int(unsettled.sum()))
 
 

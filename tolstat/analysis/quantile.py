@@ -6,6 +6,7 @@ of a report agree. An end is infinite if there are too few joints for it.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
 import numpy as np
@@ -150,7 +151,9 @@ def _interval_ranks(n: int, share: float, confidence: float) -> tuple[int, int]:
     tail = 0.5 * (1.0 - confidence)
     if n == 0:
         return 0, 1
-    cdf = np.asarray(bdtr(np.arange(n), n, share))  # P(B <= k), k = 0 .. n-1
-    low = int(np.searchsorted(cdf, tail, side="right"))
-    high = int(np.searchsorted(cdf, 1.0 - tail, side="left")) + 1
-    return low, high
+
+    def cdf(k: int) -> float:
+        """P(B <= k), which rises with k = 0 .. n-1."""
+        return float(bdtr(k, n, share))
+
+    return bisect_right(range(n), tail, key=cdf), bisect_left(range(n), 1.0 - tail, key=cdf) + 1

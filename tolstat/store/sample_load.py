@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -203,22 +203,19 @@ class SampleLoad:
 
     def shifted(self, by: FloatArray) -> SampleLoad:
         """Return the load of the same joints with `by`, (n,), added to values and ends."""
-        return replace(self, values=self.values + by, ends=(self.ends[0] + by, self.ends[1] + by))
+        return self._changed(lambda loads: loads + by)
 
     def of_limit(self) -> SampleLoad:
         """Return the ratio of load to limit of the same joints; its limit is 1."""
         assert self.limit is not None
-        ends = (self.ends[0] / self.limit, self.ends[1] / self.limit)
-        values, nominal = self.values / self.limit, self.nominal / self.limit
-        scale = self.scale * self.limit
-        return replace(self, unit="1", limit=1.0, nominal=nominal, values=values, ends=ends, scale=scale)
+        limit = self.limit
+        nominal, scale = self.nominal / limit, self.scale * limit
+        return self._changed(lambda loads: loads / limit, unit="1", limit=1.0, nominal=nominal, scale=scale)
 
     def only(self, samples: NDArray[np.intp] | Mask) -> SampleLoad:
         """Return the load of some of the joints."""
-        return replace(
-            self,
-            values=self.values[samples],
-            ends=(self.ends[0][samples], self.ends[1][samples]),
+        return self._changed(
+            lambda loads: loads[samples],
             status=self.status[samples],
             replicates=1,
             weights=None if self.weights is None else self.weights[samples],
@@ -226,3 +223,9 @@ class SampleLoad:
             lots=None if self.lots is None else self.lots[samples],
             parts=tuple(part.only(samples) for part in self.parts),
         )
+
+    def _changed(self, change: Callable[[FloatArray], FloatArray], **others: Any) -> SampleLoad:
+        """Replace values and ends by what `change` makes of them, and other fields; ends that are values stay so."""
+        values = change(self.values)
+        lower, upper = (values if end is self.values else change(end) for end in self.ends)
+        return replace(self, values=values, ends=(lower, upper), **others)

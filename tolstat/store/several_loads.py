@@ -36,9 +36,14 @@ def together(view: View) -> SampleLoad:
 def largest_of(name: str, loads: Sequence[SampleLoad]) -> SampleLoad:
     """Largest of several loads of the same joints; their limits are equal. Computed load by load to save memory."""
     first = loads[0]
-    ends = (np.maximum.reduce([load.ends[k] for load in loads]) for k in (0, 1))
     values, nominal = np.maximum.reduce([load.values for load in loads]), max(load.nominal for load in loads)
-    return replace(first, name=name, nominal=nominal, values=values, ends=tuple(ends), parts=tuple(loads))
+    lower, upper = (
+        values
+        if all(load.ends[k] is load.values for load in loads)
+        else np.maximum.reduce([load.ends[k] for load in loads])
+        for k in (0, 1)
+    )
+    return replace(first, name=name, nominal=nominal, values=values, ends=(lower, upper), parts=tuple(loads))
 
 
 def leading(view: View) -> tuple[str, ...]:

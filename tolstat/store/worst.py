@@ -81,8 +81,11 @@ def load_of(
     """
     status = [part["status"] for part in parts]
     values = np.maximum.reduce([load.of(part) for part in parts])
+    decided = np.choose(deciding(status), status)
+    if not any((own == Status.STATIONARY).any() for own in status):
+        return values, decided, (values, values)  # one array: it is sorted and kept once
     lower, upper = (np.maximum.reduce(ends) for ends in zip(*(load.ends(part) for part in parts), strict=True))
-    return values, np.choose(deciding(status), status), (lower, upper)
+    return values, decided, (lower, upper)
 
 
 def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import binomtest, norm
+from scipy.stats import binom, binomtest, norm
 
 from tolstat.analysis import exceedance, quantile
 from tolstat.common.tables import Status
@@ -187,6 +187,18 @@ def test_quantile_upper_end_needs_the_number_of_joints_wilks_gives(share, confid
     too_few = quantile.quantile(np.arange(n - 1), np.ones(n - 1), share, confidence)
     assert enough.upper == n - 1
     assert too_few.upper == np.inf
+
+
+@given(st.integers(1, 3000), st.floats(1e-4, 1 - 1e-4), st.sampled_from([0.5, 0.9, 0.95, 0.999]))
+@settings(max_examples=200, deadline=None)
+def test_ranks_of_the_interval_are_the_outermost_that_scipys_binomial_allows(n, share, confidence):
+    at_most = binom.cdf(np.arange(-1, n + 1), n, share)  # P(B <= k), k = -1 .. n
+    low, high = quantile._interval_ranks(n, share, confidence)
+    tail = 0.5 * (1 - confidence)
+    assert at_most[low] <= tail * (1 + 1e-9)  # P(B < low)
+    assert at_most[low + 1] > tail * (1 - 1e-9)
+    assert high == n + 1 or at_most[high] >= (1 - tail) * (1 - 1e-9)
+    assert at_most[high - 1] < (1 - tail) * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9])

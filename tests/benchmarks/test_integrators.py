@@ -75,20 +75,21 @@ def test_a_run_that_takes_too_long_is_stopped(integrator):
     assert 0.02 < found.seconds < 1.0
 
 
-@pytest.mark.parametrize(("code", "setting"), [("Radau", 1e-6), ("CVODE", 1e-6), ("Exudyn", 180)])
-def test_a_run_that_cannot_be_solved_has_failed(code, setting):
+@pytest.mark.parametrize("code", ["Radau", "CVODE"])
+def test_a_run_that_cannot_be_solved_has_failed(code):
     skip_without(code)
-    blow_up = circle(lambda t, y: np.array([y[1], 6 * y[0] ** 2]))  # infinite at t = 1.2
+    blow_up = circle(lambda t, y: np.array([y[0] ** 2, 0.0]))  # infinite at t = 1
     with np.errstate(all="ignore"):
-        assert integrators.solve(blow_up, Integrator(code, False), setting, 1, 20.0).outcome != "ok"
+        assert integrators.solve(blow_up, Integrator(code, False), 1e-6, 1, 20.0).outcome != "ok"
 
 
 def test_exudyn_is_silent_leaves_no_file_and_hides_no_fault(tmp_path, monkeypatch, capfd):
     skip_without("Exudyn")
     monkeypatch.chdir(tmp_path)
     integrators.solve(circle(), Integrator("Exudyn", False), 20, 1, 20.0)
-    stuck = circle(lambda t, y: np.full(2, np.nan))
-    assert integrators.solve(stuck, Integrator("Exudyn", False), 20, 1, 20.0).outcome == "failed"
+    blow_up = circle(lambda t, y: np.array([y[1], 6 * y[0] ** 2]))  # infinite at t = 1.2
+    with np.errstate(all="ignore"):
+        assert integrators.solve(blow_up, Integrator("Exudyn", False), 180, 1, 20.0).outcome == "failed"
     with pytest.raises(ValueError, match="no such force"):
         integrators.solve(circle(_faulty), Integrator("Exudyn", False), 20, 1, 20.0)
     assert capfd.readouterr() == ("", "")

@@ -20,14 +20,16 @@ from tolstat.solver.reference import SAMPLES_PER_REV, FirstOrder, Largest
 FloatArray = NDArray[np.float64]
 Code = Literal["Radau", "BDF", "LSODA", "CVODE", "Exudyn"]
 Outcome = Literal["ok", "failed", "over_time"]
+Found = tuple[FloatArray, FloatArray] | None
+"""Times (m,) and states there (m, 110), or nothing."""
 
 MAX_STEPS = 10**9
 """Step limit of CVODE, whose default is 500; here the CPU time limits its work."""
-FIXED_STEP: tuple[Code, ...] = ("Exudyn",)
+EQUAL_STEPS: tuple[Code, ...] = ("Exudyn",)
 """Codes that are given steps a revolution, and no tolerance."""
 NEWTON_TOL = 1e-2
 """Absolute tolerance (m/s2, rad/s2) of Exudyn's Newton iteration, in the norm of all accelerations. Rounding leaves
-some 1e-5 of them, above Exudyn's own tolerance; a tighter one, 2e-4, changes errors of largest loads by less than 1e-7."""
+some 1e-5 of them, more than Exudyn's own tolerance allows; 2e-4 changes errors of largest loads by less than 1e-7."""
 
 
 class Integrator(NamedTuple):
@@ -37,7 +39,7 @@ class Integrator(NamedTuple):
     ----------
     code : {"Radau", "BDF", "LSODA", "CVODE", "Exudyn"}
         The first three from scipy, CVODE (BDF, dense linear algebra) from SUNDIALS through scikit-sundae, Exudyn
-        (generalised alpha with a fixed step, dense linear algebra) from the multibody code of that name.
+        (generalised alpha with equal steps, dense linear algebra) from the multibody code of that name.
     jacobian : bool
         Whether it gets the compiled Jacobian; else it uses finite differences.
     """
@@ -128,7 +130,7 @@ def solve(
     integrator : Integrator
         The integrator.
     setting : float
-        Relative tolerance; the absolute one is this times ``system.scale``. For a code of `FIXED_STEP`: steps a
+        Relative tolerance; the absolute one is this times ``system.scale``. For a code of `EQUAL_STEPS`: steps a
         revolution.
     revolutions : int
         Number of revolutions to integrate.
@@ -136,15 +138,16 @@ def solve(
         CPU time (s) after which the run is stopped.
     angles : int
         Number of angles of the last revolution at which loads are evaluated, by the integrator's own interpolation; for
-        a code of `FIXED_STEP` they are its steps instead.
+        a code of `EQUAL_STEPS` they are its steps instead.
 
     Returns
     -------
     Solution
     """
-    runs: dict[str, Callable[..., FloatArray | None]] = {"CVODE": _cvode, "Exudyn": _exudyn}
+    own: dict[Code, Callable[..., Found]] = {"CVODE": _cvode, "Exudyn": _exudyn}
+    run: Callable[..., Found] = own.get(integrator.code, _scipy)
     settings: dict[str, Any] = {"rtol": setting, "atol": setting * system.scale}
-    if integrator.code in FIXED_STEP:
+    if integrator.code in EQUAL_STEPS:
         angles = round(setting)
         settings = {"steps": revolutions * angles}
     last = revolutions - 1 + np.arange(1, angles + 1) / angles
@@ -154,19 +157,19 @@ def solve(
     outcome: Outcome = "failed"
     largest = None
     try:
-        states = runs.get(integrator.code, _scipy)(system, integrator, counted, times, settings)
+        found = run(system, integrator, counted, times, settings)
     except _OverTimeError:
         outcome = "over_time"
     else:
-        if states is not None and np.isfinite(states).all():
-            outcome, largest = "ok", system.largest(times, states)
+        if found is not None and np.isfinite(found[1]).all():
+            outcome, largest = "ok", system.largest(*found)
     return Solution(outcome, largest, time.process_time() - begin, counted.rates, counted.jacobians)
 
 
 def _scipy(
     system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
-) -> FloatArray | None:
-    """States at `times`, (m, 110); None where the integrator gives up."""
+) -> Found:
+    """`times` and the states there, (m, 110); None where the integrator gives up."""
     from scipy.integrate import solve_ivp
 
     if integrator.jacobian:
@@ -174,12 +177,12 @@ def _scipy(
     span = (system.t0, times[-1])
     method: Any = integrator.code
     found = solve_ivp(counted.rate, span, system.y0, method, t_eval=times, **settings)
-    return np.ascontiguousarray(found.y.T) if found.success else None
+    return (times, np.ascontiguousarray(found.y.T)) if found.success else None
 
 
 def _cvode(
     system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
-) -> FloatArray | None:
+) -> Found:
     """As `_scipy`."""
     from sksundae.cvode import CVODE
 
@@ -192,22 +195,25 @@ def _cvode(
     if integrator.jacobian:
         settings = settings | {"jacfn": jacobian}
     found = CVODE(rate, max_num_steps=MAX_STEPS, **settings).solve(np.concatenate([[system.t0], times]), system.y0)
-    return np.ascontiguousarray(found.y[1:]) if found.success else None
+    return (times, np.ascontiguousarray(found.y[1:])) if found.success else None
 
 
 def _exudyn(
     system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
-) -> FloatArray | None:
-    """As `_scipy`, at the last of ``settings["steps"]`` equal steps from the initial state to the last of `times`.
+) -> Found:
+    """As `_scipy`, at all of Exudyn's own steps from the first of `times` to the last.
 
-    The joint is one object with the identity as mass matrix, whose forces are the accelerations. Settings are Exudyn's
-    own, but for its output, for `NEWTON_TOL`, and for a step that is not reduced: where Newton fails, so has the run.
+    There are ``settings["steps"]`` equal steps from the initial state to the last of `times`; Exudyn reduces those that
+    Newton's iteration cannot solve. The joint is one object with the identity as mass matrix, whose forces are the
+    accelerations. Settings are Exudyn's own, but for its output and `NEWTON_TOL`.
     """
     import exudyn
     from exudyn.itemInterface import NodeGenericODE2, ObjectGenericODE2
 
     n = len(system.y0) // 2
     states: list[FloatArray] = []
+    reached: list[float] = []
+    first = times[0] - 1e-9 * system.period
 
     def force(_mbs: Any, t: float, _item: int, q: list[float], v: list[float]) -> FloatArray:
         return counted.rate(t, np.array([*q, *v]))[n:]
@@ -216,8 +222,10 @@ def _exudyn(
         found = counted.jacobian(t, np.array([*q, *v]))[n:]
         return -factors[0] * found[:, :n] - factors[1] * found[:, n:]
 
-    def keep(mbs: Any, _t: float) -> bool:
-        states.append(np.concatenate([mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()]))
+    def keep(mbs: Any, t: float) -> bool:
+        if t >= first:
+            reached.append(t)
+            states.append(np.concatenate([mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()]))
         return True
 
     exudyn.config.printToConsole = False
@@ -233,7 +241,7 @@ def _exudyn(
     asked.solution.file.write = False
     course = asked.timeIntegration
     course.startTime, course.endTime, course.numberOfSteps = system.t0, times[-1], settings["steps"]
-    course.adaptiveStep, course.newton.absoluteTolerance = False, NEWTON_TOL
+    course.newton.absoluteTolerance = NEWTON_TOL
     try:
         mbs.SolveDynamic(asked)
     except exudyn.SolverError:
@@ -242,4 +250,4 @@ def _exudyn(
         if counted.stopped:
             raise _OverTimeError from None
         raise
-    return np.array(states[-len(times) :])
+    return np.array(reached), np.array(states)

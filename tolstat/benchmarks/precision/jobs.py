@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from tolstat.benchmarks.integrators import FIXED_STEP, both_ways, has_exudyn
+from tolstat.benchmarks.integrators import EQUAL_STEPS, both_ways, has_exudyn
 from tolstat.benchmarks.joints import choose
 from tolstat.benchmarks.precision.setup import Setup
 from tolstat.benchmarks.runs import TRUTH, Job, OtherJob, OwnJob, TruthJob
@@ -37,7 +37,7 @@ def jobs(setup: Setup, base: Study, say: Callable[[str], None]) -> Iterator[Job]
     if len(codes) < len(others.codes):
         say('Exudyn is left out: it is not installed (pip install "tolstat[bench]")')
     for one in both_ways(codes):
-        ladder = others.steps_per_rev if one.code in FIXED_STEP else others.rtol
+        ladder = others.steps_per_rev if one.code in EQUAL_STEPS else others.rtol
         for i, row in rows:
             yield OtherJob(str(one), one, tuple(map(float, ladder)), row, options, i, others.revolutions, others.limit)
     own = own_settings(setup, options)

@@ -156,7 +156,8 @@ Every integrator has the same task: from the equilibrium of the loaded joint at 
 revolution. tolstat computes this equilibrium itself and integrates until the closure is below `solver.settle_tol`. The
 others get the equilibrium at no cost and integrate a fixed number of revolutions; their own interpolation gives the
 loads at 2880 angles of the last one. Their absolute tolerance is `rtol` times 0.1 mm (0.1 mrad) and 1 m/s (1 rad/s).
-Exudyn takes part where it is installed: its generalised α with a fixed step, the loads at its own steps.
+Exudyn takes part where it is installed: its generalised α with equal steps, reduced where Newton's
+iteration fails; the loads are those at its own steps.
 They call the same compiled accelerations, without Numba's check of the argument types, and use a Jacobian from finite
 differences or the compiled one ("our Jacobian"). Times are CPU times of processes with one thread, without compilation:
 of tolstat the median of repeated calls, of the others one call.

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tolstat import study
-from tolstat.benchmarks.integrators import FIXED_STEP, Code, has_cvode
+from tolstat.benchmarks.integrators import EQUAL_STEPS, Code, has_cvode
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import Strict
@@ -31,7 +31,7 @@ class Own(Strict):
 class Others(Strict):
     """``[others]``: other integrators and their settings, loosest first. `limit`: largest CPU time of a run, s.
 
-    `rtol`: tolerances; `steps_per_rev`: for codes with a fixed step (Exudyn) instead.
+    `rtol`: tolerances; `steps_per_rev`: for codes with equal steps (Exudyn) instead.
     """
 
     codes: tuple[Code, ...]
@@ -102,7 +102,7 @@ def load(path: Path, quick: bool = False) -> tuple[Setup, Study]:
         if "CVODE" in setup.others.codes and not has_cvode():
             hint = 'pip install "tolstat[bench]", or leave CVODE out'
             raise InputError([Fault(f"{path}: others.codes", "CVODE needs scikit-sundae", hint)])
-        if set(FIXED_STEP) & set(setup.others.codes) and not setup.others.steps_per_rev:
+        if set(EQUAL_STEPS) & set(setup.others.codes) and not setup.others.steps_per_rev:
             hint = "give them, such as [180, 360], or leave Exudyn out"
             raise InputError([Fault(f"{path}: others.steps_per_rev", "Exudyn needs steps a revolution", hint)])
     return setup.quick() if quick else setup, base

@@ -110,10 +110,10 @@ def test_loads_of_exudyn_approach_those_of_radau(params, jacobian):
     for steps in (180, 720):
         found = integrators.solve(system, Integrator("Exudyn", jacobian), steps, 2, 60.0)
         assert found.outcome == "ok"
-        assert (found.jacobians > 0) == jacobian
+        assert (0 < found.jacobians < 100) == jacobian  # a wrong one would be asked for in every step
         errors.append(np.abs(found.largest[SPAN["F"]] - true).max() / true.max())
-    assert errors[1] < errors[0] < 1e-2
-    assert errors[1] < 1e-3
+    assert errors[0] < 2e-5
+    assert errors[1] < errors[0] / 8  # order two: a sixteenth
 
 
 @pytest.mark.slow

@@ -14,7 +14,14 @@ from tolstat.benchmarks.runs import OtherJob, OwnJob, failures, largest_of
 from tolstat.common.tables import RESULT, SPAN, Options, Status
 from tolstat.solver.reference import FirstOrder, first_order
 
-EVERY = both_ways(("Radau", "BDF", "LSODA", "CVODE"))
+EVERY = both_ways(("Radau", "BDF", "LSODA", "CVODE", "Exudyn"))
+PACKAGES = {"CVODE": "sksundae", "Exudyn": "exudyn"}
+
+
+def skip_without(code):
+    """Skip a test whose code is not installed."""
+    if code in PACKAGES:
+        pytest.importorskip(PACKAGES[code])
 
 
 def circle(rate=None):
@@ -39,9 +46,9 @@ def circle(rate=None):
 
 @pytest.mark.parametrize("integrator", EVERY, ids=str)
 def test_every_integrator_solves_and_is_counted(integrator):
-    if integrator.code == "CVODE":
-        pytest.importorskip("sksundae")
-    loose, tight = (integrators.solve(circle(), integrator, rtol, 2, 60.0) for rtol in (1e-3, 1e-7))
+    skip_without(integrator.code)
+    settings = (20, 360) if integrator.code == "Exudyn" else (1e-3, 1e-7)
+    loose, tight = (integrators.solve(circle(), integrator, setting, 2, 60.0) for setting in settings)
     assert loose.outcome == tight.outcome == "ok"
     assert tight.largest[SPAN["F"]][0] == pytest.approx(1.0, abs=1e-4)
     assert tight.largest[SPAN["T"]][0] == pytest.approx(1.0, abs=1e-4)
@@ -54,8 +61,7 @@ def test_every_integrator_solves_and_is_counted(integrator):
 
 @pytest.mark.parametrize("integrator", EVERY, ids=str)
 def test_a_run_that_takes_too_long_is_stopped(integrator):
-    if integrator.code == "CVODE":
-        pytest.importorskip("sksundae")
+    skip_without(integrator.code)
 
     def slow(t, y):
         begin = time.process_time()
@@ -63,7 +69,7 @@ def test_a_run_that_takes_too_long_is_stopped(integrator):
             pass
         return np.array([y[1], -y[0]])
 
-    found = integrators.solve(circle(slow), integrator, 1e-9, 200, 0.02)
+    found = integrators.solve(circle(slow), integrator, 2880 if integrator.code == "Exudyn" else 1e-9, 200, 0.02)
     assert found.outcome == "over_time"
     assert found.largest is None
     assert 0.02 < found.seconds < 1.0
@@ -71,11 +77,43 @@ def test_a_run_that_takes_too_long_is_stopped(integrator):
 
 @pytest.mark.parametrize("code", ["Radau", "CVODE"])
 def test_a_run_that_cannot_be_solved_has_failed(code):
-    if code == "CVODE":
-        pytest.importorskip("sksundae")
+    skip_without(code)
     blow_up = circle(lambda t, y: np.array([y[0] ** 2, 0.0]))  # infinite at t = 1
     with np.errstate(all="ignore"):
         assert integrators.solve(blow_up, Integrator(code, False), 1e-6, 1, 20.0).outcome != "ok"
+
+
+def test_exudyn_is_silent_leaves_no_file_and_hides_no_fault(tmp_path, monkeypatch, capfd):
+    skip_without("Exudyn")
+    monkeypatch.chdir(tmp_path)
+    integrators.solve(circle(), Integrator("Exudyn", False), 20, 1, 20.0)
+    blow_up = circle(lambda t, y: np.array([y[1], 6 * y[0] ** 2]))  # infinite at t = 1.2
+    with np.errstate(all="ignore"):
+        assert integrators.solve(blow_up, Integrator("Exudyn", False), 180, 1, 20.0).outcome == "failed"
+    with pytest.raises(ValueError, match="no such force"):
+        integrators.solve(circle(_faulty), Integrator("Exudyn", False), 20, 1, 20.0)
+    assert capfd.readouterr() == ("", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def _faulty(t, y):
+    raise KeyError("no such force")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jacobian", [False, True])
+def test_loads_of_exudyn_approach_those_of_radau(params, jacobian):
+    skip_without("Exudyn")
+    system = first_order(params(alpha=0.2), Options(), from_start=True)
+    true = integrators.solve(system, Integrator("Radau", True), 1e-7, 2, 60.0).largest[SPAN["F"]]
+    errors = []
+    for steps in (180, 720):
+        found = integrators.solve(system, Integrator("Exudyn", jacobian), steps, 2, 60.0)
+        assert found.outcome == "ok"
+        assert (0 < found.jacobians < 100) == jacobian  # a wrong one would be asked for in every step
+        errors.append(np.abs(found.largest[SPAN["F"]] - true).max() / true.max())
+    assert errors[0] < 2e-5
+    assert errors[1] < errors[0] / 8  # order two: a sixteenth
 
 
 @pytest.mark.slow
@@ -100,11 +138,11 @@ def test_own_job_times_each_setting_and_keeps_what_is_measured(params):
 @pytest.mark.slow
 def test_other_job_leaves_out_what_is_tighter_than_what_took_too_long(params):
     job = OtherJob("L", Integrator("LSODA", True), (1e-2, 1e-3, 1e-4), params(alpha=0.2), Options(), 0, 2, 0.02)
-    runs = job._replace(rtols=(1e-6, 1e-7)).runs()
+    runs = job._replace(settings=(1e-6, 1e-7)).runs()
     assert [r.outcome for r in runs] == ["over_time"] * 2
     assert runs[1].rates == 0
     assert runs[1].seconds == 0.02
-    done = job._replace(rtols=(1e-2,), limit=60.0).runs()[0]
+    done = job._replace(settings=(1e-2,), limit=60.0).runs()[0]
     assert done.outcome == "ok"
     assert done.largest[SPAN["F"]].max() == pytest.approx(620, rel=0.1)
 

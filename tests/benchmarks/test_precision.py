@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from typing import get_args
+
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
@@ -11,6 +14,7 @@ from tests.conftest import REFERENCE
 from tests.report.test_report import overlapping, texts
 from tolstat import cli
 from tolstat.benchmarks import points, runs
+from tolstat.benchmarks.integrators import Code
 from tolstat.benchmarks.joints import choose
 from tolstat.benchmarks.precision import page, setup
 from tolstat.benchmarks.precision.jobs import jobs
@@ -25,12 +29,19 @@ def _setups_may_name_cvode(monkeypatch):
     monkeypatch.setattr(setup, "has_cvode", lambda: True)
 
 
-def test_jobs_cover_every_contender_joint_and_setting():
+@pytest.mark.parametrize("installed", [True, False])
+def test_jobs_cover_every_contender_joint_and_setting(installed, monkeypatch):
+    monkeypatch.setattr("tolstat.benchmarks.precision.jobs.has_exudyn", lambda: installed)
+    said = []
     asked, base = setup.load(STUDY)
     params, count = choose(base, asked.joints, asked.seed, asked.tolstat.block)
-    todo = list(jobs(asked, base))
-    assert len(todo) == count * (1 + 8 + 5) + 1
+    todo = list(jobs(asked, base, said.append))
+    assert len(todo) == count * (1 + 8 + 2 * installed + 5) + 1
     by_name = {job.contender: job for job in todo}
+    assert ("Exudyn is left out" in "".join(said)) != installed
+    for name in {"Exudyn", "Exudyn, our Jacobian"} & set(by_name):
+        assert by_name[name].settings == asked.tolstat.steps_per_rev
+    assert by_name["CVODE"].settings == asked.others.rtol
     assert list(by_name)[-6:] == [
         *("BDF2", "generalised-α", "TR-BDF2", "quasistatic", "ideal joint", "BDF2, 64 joints at once")
     ]
@@ -59,6 +70,21 @@ def test_every_fault_of_a_setup_is_told(tmp_path):
     path.write_text(text.replace("iso2768_f.toml", "cirelli2021/cirelli2021.toml"))
     with pytest.raises(InputError, match="lists its joints"):
         setup.load(path)
+
+
+def test_exudyn_needs_steps(tmp_path):
+    text = STUDY.read_text(encoding="utf-8").replace('"iso2768_f.toml"', f'"{STUDY.parent / "iso2768_f.toml"}"')
+    path = tmp_path / "setup.toml"
+    path.write_text(re.sub(r"steps_per_rev = .*(?=# of Exudyn)", "", text), encoding="utf-8")
+    with pytest.raises(InputError, match=r"others.steps_per_rev(.|\n)*Exudyn"):
+        setup.load(path)
+    path.write_text(path.read_text(encoding="utf-8").replace(', "Exudyn"]', "]"), encoding="utf-8")
+    assert setup.load(path)[0].others.steps_per_rev == ()
+
+
+def test_figure_has_a_look_for_every_code():
+    assert set(page.OTHERS) == set(get_args(Code))
+    assert len(set(page.OTHERS.values())) == len(page.OTHERS)
 
 
 def test_cvode_that_is_not_installed_is_an_input_fault(monkeypatch):

@@ -1,4 +1,4 @@
-"""Integrators of scipy and SUNDIALS on the compiled right-hand side of a joint.
+"""Integrators of scipy, SUNDIALS and Exudyn on the compiled right-hand side of a joint.
 
 The task is that of tolstat's solver: from its initial equilibrium, which these integrators get at no cost, over a given
 number of revolutions to the largest loads of the last one. A call of the right-hand side from Python costs little more
@@ -18,11 +18,18 @@ from numpy.typing import NDArray
 from tolstat.solver.reference import SAMPLES_PER_REV, FirstOrder, Largest
 
 FloatArray = NDArray[np.float64]
-Code = Literal["Radau", "BDF", "LSODA", "CVODE"]
+Code = Literal["Radau", "BDF", "LSODA", "CVODE", "Exudyn"]
 Outcome = Literal["ok", "failed", "over_time"]
+Found = tuple[FloatArray, FloatArray] | None
+"""Times (m,) and states there (m, 110), or nothing."""
 
 MAX_STEPS = 10**9
 """Step limit of CVODE, whose default is 500; here the CPU time limits its work."""
+EQUAL_STEPS: tuple[Code, ...] = ("Exudyn",)
+"""Codes that are given steps a revolution, and no tolerance."""
+NEWTON_TOL = 1e-2
+"""Absolute tolerance (m/s2, rad/s2) of Exudyn's Newton iteration, in the norm of all accelerations. Rounding leaves
+some 1e-5 of them, more than Exudyn's own tolerance allows; 2e-4 changes errors of largest loads by less than 1e-7."""
 
 
 class Integrator(NamedTuple):
@@ -30,8 +37,9 @@ class Integrator(NamedTuple):
 
     Attributes
     ----------
-    code : {"Radau", "BDF", "LSODA", "CVODE"}
-        The first three from scipy, CVODE (BDF, dense linear algebra) from SUNDIALS through scikit-sundae.
+    code : {"Radau", "BDF", "LSODA", "CVODE", "Exudyn"}
+        The first three from scipy, CVODE (BDF, dense linear algebra) from SUNDIALS through scikit-sundae, Exudyn
+        (generalised alpha with equal steps, dense linear algebra) from the multibody code of that name.
     jacobian : bool
         Whether it gets the compiled Jacobian; else it uses finite differences.
     """
@@ -76,10 +84,12 @@ class _Counted:
         self._system = system
         self._end = time.process_time() + limit
         self.rates = self.jacobians = 0
+        self.stopped = False
 
     def rate(self, t: float, y: FloatArray) -> FloatArray:
         self.rates += 1
         if self.rates % 256 == 0 and time.process_time() > self._end:
+            self.stopped = True
             raise _OverTimeError
         return self._system.rate(t, y)
 
@@ -98,10 +108,15 @@ def has_cvode() -> bool:
     return find_spec("sksundae") is not None
 
 
+def has_exudyn() -> bool:
+    """Whether Exudyn is installed."""
+    return find_spec("exudyn") is not None
+
+
 def solve(
     system: FirstOrder,
     integrator: Integrator,
-    rtol: float,
+    setting: float,
     revolutions: int,
     limit: float,
     angles: int = SAMPLES_PER_REV,
@@ -114,41 +129,47 @@ def solve(
         The joint and the state to begin from, see `reference.first_order`.
     integrator : Integrator
         The integrator.
-    rtol : float
-        Relative tolerance; the absolute one is `rtol` times ``system.scale``.
+    setting : float
+        Relative tolerance; the absolute one is this times ``system.scale``. For a code of `EQUAL_STEPS`: steps a
+        revolution.
     revolutions : int
         Number of revolutions to integrate.
     limit : float
         CPU time (s) after which the run is stopped.
     angles : int
-        Number of angles of the last revolution at which loads are evaluated, by the integrator's own interpolation.
+        Number of angles of the last revolution at which loads are evaluated, by the integrator's own interpolation; for
+        a code of `EQUAL_STEPS` they are its steps instead.
 
     Returns
     -------
     Solution
     """
-    run: Callable[..., FloatArray | None] = _cvode if integrator.code == "CVODE" else _scipy
+    own: dict[Code, Callable[..., Found]] = {"CVODE": _cvode, "Exudyn": _exudyn}
+    run: Callable[..., Found] = own.get(integrator.code, _scipy)
+    settings: dict[str, Any] = {"rtol": setting, "atol": setting * system.scale}
+    if integrator.code in EQUAL_STEPS:
+        angles = round(setting)
+        settings = {"steps": revolutions * angles}
     last = revolutions - 1 + np.arange(1, angles + 1) / angles
     times = system.t0 + system.period * last
     counted = _Counted(system, limit)
-    settings = {"rtol": rtol, "atol": rtol * system.scale}
     begin = time.process_time()
     outcome: Outcome = "failed"
     largest = None
     try:
-        states = run(system, integrator, counted, times, settings)
+        found = run(system, integrator, counted, times, settings)
     except _OverTimeError:
         outcome = "over_time"
     else:
-        if states is not None and np.isfinite(states).all():
-            outcome, largest = "ok", system.largest(times, states)
+        if found is not None and np.isfinite(found[1]).all():
+            outcome, largest = "ok", system.largest(*found)
     return Solution(outcome, largest, time.process_time() - begin, counted.rates, counted.jacobians)
 
 
 def _scipy(
     system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
-) -> FloatArray | None:
-    """States at `times`, (m, 110); None where the integrator gives up."""
+) -> Found:
+    """`times` and the states there, (m, 110); None where the integrator gives up."""
     from scipy.integrate import solve_ivp
 
     if integrator.jacobian:
@@ -156,12 +177,12 @@ def _scipy(
     span = (system.t0, times[-1])
     method: Any = integrator.code
     found = solve_ivp(counted.rate, span, system.y0, method, t_eval=times, **settings)
-    return np.ascontiguousarray(found.y.T) if found.success else None
+    return (times, np.ascontiguousarray(found.y.T)) if found.success else None
 
 
 def _cvode(
     system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
-) -> FloatArray | None:
+) -> Found:
     """As `_scipy`."""
     from sksundae.cvode import CVODE
 
@@ -174,4 +195,59 @@ def _cvode(
     if integrator.jacobian:
         settings = settings | {"jacfn": jacobian}
     found = CVODE(rate, max_num_steps=MAX_STEPS, **settings).solve(np.concatenate([[system.t0], times]), system.y0)
-    return np.ascontiguousarray(found.y[1:]) if found.success else None
+    return (times, np.ascontiguousarray(found.y[1:])) if found.success else None
+
+
+def _exudyn(
+    system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
+) -> Found:
+    """As `_scipy`, at all of Exudyn's own steps from the first of `times` to the last.
+
+    There are ``settings["steps"]`` equal steps from the initial state to the last of `times`; Exudyn reduces those that
+    Newton's iteration cannot solve. The joint is one object with the identity as mass matrix, whose forces are the
+    accelerations. Settings are Exudyn's own, but for its output and `NEWTON_TOL`.
+    """
+    import exudyn
+    from exudyn.itemInterface import NodeGenericODE2, ObjectGenericODE2
+
+    n = len(system.y0) // 2
+    states: list[FloatArray] = []
+    reached: list[float] = []
+    first = times[0] - 1e-9 * system.period
+
+    def force(_mbs: Any, t: float, _item: int, q: list[float], v: list[float]) -> FloatArray:
+        return counted.rate(t, np.array([*q, *v]))[n:]
+
+    def jacobian(_mbs: Any, t: float, _item: int, q: list[float], v: list[float], *factors: float) -> FloatArray:
+        found = counted.jacobian(t, np.array([*q, *v]))[n:]
+        return -factors[0] * found[:, :n] - factors[1] * found[:, n:]
+
+    def keep(mbs: Any, t: float) -> bool:
+        if t >= first:
+            reached.append(t)
+            states.append(np.concatenate([mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()]))
+        return True
+
+    exudyn.config.printToConsole = False
+    container = exudyn.SystemContainer()
+    mbs = container.AddSystem()
+    start = {"initialCoordinates": system.y0[:n], "initialCoordinates_t": system.y0[n:]}
+    node = mbs.AddNode(NodeGenericODE2(referenceCoordinates=np.zeros(n), numberOfODE2Coordinates=n, **start))
+    functions = {"forceUserFunction": force, "jacobianUserFunction": jacobian if integrator.jacobian else 0}
+    mbs.AddObject(ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.eye(n), **functions))
+    mbs.SetPostStepUserFunction(keep)
+    mbs.Assemble()
+    asked = exudyn.SimulationSettings()
+    asked.solution.file.write = False
+    course = asked.timeIntegration
+    course.startTime, course.endTime, course.numberOfSteps = system.t0, times[-1], settings["steps"]
+    course.newton.absoluteTolerance = NEWTON_TOL
+    try:
+        mbs.SolveDynamic(asked)
+    except exudyn.SolverError:
+        return None
+    except exudyn.ModelError:  # what a function raised that Exudyn called
+        if counted.stopped:
+            raise _OverTimeError from None
+        raise
+    return np.array(reached), np.array(states)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-PACKAGES = ("tolstat", "numba", "numpy", "scipy", "scikit-sundae")
+PACKAGES = ("tolstat", "numba", "numpy", "scipy", "scikit-sundae", "exudyn")
 
 
 def machine() -> dict[str, str]:

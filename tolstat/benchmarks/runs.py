@@ -43,7 +43,7 @@ class Run(NamedTuple):
     joint : int
         Place among the joints that are compared.
     outcome : {"ok", "failed", "over_time"}
-        ``over_time`` also for a run that was skipped because a looser tolerance took too long.
+        ``over_time`` also for a run that was skipped because a looser setting took too long.
     seconds : float
         CPU time of the joint.
     largest : Largest or None
@@ -89,11 +89,11 @@ class OwnJob(NamedTuple):
 
 
 class OtherJob(NamedTuple):
-    """Another integrator at several tolerances, loosest first."""
+    """Another integrator at several settings, tolerances or steps a revolution, loosest first."""
 
     contender: str
     integrator: Integrator
-    rtols: tuple[float, ...]
+    settings: tuple[float, ...]
     params: Params
     options: Options
     joint: int
@@ -101,17 +101,18 @@ class OtherJob(NamedTuple):
     limit: float
 
     def runs(self) -> list[Run]:
-        """Integrate at each tolerance; after a run that takes too long, skip the tighter ones."""
+        """Integrate at each setting; after a run that takes too long, skip the tighter ones."""
         system = first_order(self.params, self.options, from_start=True)
         prepare(system)
-        solve(system, self.integrator, 0.1, 1, 1e-3)  # loads the integrator
+        solve(system, self.integrator, self.settings[0], 1, 1e-3)  # loads the integrator
         runs = []
         outcome: Outcome = "ok"
-        for rtol in self.rtols:
+        for setting in self.settings:
             seconds, largest, rates = self.limit, None, 0
             if outcome != "over_time":
-                outcome, largest, seconds, rates, _ = solve(system, self.integrator, rtol, self.revolutions, self.limit)
-            runs.append(Run(self.contender, False, rtol, self.joint, outcome, seconds, largest, rates=rates))
+                solution = solve(system, self.integrator, setting, self.revolutions, self.limit)
+                outcome, largest, seconds, rates, _ = solution
+            runs.append(Run(self.contender, False, setting, self.joint, outcome, seconds, largest, rates=rates))
         return runs
 
 
@@ -193,6 +194,6 @@ def failures(job: Job) -> list[Run]:
     if isinstance(job, OwnJob):
         settings = [float(options.steps_per_rev) for options in job.options]
     else:
-        settings = job.rtols if isinstance(job, OtherJob) else (0.0, 1.0)
+        settings = job.settings if isinstance(job, OtherJob) else (0.0, 1.0)
     ours = isinstance(job, OwnJob)
     return [Run(job.contender, ours, setting, job.joint, "failed", np.nan, None) for setting in settings]

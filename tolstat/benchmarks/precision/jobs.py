@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
-from tolstat.benchmarks.integrators import both_ways
+from tolstat.benchmarks.integrators import EQUAL_STEPS, both_ways, has_exudyn
 from tolstat.benchmarks.joints import choose
 from tolstat.benchmarks.precision.setup import Setup
 from tolstat.benchmarks.runs import TRUTH, Job, OtherJob, OwnJob, TruthJob
@@ -16,7 +16,7 @@ IDEAL_STEPS = 90
 """Steps a revolution of the ideal joint, whose error does not depend on them: the nearest setting is taken."""
 
 
-def jobs(setup: Setup, base: Study) -> Iterator[Job]:
+def jobs(setup: Setup, base: Study, say: Callable[[str], None]) -> Iterator[Job]:
     """All jobs of a comparison, those that take longest first.
 
     Parameters
@@ -25,20 +25,26 @@ def jobs(setup: Setup, base: Study) -> Iterator[Job]:
         The comparison.
     base : Study
         Study that the joints are drawn from.
+    say : callable
+        Called with a message where Exudyn is asked for and not installed: it is left out.
     """
     options = base.solver.options()
     params, count = choose(base, setup.joints, setup.seed, setup.tolstat.block)
     rows = [(i, params[i : i + 1]) for i in range(count)]
     yield from (TruthJob(TRUTH, setup.truth.rtol, row, options, i) for i, row in rows)
     others = setup.others
-    for one in both_ways(others.codes):
+    codes = [code for code in others.codes if code != "Exudyn" or has_exudyn()]
+    if len(codes) < len(others.codes):
+        say('Exudyn is left out: it is not installed (pip install "tolstat[bench]")')
+    for one in both_ways(codes):
+        ladder = others.steps_per_rev if one.code in EQUAL_STEPS else others.rtol
         for i, row in rows:
-            yield OtherJob(str(one), one, others.rtol, row, options, i, others.revolutions, others.limit)
-    ladders = own_settings(setup, options)
-    for name, ladder in ladders.items():
-        yield from (OwnJob(name, ladder, row, i, setup.repeats, 1) for i, row in rows)
-    name, ladder = next(iter(ladders.items()))
-    yield OwnJob(f"{name}, {len(params)} joints at once", ladder, params, 0, setup.repeats, count)
+            yield OtherJob(str(one), one, tuple(map(float, ladder)), row, options, i, others.revolutions, others.limit)
+    own = own_settings(setup, options)
+    for name, levels in own.items():
+        yield from (OwnJob(name, levels, row, i, setup.repeats, 1) for i, row in rows)
+    name, levels = next(iter(own.items()))
+    yield OwnJob(f"{name}, {len(params)} joints at once", levels, params, 0, setup.repeats, count)
 
 
 def own_settings(setup: Setup, options: Options) -> dict[str, tuple[Options, ...]]:

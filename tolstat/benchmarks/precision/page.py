@@ -24,8 +24,14 @@ from tolstat.study import Study
 
 OWN_MARKERS = ("o", "s", "D", "v", "*", "P")
 OWN_COLOURS = ("#0072B2", "#0072B2", "#0072B2", "#56B4E9", "#56B4E9", style.INK)
-OTHERS = {"Radau": ("#D55E00", "^"), "BDF": ("#009E73", "<"), "LSODA": ("#CC79A7", ">"), "CVODE": ("#E69F00", "X")}
-"""Colours of Okabe and Ito (2008); each code has a marker of its own too."""
+OTHERS = {
+    "Radau": ("#D55E00", "^"),
+    "BDF": ("#009E73", "<"),
+    "LSODA": ("#CC79A7", ">"),
+    "CVODE": ("#E69F00", "X"),
+    "Exudyn": ("#8C8C8C", "p"),
+}
+"""Colours of Okabe and Ito (2008), and a grey; each code has a marker of its own too."""
 LABELS = {"loads": "largest |F| and |T|", "contact": "largest contact force", "psi": "largest |Ψ|"}
 LEVELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 """Errors whose cost is tabulated, as far as they exceed the truth's own error."""
@@ -60,9 +66,12 @@ def write(runs: Sequence[Run], setup: Setup, base: Study, stem: Path) -> Report:
     points, truth = build(runs)
     count = len({run.joint for run in runs})
     steps, rtol = setup.tolstat.steps_per_rev, setup.others.rtol
+    fixed = setup.others.steps_per_rev if points["contender"].str.startswith("Exudyn").any() else ()
+    exudyn = f", Exudyn: {fixed[0]} to {fixed[-1]} steps" if fixed else ""
     subtitle = (
         f"{count} joints of {base.path.name} (seed {setup.seed}), {len(truth)} of them with a truth. "
-        f"tolstat: {steps[0]} to {steps[-1]} steps a revolution; others: rtol {rtol[0]:.0e} to {rtol[-1]:.0e},\n"
+        f"tolstat: {steps[0]} to {steps[-1]} steps a revolution; others: rtol {rtol[0]:.0e} to {rtol[-1]:.0e}"
+        f"{exudyn},\n"
         f"{setup.others.revolutions} revolutions, at most {setup.others.limit:g} s. {machine.text(machine.versions())}"
     )
     files = style.save(figure(points, truth, subtitle), stem)
@@ -147,6 +156,8 @@ Every integrator has the same task: from the equilibrium of the loaded joint at 
 revolution. tolstat computes this equilibrium itself and integrates until the closure is below `solver.settle_tol`. The
 others get the equilibrium at no cost and integrate a fixed number of revolutions; their own interpolation gives the
 loads at 2880 angles of the last one. Their absolute tolerance is `rtol` times 0.1 mm (0.1 mrad) and 1 m/s (1 rad/s).
+Exudyn takes part where it is installed: its generalised α with equal steps, reduced where Newton's
+iteration fails; the loads are those at its own steps.
 They call the same compiled accelerations, without Numba's check of the argument types, and use a Jacobian from finite
 differences or the compiled one ("our Jacobian"). Times are CPU times of processes with one thread, without compilation:
 of tolstat the median of repeated calls, of the others one call.

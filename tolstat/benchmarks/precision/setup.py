@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tolstat import study
-from tolstat.benchmarks.integrators import Code, has_cvode
+from tolstat.benchmarks.integrators import EQUAL_STEPS, Code, has_cvode
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import Strict
@@ -29,10 +29,14 @@ class Own(Strict):
 
 
 class Others(Strict):
-    """``[others]``: other integrators and their tolerances, loosest first. `limit`: largest CPU time of a run, s."""
+    """``[others]``: other integrators and their settings, loosest first. `limit`: largest CPU time of a run, s.
+
+    `rtol`: tolerances; `steps_per_rev`: for codes with equal steps (Exudyn) instead.
+    """
 
     codes: tuple[Code, ...]
     rtol: Annotated[tuple[Tolerance, ...], Field(min_length=1)]
+    steps_per_rev: tuple[Steps, ...] = ()
     revolutions: Annotated[int, Field(strict=True, ge=1, le=100)]
     limit: Annotated[float, Field(gt=0, le=3600)]
 
@@ -71,7 +75,8 @@ class Setup(Strict):
     def quick(self) -> Setup:
         """Two joints and few settings: to check that everything runs, not for the numbers."""
         own = self.tolstat.model_copy(update={"steps_per_rev": self.tolstat.steps_per_rev[1::3]})
-        others = self.others.model_copy(update={"rtol": self.others.rtol[:3:2], "limit": min(self.others.limit, 2.0)})
+        fewer = {"rtol": self.others.rtol[:3:2], "steps_per_rev": self.others.steps_per_rev[:3:2]}
+        others = self.others.model_copy(update={**fewer, "limit": min(self.others.limit, 2.0)})
         truth = Truth(rtol=(1e-6, 1e-5))
         return self.model_copy(update={"joints": 1, "repeats": 3, "tolstat": own, "others": others, "truth": truth})
 
@@ -97,4 +102,7 @@ def load(path: Path, quick: bool = False) -> tuple[Setup, Study]:
         if "CVODE" in setup.others.codes and not has_cvode():
             hint = 'pip install "tolstat[bench]", or leave CVODE out'
             raise InputError([Fault(f"{path}: others.codes", "CVODE needs scikit-sundae", hint)])
+        if set(EQUAL_STEPS) & set(setup.others.codes) and not setup.others.steps_per_rev:
+            hint = "give them, such as [180, 360], or leave Exudyn out"
+            raise InputError([Fault(f"{path}: others.steps_per_rev", "Exudyn needs steps a revolution", hint)])
     return setup.quick() if quick else setup, base

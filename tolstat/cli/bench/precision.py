@@ -30,9 +30,9 @@ def precision(
 ) -> None:
     """Measure speed against error, beside other integrators.
 
-    The others are those of scipy and SUNDIALS. Prints the fastest of tolstat and of the others at each error; writes
-    COMPARISON.md (page), .csv (every setting), .png and .svg (figure). COMPARISON is a file such as
-    studies/precision.toml, which takes four minutes. Use a machine without other load.
+    The others are those of scipy and SUNDIALS, and Exudyn where it is installed. Prints the fastest of tolstat and of
+    the others at each error; writes COMPARISON.md (page), .csv (every setting), .png and .svg (figure). COMPARISON is a
+    file such as studies/precision.toml, which takes four minutes. Use a machine without other load.
 
     Example: tolstat bench precision studies/precision.toml --quick
     """
@@ -45,7 +45,7 @@ def precision(
         marks.split(into, MARK)
     make_folder(out)
     announce_compilation()
-    found = runs.run([*jobs.jobs(asked, base)], say)
+    found = runs.run([*jobs.jobs(asked, base, say)], say)
     tell(page.write(found, asked, base, out / file.stem))
     if into is not None:
         marks.insert(into, MARK, page.short(found))

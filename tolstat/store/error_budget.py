@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,11 +11,12 @@ import numpy as np
 
 from tolstat.analysis import prediction
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
-from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS
+from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS, FloatArray
+from tolstat.store.once import once
+from tolstat.store.sample_load import SampleLoad, frozen
 from tolstat.store.several_loads import largest_of, together
 
 if TYPE_CHECKING:
-    from tolstat.store.sample_load import SampleLoad
     from tolstat.store.view import View
 
 
@@ -26,7 +27,7 @@ def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | Non
     the error that most joints checked at random stay below.
     """
     if load.parts:
-        return _together(load, [shifted(view, part) for part in load.parts])
+        return _together(load, (shifted(view, part) for part in load.parts))
     found = near(view, load)
     if found is not None:
         return found
@@ -34,8 +35,14 @@ def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | Non
     if np.isnan(error):
         return None
     narrowed, name = view.narrowed(load.name)
-    by = error * size(narrowed.results, name) / load.scale
+    by = error * _largest(narrowed, LOADS[name].kind) / load.scale
     return load.shifted(-by), load.shifted(by)
+
+
+@once
+def _largest(view: View, kind: str) -> FloatArray:
+    """Largest load of a kind in each joint, (n,), see `accuracy.size`."""
+    return frozen(size(view.results, next(name for name in OBSERVABLES if LOADS[name].kind == kind)))
 
 
 def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
@@ -48,12 +55,12 @@ def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
         the limit are verified, twice as many at most; `unknown` has the command that verifies them.
     """
     if load.parts:
-        return _together(load, [near(view, part) for part in load.parts])
+        return _together(load, (near(view, part) for part in load.parts))
     if load.limit is None:
         return None
     view, name = view.narrowed(load.name)
     if len(view.parts) > 1:
-        return _together(load, [near(part, _at(part, name, load)) for part in view.parts])
+        return _together(load, (near(part, _at(part, name, load)) for part in view.parts))
     if view.near is None:
         return None
     checks = {name: check.results for name, check in view.near.checks.items()}
@@ -63,7 +70,7 @@ def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
     found = found[np.isfinite(found)]
     if found.size < LEAST_NEAR:
         return None
-    sizes = np.nan_to_num(size(view.results, name) / load.scale)
+    sizes = np.nan_to_num(_largest(view, LOADS[name].kind) / load.scale)
     low, high = corrected(np.zeros(load.values.size), sizes, found)
     return load.shifted(low), load.shifted(high)
 
@@ -76,14 +83,16 @@ def _at(part: View, name: str, load: SampleLoad) -> SampleLoad:
 
 
 def _together(
-    load: SampleLoad, parts: Sequence[tuple[SampleLoad, SampleLoad] | None]
+    load: SampleLoad, pairs: Iterable[tuple[SampleLoad, SampleLoad] | None]
 ) -> tuple[SampleLoad, SampleLoad] | None:
-    """The largest of the loads at each end; None if one of them is not known."""
-    known = [part for part in parts if part is not None]
-    if len(known) < len(parts):
-        return None
-    low, high = (largest_of(load.name, ends) for ends in zip(*known, strict=True))
-    return low, high
+    """The largest of the loads at each end, taken one by one to save memory; None if one of them is not known."""
+    found: tuple[SampleLoad, SampleLoad] | None = None
+    for pair in pairs:
+        if pair is None:
+            return None
+        low, high = pair if found is None else (largest_of(load.name, both) for both in zip(found, pair, strict=True))
+        found = replace(low, name=load.name, parts=()), replace(high, name=load.name, parts=())
+    return found
 
 
 def unknown(view: View) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from inspect import signature
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
-from tolstat.store.view import View
+if TYPE_CHECKING:
+    from tolstat.store.view import View
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -74,6 +74,7 @@ def most_exceeded(view: View, rows: Sequence[Mapping[Any, Any]]) -> Mapping[Any,
     return max(rows, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
 
 
+@once
 def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
     """Share of the joints above at least one limit of the study: a row as those of `limits`, of the load `ALL_LIMITS`.
 
@@ -86,10 +87,10 @@ def _above_limit(view: View, load: SampleLoad, confidence: float) -> dict[str, A
     level = load.limit
     assert level is not None
     head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
-    budget = _error_budget(view, load, level, confidence)
+    ends = error_budget.shifted(view, load)
+    budget = _error_budget(view, load, ends, level, confidence)
     row = {**head, **vars(load.above(level, confidence)), "confidence": confidence, **budget}
-    # the load with its numerical error, where that is known
-    top = (error_budget.shifted(view, load) or (load, load))[1]
+    top = (ends or (load, load))[1]  # the load with its numerical error, where that is known
     row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
     if view.known is not None:
         known = view.known.share(load.name, confidence)
@@ -126,8 +127,10 @@ def point_rows(view: View) -> list[dict[str, Any]]:
     return rows
 
 
-def _error_budget(view: View, load: SampleLoad, level: float, confidence: float) -> dict[str, float]:
-    """Bounds of a share with every load shifted down and up by the numerical error.
+def _error_budget(
+    view: View, load: SampleLoad, ends: tuple[SampleLoad, SampleLoad] | None, level: float, confidence: float
+) -> dict[str, float]:
+    """Bounds of a share with every load shifted down and up by the numerical error: `ends`, if that is known.
 
     Returns
     -------
@@ -136,7 +139,7 @@ def _error_budget(view: View, load: SampleLoad, level: float, confidence: float)
         and ``numerical_upper``, the estimates with loads shifted down and up; ``total_lower`` and ``total_upper``,
         their ends ``outer_lower`` and ``outer_upper``: cover numerical error, sampling and unresolved joints.
     """
-    error, ends = error_budget.relative(view, load.name), error_budget.shifted(view, load)
+    error = error_budget.relative(view, load.name)
     if ends is None:
         return {"numerical_error": error} | dict.fromkeys(ERROR_BUDGET, np.nan)
     estimates = (end.above(level, confidence).estimate for end in ends)

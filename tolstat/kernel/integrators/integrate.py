@@ -38,6 +38,8 @@ ERROR_TO_GROW = 0.1
 """Estimated error, in units of the tolerance, below which a step may be doubled."""
 MAX_RATIO = 2.0
 """Largest ratio of a step to the one before, for the stability of BDF2 and with error control."""
+START_LEVEL = 4
+"""Level of the first sub-step of BDF2 in general, 1/2^4 of the step: without earlier points it is implicit Euler."""
 
 bdf2_predict = bdf2.predict
 alpha_predict, alpha_accept = generalized_alpha.predict, generalized_alpha.accept
@@ -189,8 +191,11 @@ def build_newton(residual, factorise, solve, size=scaled_size, small=at_rounding
     return newton
 
 
-def build_advance(newton):
+def build_advance(newton, start_level=0):
     """Bind Newton's iteration for a system to the stepping scheme.
+
+    `start_level`: level of BDF2's first sub-step. Joints take the first step as a whole: that damps what their start
+    leaves behind, and is forgotten before their loads count.
 
     Returns
     -------
@@ -211,6 +216,8 @@ def build_advance(newton):
     def advance(t, h, par, options, work, state):
         whole = 1 << options.max_halvings  # progress is counted in sub-steps of the smallest size
         done = level = 0
+        if options.method == BDF2 and state.memory[H_OLD] == 0:
+            level = min(start_level, options.max_halvings)
         while done < whole:
             if options.method == BDF2 or options.rtol > 0:
                 level = admissible_level(level, h, state.memory[H_OLD], options)
@@ -259,4 +266,4 @@ def build_integrator(residual, factorise, solve, size=scaled_size, small=at_roun
         Take one step of the output grid; False when the smallest sub-step failed, or no attempt is left.
     """
     newton = build_newton(residual, factorise, solve, size, small)
-    return newton, build_advance(newton)
+    return newton, build_advance(newton, START_LEVEL)

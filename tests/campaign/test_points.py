@@ -99,6 +99,7 @@ def test_slices_merge_to_the_whole(tmp_path, whole):
         run(fake(), part, rows=rows)
     merged = extend.merge(parts, tmp_path / "merged.h5")
     assert merged.counts.done == 120
+    assert merged.counts.counted == "simulations of joints at 3 operating points"
     assert all(results(tmp_path / "merged.h5", name) == results(whole, name) for name in ALPHAS)
 
 

@@ -2,7 +2,8 @@
 
 ``python -m tests.measure.corruption FILE 1000 [FIRST [COMMAND ...]]`` corrupts a copy of FILE, a result file of 220
 joints, in 1000 ways, the first of them number FIRST (0), passes each to every command below, or to those named, and
-prints every traceback, signal, hang and silent difference. What a command writes is compared, too.
+prints every traceback, signal, hang and silent difference. What a command writes is compared, too. FILE may have
+several operating points, and load histories or cycles: these pass through two commands more.
 """
 
 from __future__ import annotations
@@ -11,24 +12,41 @@ import sys
 import tempfile
 from pathlib import Path
 
+import h5py
+
 from tests.support import corruption
 
 COMMANDS = (
     ("status", "FILE", "--json"),
-    ("export", "FILE", "--csv", "-", "--quiet"),
+    ("export", "FILE", "--csv", "-", "--quiet", "POINT"),
     ("export", "FILE", "--statistics", "-", "--quiet"),
     ("report", "FILE", "--out", "page.html", "--quiet"),
     ("causes", "FILE", "--by", "cross1.F", "--json"),
     ("verify", "FILE", "--near", "cross1.F > 1500 N", "--joints", "50", "--json", "--workers", "1"),
-    ("replay", "FILE", "--row", "1", "--json"),
+    ("replay", "FILE", "--row", "1", "--json", "POINT"),
     ("extend", "FILE", "--n", "230", "--workers", "1", "--no-report"),
     ("merge", "FILE", "--out", "whole.h5"),
 )
+OF_HISTORIES = (
+    ("export", "FILE", "--pylife", "-", "--quiet", "POINT"),
+    ("fatigue", "FILE", "--by", "cross1.F_t", "--json"),
+)
+"""Commands that read load histories or cycles."""
+
+
+def _commands(path: Path) -> list[tuple[str, ...]]:
+    """Commands for a file; a command that is about one operating point gets the first."""
+    with h5py.File(path) as file:
+        points = list(file.get("points", ()))
+        histories = "histories" in (file[f"points/{points[0]}"] if points else file)
+    point = ("--point", points[0]) if points else ()
+    commands = COMMANDS + OF_HISTORIES * histories
+    return [tuple(word for given in words for word in (point if given == "POINT" else (given,))) for words in commands]
 
 
 def main(path: Path, count: int, first: int = 0, *names: str) -> None:
     """Corrupt a file `count` times; print the faults and how many commands ended how."""
-    commands = [words for words in COMMANDS if not names or words[0] in names]
+    commands = [words for words in _commands(path) if not names or words[0] in names]
     with tempfile.TemporaryDirectory() as folder:
         corruption.warm(path, Path(folder), commands)
         for words in commands:

@@ -39,7 +39,7 @@ ODD: tuple[Any, ...] = (
 
 def corrupt(path: Path, rng: np.random.Generator) -> str:
     """Change a file in one of the ways below; return what was done."""
-    ways = (flipped, flipped_early, cut, flipped_value, swapped, mutated, mutated, odd_number)
+    ways = (flipped, flipped_early, cut, flipped_value, swapped, reshaped, mutated, mutated, odd_number)
     way: Callable[[Path, np.random.Generator], str] = ways[rng.integers(len(ways))]
     return f"{way.__name__} {way(path, rng)}"
 
@@ -67,11 +67,12 @@ def cut(path: Path, rng: np.random.Generator) -> str:
 
 def flipped_value(path: Path, rng: np.random.Generator) -> str:
     """Flip a bit of the raw data of a dataset."""
-    places = []
     with h5py.File(path) as file:
-        file.visititems(lambda name, item: places.append((name, item)) if isinstance(item, h5py.Dataset) else None)
-        name, item = places[rng.integers(len(places))]
-        begin, size = item.id.get_offset(), item.id.get_storage_size()
+        dataset = _any_dataset(file, rng)
+        name, begin, size = dataset.name, dataset.id.get_offset(), dataset.id.get_storage_size()
+        if begin is None and dataset.chunks and dataset.id.get_num_chunks():
+            chunk = dataset.id.get_chunk_info(int(rng.integers(dataset.id.get_num_chunks())))
+            begin, size = chunk.byte_offset, chunk.size
     if begin is None:
         return f"no bit of {name}"
     content = bytearray(path.read_bytes())
@@ -82,15 +83,42 @@ def flipped_value(path: Path, rng: np.random.Generator) -> str:
 
 
 def swapped(path: Path, rng: np.random.Generator) -> str:
-    """Exchange two columns of a table."""
+    """Exchange two datasets of a group."""
     with h5py.File(path, "r+") as file:
-        tables = [name for name in ("results", "errors", "ledger") if name in file]  # several points have theirs apart
-        group = file[tables[rng.integers(len(tables))]]
-        one, other = rng.choice([name for name in group if name not in result_file.LINKED], 2, replace=False)
+        group = _any_dataset(file, rng).parent
+        names = [name for name in group if name not in result_file.LINKED]
+        if len(names) < 2:
+            return f"nothing of {group.name}"
+        one, other = rng.choice(names, 2, replace=False)
         group.move(one, "held")
         group.move(other, one)
         group.move("held", other)
         return f"{group.name}/{one} and {other}"
+
+
+def reshaped(path: Path, rng: np.random.Generator) -> str:
+    """Put a dataset of another shape or type in the place of one; its values are zero."""
+    with h5py.File(path, "r+") as file:
+        dataset = _any_dataset(file, rng)
+        name, shape, dtype = dataset.name, dataset.shape, dataset.dtype
+        shapes = (shape[::-1], shape[1:], (*shape, 2), (0,), (2**33,), (2**20, *shape[1:]), (), shape)
+        types = (dtype, dtype, np.dtype("f8"), np.dtype("i8"), np.dtype("u1"), np.dtype("S4"), np.dtype([("a", "f4")]))
+        wanted, kind = shapes[rng.integers(len(shapes))], types[rng.integers(len(types))]
+        del file[name]
+        if rng.random() < 0.1:
+            return f"{name} deleted"
+        file.create_dataset(name, wanted, kind, chunks=True if np.prod(wanted) > 2**24 else None)
+        return f"{name} of shape {wanted} and type {kind}"
+
+
+def _any_dataset(file: h5py.File, rng: np.random.Generator) -> h5py.Dataset:
+    """Any dataset: of any group first, so that a table of many columns does not hide the others."""
+    groups: dict[str, list[h5py.Dataset]] = {}
+    file.visititems(
+        lambda _, item: groups.setdefault(item.parent.name, []).append(item) if isinstance(item, h5py.Dataset) else None
+    )
+    held = groups[sorted(groups)[rng.integers(len(groups))]]
+    return held[rng.integers(len(held))]
 
 
 def mutated(path: Path, rng: np.random.Generator) -> str:
@@ -162,7 +190,7 @@ def call(words: Sequence[object], folder: Path) -> Ended:
 def run(words: Sequence[str], copied: Path) -> Ended:
     """Pass a file to a command; what the command wrote is part of its output.
 
-    A page is text; a result file is exported.
+    A page is text; a result file is exported, each operating point for itself.
     """
     folder = copied.parent
     ended = call([copied if word == "FILE" else word for word in words], folder)
@@ -170,9 +198,12 @@ def run(words: Sequence[str], copied: Path) -> Ended:
     if page.exists():
         ended = ended._replace(out=ended.out + page.read_text(encoding="utf-8"))
     if ended.code == 0 and words[0] in ("extend", "merge"):
-        after = call(["export", whole, "--csv", "-", "--quiet"], folder)
-        memory = max(ended.memory, after.memory)
-        ended = after._replace(out=ended.out + after.out, err=ended.err + after.err, memory=memory)
+        with h5py.File(whole) as file:
+            points = list(file.get("points", ()))
+        for point in points or [None]:
+            after = call(["export", whole, "--csv", "-", "--quiet", *(("--point", point) if point else ())], folder)
+            memory = max(ended.memory, after.memory)
+            ended = after._replace(out=ended.out + after.out, err=ended.err + after.err, memory=memory)
     return ended
 
 

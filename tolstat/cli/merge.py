@@ -32,10 +32,11 @@ def merge(
         merged = extend.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
-    lines = [f"{out}: {counts.done} joints, {counts.shortfall}"]
+    lines = [f"{out}: {counts.done} {counts.counted}, {counts.shortfall}"]
     lines += [f"{merged.twice} surplus copies of rows, with identical results"] * bool(merged.twice)
     dropped = f"left out: joints of {merged.dropped} changes of what_if, of which the slices hold different results"
     lines += [dropped] * bool(merged.dropped)
-    lines += [f"{pending} joints are pending; to simulate them: tolstat run STUDY --out {out}"] * bool(pending)
+    again = f"{pending} {counts.counted} are pending; to simulate them: tolstat run STUDY --out {out}"
+    lines += [again] * bool(pending)
     lines += [f"next: tolstat report {out} --out {out.with_suffix('.html')}"] * (not pending)
     say("\n".join(lines))

@@ -211,10 +211,7 @@ def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) 
     except WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
-    done = f"{counts.done} joints"
-    if len(plan.points) > 1:
-        done = f"{counts.done} simulations of joints at {len(plan.points)} operating points"
-    say(f"{path}: {done}, {counts.shortfall}")
+    say(f"{path}: {counts.done} {counts.counted}, {counts.shortfall}")
 
 
 def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None:

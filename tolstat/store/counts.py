@@ -27,6 +27,8 @@ class Counts(NamedTuple):
         Joints without results.
     not_resolved : int
         Those of the unsettled joints whose largest loads still change with finer steps.
+    points : int
+        Operating points; a joint counts once at each.
     """
 
     total: int
@@ -34,11 +36,17 @@ class Counts(NamedTuple):
     unsettled: int
     failed: int
     not_resolved: int = 0
+    points: int = 1
 
     @classmethod
     def of(cls, status: NDArray[np.uint8]) -> Counts:
         """Count joints by their `status`, (m,)."""
         return cls(len(status), 0, 0, 0).after(status)
+
+    @property
+    def counted(self) -> str:
+        """``"joints"``, or ``"simulations of joints at 2 operating points"``."""
+        return "joints" if self.points == 1 else f"simulations of joints at {self.points} operating points"
 
     @property
     def shortfall(self) -> str:
@@ -58,4 +66,5 @@ class Counts(NamedTuple):
             self.unsettled + count(*UNSETTLED),
             self.failed + count(*FAILED),
             self.not_resolved + count(Status.NOT_RESOLVED),
+            self.points,
         )

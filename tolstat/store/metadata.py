@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 import h5py
 from pydantic import (
     AfterValidator,
+    BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -257,10 +258,12 @@ def read(file: h5py.Group, name: str, default: object = None) -> Any:
         raise ValueError(f"attribute {name} is nested deeper than {MAX_DEPTH}")
     subset = name == "sampling" and isinstance(value, Mapping) and value.get("method") == "subset"
     try:
-        MODELS["subset" if subset else name].validate_json(held, strict=True)
+        found = MODELS["subset" if subset else name].validate_json(held, strict=True)
     except ValidationError as error:
         # the location alone names the value: values of a file that is not trusted are not quoted
-        found = [f"{dotted(one['loc'])} {one['msg']}".strip()[:200] for one in error.errors(include_url=False)]
-        more = [f"and {len(found) - MAX_SHOWN} more"] if len(found) > MAX_SHOWN else []
-        raise ValueError(f"attribute {name}: {'; '.join(found[:MAX_SHOWN] + more)}") from None
+        faults = [f"{dotted(one['loc'])} {one['msg']}".strip()[:200] for one in error.errors(include_url=False)]
+        more = [f"and {len(faults) - MAX_SHOWN} more"] if len(faults) > MAX_SHOWN else []
+        raise ValueError(f"attribute {name}: {'; '.join(faults[:MAX_SHOWN] + more)}") from None
+    if isinstance(found, BaseModel) and (missing := sorted(set(found.model_dump()) - set(value))):
+        raise ValueError(f"attribute {name}: missing key {missing[0]}")  # a study may leave it out, a file never does
     return value

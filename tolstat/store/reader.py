@@ -278,7 +278,7 @@ class Reader(CheckedTables):
     def counts(self) -> Counts:
         """Count the joints of the file by status; each at every operating point."""
         each = self.each()
-        counts = Counts(self.n * len(each), 0, 0, 0)
+        counts = Counts(self.n * len(each), 0, 0, 0, points=len(each))
         for one in each:
             for first in range(0, self.n, BLOCK):
                 counts = counts.after(one.status(slice(first, first + BLOCK)))

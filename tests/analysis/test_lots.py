@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import beta, betabinom, norm
 from scipy.stats import t as student
 
-from tolstat.analysis import exceedance, lots, prediction
+from tolstat.analysis import exceedance, lots, prediction, sorted_loads
 from tolstat.common.tables import Status
 
 RNG = np.random.default_rng(5)
@@ -68,8 +68,8 @@ def test_curve_counts_joints_without_a_load_both_ways_and_parts_of_lots():
     lot, values = np.repeat(np.arange(40), 20)[7:], loads.ravel()[7:]  # a slice cuts the first lot
     status = np.full(values.size, int(Status.OK))
     status[:30] = Status.NEWTON_FAILED
-    parts = [exceedance.sort_out(values[lot == k], status[lot == k]) for k in range(40)]
-    row = lots.curve_of(exceedance.sort_out(values, status), parts, [1.0])[0]
+    parts = [sorted_loads.sort_out(values[lot == k], status[lot == k]) for k in range(40)]
+    row = lots.curve_of(sorted_loads.sort_out(values, status), parts, [1.0])[0]
     assert row["estimate"] == np.mean(values[30:] > 1.0)
     assert row["outer_lower"] < row["lower"] < row["estimate"] < row["upper"] < row["outer_upper"]
     n = np.array([part.n for part in parts])
@@ -79,8 +79,8 @@ def test_curve_counts_joints_without_a_load_both_ways_and_parts_of_lots():
 
 def test_quantile_inverts_the_curve():
     loads = RNG.standard_normal((50, 20))
-    parts = [exceedance.sort_out(own, np.ones(20)) for own in loads]
-    whole = exceedance.sort_out(loads.ravel(), np.ones(1000))
+    parts = [sorted_loads.sort_out(own, np.ones(20)) for own in loads]
+    whole = sorted_loads.sort_out(loads.ravel(), np.ones(1000))
     found = lots.quantile_of(whole, parts, 0.9)
     assert found.lower < found.estimate < found.upper
     ends = lots.curve_of(whole, parts, [found.lower, found.upper])

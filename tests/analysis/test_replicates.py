@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm, qmc
 
-from tolstat.analysis import exceedance, replicates
+from tolstat.analysis import exceedance, replicates, sorted_loads
 
 SEEDS, REPLICATES, JOINTS = 600, 4, 64
 
@@ -62,7 +62,7 @@ def loads_of(seed, joints, number):
 
 
 def sample_of(values):
-    return exceedance.sort_out(values, np.ones(len(values), int))
+    return sorted_loads.sort_out(values, np.ones(len(values), int))
 
 
 @pytest.mark.slow

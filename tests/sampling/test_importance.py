@@ -12,6 +12,7 @@ from tests.cli.test_cli import invented_campaign
 from tests.support import synthetic
 from tolstat import sampling, study
 from tolstat.analysis import exceedance, weighted
+from tolstat.analysis.sorted_loads import EXACT
 from tolstat.campaign import extend
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
@@ -225,7 +226,7 @@ def two_ways(seeds, n, beta=3.0):
 
 def loads_of(values, w, own):
     status = np.full(values.size, Status.OK)
-    return SampleLoad("x", "N", 3.0, np.nan, values, (values, values), status, w, True, 5.0, 1, own)
+    return SampleLoad("x", "N", 3.0, np.nan, values, EXACT, status, w, True, 5.0, 1, own)
 
 
 def test_an_upper_end_covers_a_way_that_the_proposals_do_not_know_and_that_of_the_weights_does_not():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,6 +11,7 @@ import pytest
 import tolstat
 from tests.support import synthetic
 from tolstat.analysis.quantile import Quantile
+from tolstat.analysis.sorted_loads import Intervals
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS
 from tolstat.common.shown import short, shown
@@ -68,21 +71,46 @@ def test_what_is_opened_for_reading_cannot_write(store):
     assert store._file.mode == "r"
     view = store.view()
     load = view.load("cross1.F")
-    kept = [load.values, *load.ends, load.status, load.is_valid, load.sample.valid, view.nominal, view.mode_share]
-    kept += [view.results, view.first_without_load, next(view.error_blocks(()))]
+    kept = [load.values, *load.intervals, load.status, load.is_valid, *load.sample[:4], view.nominal, view.mode_share]
+    kept += [*view.results.values(), view.first_without_load, next(view.error_blocks(()))]
     assert not any(array.flags.writeable for array in kept)
     with pytest.raises(ValueError, match="read-only"):
         view.load("cross1.F").values[0] = 0.0
 
 
-def test_a_load_without_stationary_joints_is_kept_and_sorted_once(store):
-    """Three arrays for each load, three for each end of its numerical error: a page of a million joints took 2.7 GB."""
-    loads = store.view().loads(["cross1.F", "fork1.T"])
-    for load in (*loads, loads[0].shifted(np.ones(60)), loads[1].of_limit(), loads[0].only(np.arange(9))):
-        assert load.ends[0] is load.values is load.ends[1]
-        assert load.sample.lower is load.sample.valid is load.sample.upper
-    largest = largest_of("both", [load.of_limit() for load in loads])
-    assert largest.ends[0] is largest.values is largest.ends[1]
+def test_a_load_is_a_column_of_what_is_read_and_ratios_are_not_kept(store):
+    """Copies of loads, their ends and their ratios to limits once took a page of a million joints to 2.7 GB."""
+    view = store.view()
+    load, whole = view.load("cross1.F"), view.load("all limits")
+    assert load.values.base is view.results["F_max"]
+    assert load.values.flags.c_contiguous
+    assert [part.values.base is None for part in whole.parts] == [False] * len(view.limits)
+    assert [part.limit for part in whole.each()] == [1.0] * len(view.limits)
+    np.testing.assert_array_equal(whole.values, np.maximum.reduce([part.values for part in whole.each()]))
+
+
+def test_intervals_of_loads_follow_their_joints(store):
+    load = store.view().load("cross1.F")
+    held = Intervals(np.array([2, 50]), load.values[[2, 50]] - 4.0, load.values[[2, 50]] + 6.0)
+    one, other = replace(load, intervals=held), load.scaled(0.999)
+    by = np.arange(60.0)
+    lower, upper = one.ends
+    for found, expected in (
+        (one.shifted(by), (lower + by, upper + by)),
+        (one.scaled(2.0), (2.0 * lower, 2.0 * upper)),
+        (one.of_limit(), (lower / 700.0, upper / 700.0)),
+        (one.only(np.arange(40, 60)), (lower[40:], upper[40:])),
+        (one.only(by < 40.0), (lower[:40], upper[:40])),
+        (largest_of("both", [one, other]), (np.maximum(lower, other.values), np.maximum(upper, other.values))),
+        (largest_of("both", [other, one]), (np.maximum(lower, other.values), np.maximum(upper, other.values))),
+    ):
+        np.testing.assert_array_equal(found.ends, expected)
+    level = float(load.values[2]) + 1.0
+    alone = one.above(level)
+    assert one.sample.valid.size == 55
+    assert one.above(level) == alone, "sorted or not"
+    undecided = 5 + np.sum((held.lower <= level) & (level < held.upper))
+    assert round(alone.n * (alone.bound_upper - alone.bound_lower)) == undecided
 
 
 def test_texts_at_the_prompt_are_short(path, store):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import KINDS, LOADS, of_kind
+from tolstat.common.loads import KINDS, LOADS, Results, of_kind
 from tolstat.common.tables import SIMULATED, Status
 
 FloatArray = NDArray[np.float64]
@@ -59,11 +59,11 @@ def sizes(results: NDArray[np.void]) -> FloatArray:
     return np.asarray(_largest(loads(results))[:, KIND_OF])
 
 
-def size(results: NDArray[np.void], observable: str) -> FloatArray:
+def size(results: Results, observable: str) -> FloatArray:
     """Reference value of one observable in each joint, (m,), SI: a column of `sizes`."""
     values = of_kind(results, LOADS[observable].kind)
     held = ~np.isnan(values).all(axis=0)
-    return values[:, held].max(axis=1) if held.any() else np.full(len(results), np.nan)
+    return values[:, held].max(axis=1) if held.any() else np.full(len(values), np.nan)
 
 
 def _largest(values: FloatArray) -> FloatArray:

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis import exceedance, quantile
-from tolstat.analysis.exceedance import Ends, Exceedance, FloatArray, Sample
+from tolstat.analysis.exceedance import Exceedance, FloatArray
+from tolstat.analysis.sorted_loads import EXACT, Ends, Intervals, Sample, sort_out
 from tolstat.common.shown import shown
 
 REFERENCE = 0.9986501019683699
@@ -97,7 +98,7 @@ def capability(
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not.
     ends : tuple of array_like, shape (n,), optional
-        Interval of each load, see `exceedance.sort_out`.
+        Interval of each load, see `exceedance.curve`.
 
     Returns
     -------
@@ -117,7 +118,8 @@ def capability(
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    return of_sample(exceedance.sort_out(values, status, ends), limit, confidence, iid)
+    intervals = EXACT if ends is None else Intervals.of(np.asarray(values, dtype=float), ends)
+    return of_sample(sort_out(values, status, intervals), limit, confidence, iid)
 
 
 def of_sample(sample: Sample, limit: float, confidence: float = 0.95, iid: bool = True) -> Capability:
@@ -209,7 +211,7 @@ def _normality(valid: FloatArray) -> float:
 
 def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
     """Quantile index; interval from those of both quantiles, half the error probability each (Bonferroni)."""
-    sample, each = Sample(valid, valid, valid, 0, 0), 0.5 * (1.0 + confidence)
+    sample, each = Sample.exact(valid), 0.5 * (1.0 + confidence)
     middle, high = (quantile.of_sample(sample, share, each, iid) for share in (0.5, REFERENCE))
     index = float(_index(limit, middle.estimate, high.estimate))
     if not iid:

@@ -9,13 +9,12 @@ The largest load of a stationary joint has an interval; at a level inside it, th
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.analysis.sorted_loads import EXACT, Counted, Ends, Intervals, Sample, count, sort_out
 from tolstat.common.shown import shown
-from tolstat.common.tables import UNSETTLED, VALID, Status
 
 FloatArray = NDArray[np.float64]
 Table = NDArray[np.void]
@@ -65,83 +64,6 @@ class Exceedance:
 
 CURVE = np.dtype([(f.name, "i8" if f.type == "int" else "f8") for f in fields(Exceedance)])
 """A row of a curve: the fields of `Exceedance`."""
-
-
-class Sample(NamedTuple):
-    """One load of the simulated joints, sorted once for all shares and quantiles; see `sort_out`.
-
-    Attributes
-    ----------
-    valid : ndarray, shape (m,)
-        Loads of the valid joints, ascending.
-    lower, upper : ndarray, shape (m,)
-        Lower and upper ends of the intervals of these loads, each ascending; equal to `valid` where loads are exact.
-    n_failed, n_unsettled : int
-        Joints without a valid load.
-    """
-
-    valid: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    n_failed: int
-    n_unsettled: int
-
-    @property
-    def n(self) -> int:
-        """Joints simulated."""
-        return self.valid.size + self.n_unresolved
-
-    @property
-    def n_unresolved(self) -> int:
-        """Joints without a valid value."""
-        return self.n_failed + self.n_unsettled
-
-
-Ends = tuple[ArrayLike, ArrayLike]
-"""Lower and upper end of the interval of each joint's load."""
-
-
-def sort_out(values: ArrayLike, status: ArrayLike, ends: Ends | None = None) -> Sample:
-    """Split the simulated joints into valid (sorted ascending), failed and unsettled.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        Load of each joint, any unit.
-    status : array_like of int, shape (n,)
-        `tables.Status` of each joint. Pending joints are left out. Rows are simulated in order, so pending joints are
-        the last rows and those being simulated, among which slow joints are over-represented. A value that is not
-        finite counts as failed even if its status is valid.
-    ends : tuple of array_like, shape (n,), optional
-        Interval of each load; without it, and where an end is not finite, the load is exact.
-
-    Returns
-    -------
-    Sample
-        Valid values and the counts of the others.
-
-    Raises
-    ------
-    ValueError
-        When the shapes differ or are not one-dimensional.
-    """
-    load, state = np.asarray(values, dtype=float), np.asarray(status)
-    if load.ndim != 1 or load.shape != state.shape:
-        raise ValueError(f"values {load.shape} and status {state.shape} must be of one length")
-    valid, failed, unsettled = split(load, state)
-    exact = np.sort(load[valid])
-    lower, upper = (
-        exact if end is values else np.sort(np.where(np.isfinite(end), end, load)[valid])
-        for end in ends or (values, values)
-    )
-    return Sample(exact, lower, upper, int(failed.sum()), int(unsettled.sum()))
-
-
-def split(load: FloatArray, status: NDArray[np.integer]) -> tuple[Mask, Mask, Mask]:
-    """Which joints are valid, failed and unsettled, each (n,); pending joints are none of these."""
-    unsettled = np.isin(status, UNSETTLED)
-    valid = np.isin(status, VALID) & np.isfinite(load)
-    return valid, ~valid & ~unsettled & (status != Status.PENDING), unsettled
 
 
 def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
@@ -324,7 +246,15 @@ def exceedance(
     >>> found.bound_lower, found.bound_upper
     (0.25, 0.5)
     """
-    row = curve(values, status, [level], confidence, iid, ends)[0]
+    return above(values, status, _intervals(values, ends), level, confidence, iid)
+
+
+def above(
+    values: ArrayLike, status: ArrayLike, intervals: Intervals, level: float, confidence: float = 0.95, iid: bool = True
+) -> Exceedance:
+    """Share of the joints whose load is above one level, from loads that are not sorted; see `exceedance`."""
+    x = _levels([level])
+    row = _table(x, count(values, status, intervals, x), confidence, iid)[0]
     return Exceedance(*row.tolist())
 
 
@@ -345,8 +275,8 @@ def curve(
     levels : array_like, shape (m,), optional
         Levels in the unit of the values. By default every value that a valid joint has, ascending; between
         two of them the share does not change, so that the table is the whole step curve.
-    ends
-        As in `sort_out`.
+    ends : tuple of array_like, shape (n,), optional
+        Interval of each load; without it, and where an end is not finite, the load is exact.
 
     Returns
     -------
@@ -359,30 +289,40 @@ def curve(
     ValueError
         As `sort_out` and `clopper_pearson`, or when a level is NaN.
     """
-    return curve_of(sort_out(values, status, ends), levels, confidence, iid)
+    return curve_of(sort_out(values, status, _intervals(values, ends)), levels, confidence, iid)
 
 
 def curve_of(
     sample: Sample, levels: ArrayLike | None = None, confidence: float = 0.95, iid: bool = True
 ) -> NDArray[np.void]:
     """Share of the joints above each of many levels, from loads that are sorted already; see `curve`."""
-    x = np.unique(sample.valid) if levels is None else np.atleast_1d(np.asarray(levels, dtype=float))
+    x = np.unique(sample.valid) if levels is None else _levels(levels)
+    return _table(x, sample.counted(x), confidence, iid)
+
+
+def _intervals(values: ArrayLike, ends: Ends | None) -> Intervals:
+    return EXACT if ends is None else Intervals.of(np.asarray(values, dtype=float), ends)
+
+
+def _levels(levels: ArrayLike) -> FloatArray:
+    x = np.atleast_1d(np.asarray(levels, dtype=float))
     if np.isnan(x).any():
         raise ValueError("a level is NaN")
-    n_valid = sample.valid.size
-    count, least, most = (
-        n_valid - np.searchsorted(loads, x, side="right") for loads in (sample.valid, sample.lower, sample.upper)
-    )
-    table = np.zeros(x.shape, CURVE)
-    table["level"], table["count"] = x, count
-    table["n"], table["n_failed"], table["n_unsettled"] = sample.n, sample.n_failed, sample.n_unsettled
-    table["estimate"] = count / n_valid if n_valid else np.nan
-    table["bound_lower"] = least / sample.n if sample.n else 0.0
-    table["bound_upper"] = (most + sample.n_unresolved) / sample.n if sample.n else 1.0
+    return x
+
+
+def _table(levels: FloatArray, joints: Counted, confidence: float, iid: bool) -> NDArray[np.void]:
+    n, n_valid, most = joints.n, joints.n_valid, joints.most + joints.n_unresolved
+    table = np.zeros(levels.shape, CURVE)
+    table["level"], table["count"] = levels, joints.above
+    table["n"], table["n_failed"], table["n_unsettled"] = n, joints.n_failed, joints.n_unsettled
+    table["estimate"] = joints.above / n_valid if n_valid else np.nan
+    table["bound_lower"] = joints.least / n if n else 0.0
+    table["bound_upper"] = most / n if n else 1.0
     for name in ("lower", "upper", "outer_lower", "outer_upper"):
         table[name] = np.nan
     if iid:
-        table["lower"], table["upper"] = clopper_pearson(count, n_valid, confidence)
-        table["outer_lower"] = clopper_pearson(least, sample.n, confidence)[0]
-        table["outer_upper"] = clopper_pearson(most + sample.n_unresolved, sample.n, confidence)[1]
+        table["lower"], table["upper"] = clopper_pearson(joints.above, n_valid, confidence)
+        table["outer_lower"] = clopper_pearson(joints.least, n, confidence)[0]
+        table["outer_upper"] = clopper_pearson(most, n, confidence)[1]
     return table

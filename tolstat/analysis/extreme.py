@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis import exceedance, pareto
+from tolstat.analysis import pareto
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.sorted_loads import Sample, sort_out
 from tolstat.common.shown import shown
 
 MIN_EXCESSES = 50
@@ -189,12 +190,10 @@ def fit(
     TooThinError
         When fewer than `MIN_EXCESSES` joints are above the threshold.
     """
-    return of_sample(exceedance.sort_out(values, status), share, confidence, iid)
+    return of_sample(sort_out(values, status), share, confidence, iid)
 
 
-def of_sample(
-    sample: exceedance.Sample, share: float | None = None, confidence: float = 0.95, iid: bool = True
-) -> Tail:
+def of_sample(sample: Sample, share: float | None = None, confidence: float = 0.95, iid: bool = True) -> Tail:
     """Fit a tail to loads that are sorted already; other parameters and errors raised as in `fit`."""
     from scipy.special import gammaincinv, xlog1py, xlogy
 
@@ -238,7 +237,7 @@ def stability(
     TooThinError
         When a share has fewer than `MIN_EXCESSES` joints.
     """
-    sample = exceedance.sort_out(values, status)
+    sample = sort_out(values, status)
     n = sample.valid.size
     least = min(0.3, (MIN_EXCESSES + 1) / max(n, 1))
     asked = np.geomspace(0.3, least, 8) if shares is None else np.sort(np.atleast_1d(shares))[::-1]

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis import exceedance, prediction
-from tolstat.analysis.exceedance import FloatArray, Sample, Table
+from tolstat.analysis.exceedance import FloatArray, Table
 from tolstat.analysis.quantile import Quantile
 from tolstat.analysis.quantile import of_sample as quantile_of_sample
+from tolstat.analysis.sorted_loads import Sample
 
 LEAST = 30
 """Number of lots from which on intervals over lots hold; with fewer there are none."""

@@ -97,7 +97,9 @@ def log_likelihood(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> Floa
     straight = np.abs(shape) < STRAIGHT
     safe = np.where(straight, 1.0, shape)
     with np.errstate(invalid="ignore", divide="ignore"):
-        bent = (1.0 + 1.0 / safe) * np.log1p((safe / scale)[..., None] * excesses).sum(axis=-1)
+        ratio = np.atleast_1d(safe / scale)
+        sums = np.stack([np.log1p(row[..., None] * excesses).sum(axis=-1) for row in ratio])  # row by row, for memory
+        bent = (1.0 + 1.0 / safe) * sums.reshape(safe.shape)
     loss = np.where(straight, excesses.sum() / scale, bent)
     return np.where(np.isnan(loss), -np.inf, -excesses.size * np.log(scale) - loss)
 

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis.exceedance import FloatArray, Sample, sort_out
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.sorted_loads import Sample, sort_out
 from tolstat.common.shown import shown
 
 

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis import exceedance
-from tolstat.analysis.exceedance import FloatArray, Sample, Table
+from tolstat.analysis.exceedance import FloatArray, Table
 from tolstat.analysis.quantile import Quantile
 from tolstat.analysis.quantile import of_sample as quantile_of_sample
+from tolstat.analysis.sorted_loads import Sample
 
 FEW = 20
 """Number of joints on a side of a level below which shares of replicates are too skew for Student's t alone."""

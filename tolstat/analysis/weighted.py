@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import pareto
-from tolstat.analysis.exceedance import CURVE, Ends, Exceedance, FloatArray, Table, split
+from tolstat.analysis.exceedance import CURVE, Exceedance, FloatArray, Table
 from tolstat.analysis.quantile import Quantile
+from tolstat.analysis.sorted_loads import Ends, split
 from tolstat.common.shown import shown
 
 LEAST_EFFECTIVE = 20.0
@@ -363,18 +364,14 @@ def _first(n: int, holds: Callable[[int], bool]) -> int:
 
 
 def sort_out(
-    values: ArrayLike,
-    status: ArrayLike,
-    weights: ArrayLike,
-    ends: Ends | None = None,
-    heaviest: float = np.inf,
+    values: ArrayLike, status: ArrayLike, weights: ArrayLike, ends: Ends | None = None, heaviest: float = np.inf
 ) -> Sample:
-    """Split the simulated joints into valid (sorted ascending), failed and unsettled, see `exceedance.sort_out`.
+    """Split the simulated joints into valid (sorted ascending), failed and unsettled, see `sorted_loads.sort_out`.
 
     Parameters
     ----------
     values, status, ends
-        As in `exceedance.sort_out`.
+        As in `exceedance.curve`.
     weights, heaviest
         As in `curve`.
 

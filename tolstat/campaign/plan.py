@@ -343,8 +343,8 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
     plans = []
     for name, level in study.limits.items():
         points = names_of(split(name)[1], list(results), "limits")
-        values, status, ends = worst.load_of([results[point] for point in points], load_of(name))
-        found = exceedance.exceedance(values, status, level, CONFIDENCE, ends=ends)
+        values, status, intervals = worst.load_of([results[point] for point in points], load_of(name))
+        found = exceedance.above(values, status, intervals, level, CONFIDENCE)
         valid = found.n - found.n_failed - found.n_unsettled
         nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))

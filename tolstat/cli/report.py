@@ -79,7 +79,7 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None, point: s
     from tolstat.common.cores import available_cores
     from tolstat.common.files import check_target
     from tolstat.report import page
-    from tolstat.store import Reader, revolutions
+    from tolstat.store import revolutions, viewed
     from tolstat.store.methods import DRAWN
 
     faults: list[Fault] = []
@@ -90,14 +90,16 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None, point: s
         accepted = parse_share(accept) if accept is not None else accepted
     if faults:
         raise InputError(faults)
-    with Reader.open(file) as store:
-        held = bool(revolutions.held(store))
+    with viewed(file) as view:
+        store, held = view.store, bool(revolutions.held(view.store))
         if again is None:
-            again = page.REPLAYED if held or store.complete else 0
+            with progress("reading"):
+                done = view.counts.done == view.counts.total
+            again = page.REPLAYED if held or done else 0
             if not again:
                 say(f"{file} has pending joints: the page shows the others, and none over the input angle (--replay)")
         if again and store.sampling["method"] in DRAWN and not held:
             announce_compilation()
         with progress("page") as shown:
-            page.write_page(store, out, accepted, again, shown.stage, point, available_cores())
+            page.write_page(view, out, accepted, again, shown.stage, point, available_cores())
     say(f"wrote {out}")

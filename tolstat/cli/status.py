@@ -108,8 +108,8 @@ def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]
                 damaged += int(((written != Status.PENDING) & (states[point][slots] == Status.PENDING)).sum())
         for name, values in loads.items():
             if all(point in results for point in at[name]):
-                own, state, ends = worst.load_of([results[point] for point in at[name]], load_of(name))
-                values[:, slots], worst_states[name][slots] = (own, *ends), state
+                own, state, intervals = worst.load_of([results[point] for point in at[name]], load_of(name))
+                values[:, slots], worst_states[name][slots] = (own, *intervals.ends(own)), state
     joints = np.choose(worst.deciding(list(states.values())), list(states.values()))
     found = np.bincount(joints, minlength=len(Status))
     summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
@@ -140,6 +140,7 @@ def _pace(store: Reader, points: int, pending: int) -> dict[str, Any]:
 
 def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]) -> dict[str, Any]:
     """Share of the joints above a limit so far, from loads and their ends, (3, n); None without an estimate."""
+    from tolstat.analysis.sorted_loads import Intervals
     from tolstat.common.loads import load_of
     from tolstat.store.sample_load import SampleLoad
 
@@ -148,9 +149,8 @@ def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDA
     limit, unit = store.limits[name], load_of(name).unit
     own, lower, upper = values[:, samples]
     iid = method in ("random", "importance") and "joints_per_lot" not in store.sampling
-    load = SampleLoad(
-        name, unit, limit, float("nan"), own, (lower, upper), states[samples], weights, iid, store.heaviest
-    )
+    held = Intervals.of(own, (lower, upper))
+    load = SampleLoad(name, unit, limit, float("nan"), own, held, states[samples], weights, iid, store.heaviest)
     share = load.above(limit)
     numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
     rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}

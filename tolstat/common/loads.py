@@ -7,7 +7,7 @@ numerical error, selection of results and export read them.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from tolstat.common.tables import LOAD_KINDS, SPAN
 
 FloatArray = NDArray[np.float64]
+Results = NDArray[np.void] | Mapping[str, NDArray[Any]]
+"""Results of n joints: a table RESULT, or some of its columns, (n, ...) each."""
 
 AT = " at "
 """What stands between a load and the operating points that it is taken at: ``"cross1.F at cruise+start"``."""
@@ -43,11 +45,11 @@ class Load(NamedTuple):
     element: int
     columns: tuple[str, ...]
 
-    def of(self, results: NDArray[np.void]) -> FloatArray:
-        """Values of the joints in a table RESULT, (n,), SI."""
+    def of(self, results: Results) -> FloatArray:
+        """Values of the joints, (n,), SI."""
         return of_kind(results, self.kind)[:, self.element]
 
-    def ends(self, results: NDArray[np.void]) -> tuple[FloatArray, FloatArray]:
+    def ends(self, results: Results) -> tuple[FloatArray, FloatArray]:
         """Interval of the load in each joint, (n,) each, SI: the load itself unless the joint is stationary."""
         values = self.of(results)
         return values * results[f"{self.kind}_lower"], values * results[f"{self.kind}_upper"]
@@ -108,7 +110,7 @@ class Limit(NamedTuple):
         return np.asarray(np.maximum.reduce(parts))
 
 
-def of_kind(results: NDArray[np.void], kind: str) -> FloatArray:
+def of_kind(results: Results, kind: str) -> FloatArray:
     """All loads of a kind, (n, m), SI: of a pin's contact forces the largest."""
     values: FloatArray = results[f"{kind}_max"]
     if values.ndim == 1:

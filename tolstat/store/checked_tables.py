@@ -15,7 +15,7 @@ from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.tables import Status, Variant
 from tolstat.store import checks, integrity
 from tolstat.store.numbering import Numbering
-from tolstat.store.result_file import BLOCK, POINT_GROUPS, RUN_AGAIN, descriptions, place_of, store_error
+from tolstat.store.result_file import BLOCK, POINT_GROUPS, RUN_AGAIN, Handle, descriptions, place_of, store_error
 from tolstat.study.points import Point
 
 
@@ -23,6 +23,7 @@ class CheckedTables(Numbering):
     """Tables of an open result file, row i for joint i; part of `Reader`, which has the attributes."""
 
     path: Path
+    _handle: Handle
     n: int
     columns: tuple[Column, ...]
     case_names: tuple[str, ...]
@@ -34,10 +35,14 @@ class CheckedTables(Numbering):
 
     @property
     def _file(self) -> h5py.File:
-        raise NotImplementedError
+        return self._handle.file
 
     def _held(self) -> h5py.Group:
-        """Group of the file with the tables of the operating point.
+        """Group of the file with the tables of the operating point; raises as `_place`."""
+        return self._file[self._place()]
+
+    def _place(self) -> str:
+        """Path of that group.
 
         Raises
         ------
@@ -48,7 +53,7 @@ class CheckedTables(Numbering):
             names = ", ".join(self.points)
             remedy = f"give one of them: --point {next(iter(self.points))}, or store.at({next(iter(self.points))!r})"
             raise store_error(self.path, f"has results at several operating points: {names}", remedy)
-        return self._file[place_of(self.point)]
+        return place_of(self.point)
 
     def status(self, slots: slice = slice(None)) -> NDArray[np.uint8]:
         """Status of the joints, (n,), or of a slice of file slots; joints whose row is damaged are PENDING.
@@ -183,9 +188,9 @@ class CheckedTables(Numbering):
         StoreError
             When it cannot be read.
         """
+        place = self._place() if group in POINT_GROUPS else "/"
         try:
-            holder = self._held() if group in POINT_GROUPS else self._file
-            return np.asarray(holder[group][name][slots])
+            return np.asarray(self._handle.dataset(f"{place.rstrip('/')}/{group}/{name}")[slots])
         except checks.DAMAGE_ERRORS as error:
             if not self._file:
                 raise

@@ -27,7 +27,7 @@ def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | Non
     the error that most joints checked at random stay below.
     """
     if load.parts:
-        return _together(load, (shifted(view, part) for part in load.parts))
+        return _together(load, (shifted(view, part) for part in load.each()))
     found = near(view, load)
     if found is not None:
         return found
@@ -55,7 +55,7 @@ def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
         the limit are verified, twice as many at most; `unknown` has the command that verifies them.
     """
     if load.parts:
-        return _together(load, (near(view, part) for part in load.parts))
+        return _together(load, (near(view, part) for part in load.each()))
     if load.limit is None:
         return None
     view, name = view.narrowed(load.name)

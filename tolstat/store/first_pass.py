@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from tolstat.common.loads import LOAD_FIELDS, FloatArray
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID
 from tolstat.store import worst
-from tolstat.store.result_file import BLOCK
 from tolstat.store.sample_load import frozen
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
 
+AT_ONCE = 16_384
+"""Rows read at once: column by column they are written to a table, which is faster the more of it the cache holds."""
 MAX_LISTED = 12
 """Number of joints without a valid load whose complete results are kept."""
 
@@ -26,8 +27,8 @@ class FirstPass(NamedTuple):
 
     Attributes
     ----------
-    results : ndarray, shape (n,)
-        Fields `LOAD_FIELDS` of the samples.
+    results : dict of str to ndarray, shape (n, ...)
+        Columns `LOAD_FIELDS` of the samples; the values of one load lie side by side.
     nominal : ndarray of RESULT, shape (1,) or (0,)
         The nominal joint, if the file has one and its results are valid.
     without_load : ndarray of RESULT, shape (m,)
@@ -36,7 +37,7 @@ class FirstPass(NamedTuple):
         Weighted mean over the valid joints; NaN if none is valid or the study does not keep it.
     """
 
-    results: NDArray[np.void]
+    results: dict[str, NDArray[Any]]
     nominal: NDArray[np.void]
     without_load: NDArray[np.void]
     mode_share: FloatArray
@@ -46,10 +47,10 @@ def read(store: Reader, weights: FloatArray | None) -> FirstPass:
     """Read the results of a file at one operating point; `weights` are those of its samples, if they differ."""
     skip, n = store.first_sample, store.n - store.first_sample
     nominal = np.empty(0, RESULT)
-    results = np.empty(n, [(name, RESULT[name]) for name in LOAD_FIELDS])
+    results = {name: np.empty((n, *RESULT[name].shape), RESULT[name].base, "F") for name in LOAD_FIELDS}
     kept, total, shares = [np.empty(0, RESULT)], 0.0, np.zeros((4, 4))
-    for first in range(0, store.n, BLOCK):
-        block = store.results(slice(first, first + BLOCK))
+    for first in range(0, store.n, AT_ONCE):
+        block = store.results(slice(first, first + AT_ONCE))
         if first == 0 and skip:
             nominal, block = block[:1][np.isin(block["status"][:1], VALID)].copy(), block[1:]
         begin = max(0, first - skip)
@@ -62,7 +63,7 @@ def read(store: Reader, weights: FloatArray | None) -> FirstPass:
         shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
         total += float(weight[valid].sum())
     mean = shares / total if total else np.full((4, 4), np.nan)
-    return FirstPass(frozen(results), frozen(nominal), frozen(np.concatenate(kept)[:MAX_LISTED]), frozen(mean))
+    return FirstPass(_frozen(results), frozen(nominal), frozen(np.concatenate(kept)[:MAX_LISTED]), frozen(mean))
 
 
 def of_points(parts: Sequence[FirstPass], stores: Sequence[Reader]) -> FirstPass:
@@ -76,4 +77,8 @@ def of_points(parts: Sequence[FirstPass], stores: Sequence[Reader]) -> FirstPass
         without.append(stores[number].results(slice(slot, slot + 1)))
     nominal = worst.nominal([part.nominal for part in parts])
     none = np.full((4, 4), np.nan)
-    return FirstPass(frozen(results), frozen(nominal), frozen(np.concatenate(without)), frozen(none))
+    return FirstPass(_frozen(results), frozen(nominal), frozen(np.concatenate(without)), frozen(none))
+
+
+def _frozen(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    return {name: frozen(column) for name, column in columns.items()}

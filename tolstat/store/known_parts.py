@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tolstat.analysis import known_share, process
-from tolstat.analysis.exceedance import FloatArray, Mask
+from tolstat.analysis.exceedance import Mask
 from tolstat.analysis.known_share import Event, KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.weighted import Split
@@ -148,16 +148,12 @@ class KnownParts:
     def _fewest(self, load: SampleLoad) -> Event:
         """Event with all joints without a valid load below, and the least load of those that never repeat."""
         assert load.limit is not None
-        return Event(load.is_valid & (_finite(load.ends[0], load.values) > load.limit), self._done)
+        return Event(load.is_valid & (load.ends[0] > load.limit), self._done)
 
     def _most(self, load: SampleLoad) -> Event:
         """Event with all joints without a valid load above, and the largest load of those that never repeat."""
         assert load.limit is not None
-        return Event(~load.is_valid | (_finite(load.ends[1], load.values) > load.limit), self._done)
-
-
-def _finite(ends: FloatArray, values: FloatArray) -> FloatArray:
-    return np.where(np.isfinite(ends), ends, values)
+        return Event(~load.is_valid | (load.ends[1] > load.limit), self._done)
 
 
 def _parts_of(entry: KnownEntry, proposal: Proposal) -> int | None:

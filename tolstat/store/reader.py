@@ -161,10 +161,6 @@ class Reader(CheckedTables):
         self.point = next(iter(self.points)) if len(self.points) == 1 else None
         self._campaign = campaign_digest(file)
 
-    @property
-    def _file(self) -> h5py.File:
-        return self._handle.file
-
     @cached_property
     def _parts(self) -> HistoryParts:
         self._held()

@@ -47,6 +47,25 @@ class Handle:
     def __init__(self, file: h5py.File) -> None:
         self.file = file
 
+    @property
+    def file(self) -> h5py.File:
+        """The file."""
+        return self._file
+
+    @file.setter
+    def file(self, file: h5py.File) -> None:
+        self._file = file
+        self._datasets: dict[str, h5py.Dataset] = {}
+
+    def dataset(self, path: str) -> h5py.Dataset:
+        """A dataset; that of a file open for reading is looked up once, which takes longer than to read 65 536 rows."""
+        found = self._datasets.get(path)
+        if found is None:
+            found = self._file[path]
+            if self._file.mode == "r":
+                self._datasets[path] = found
+        return found
+
 
 def place_of(point: str) -> str:
     """Path of the group that holds `POINT_GROUPS` of an operating point: the root for the one without a name."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis import exceedance, lots, prediction, quantile, replicates, weighted
 from tolstat.analysis.exceedance import Exceedance, FloatArray, Mask
 from tolstat.analysis.quantile import Quantile
+from tolstat.analysis.sorted_loads import Intervals, Sample, sort_out, split
 from tolstat.common.shown import table
 
 CONFIDENCE = 0.95
@@ -43,8 +44,8 @@ class SampleLoad:
         Load of the nominal joint, SI; NaN if there is none.
     values : ndarray, shape (n,)
         Load of each joint, SI; NaN without a result.
-    ends : tuple of ndarray, shape (n,)
-        Interval of each load; the load itself unless the joint is stationary.
+    intervals : sorted_loads.Intervals
+        Those of loads that are not exact, of stationary joints.
     status : ndarray, shape (n,)
         `tables.Status` of each joint.
     weights : ndarray, shape (n,), optional
@@ -63,6 +64,8 @@ class SampleLoad:
         Lot of each joint, where several are of one.
     parts : tuple of SampleLoad
         Loads of which this is the largest; empty for a single one. See `largest_of`.
+    of_ratios : bool
+        Whether this is the largest ratio of `parts` to their limits.
     """
 
     name: str
@@ -70,7 +73,7 @@ class SampleLoad:
     limit: float | None
     nominal: float
     values: FloatArray
-    ends: tuple[FloatArray, FloatArray]
+    intervals: Intervals
     status: NDArray[np.uint8]
     weights: FloatArray | None
     iid: bool
@@ -80,6 +83,7 @@ class SampleLoad:
     scale: float = 1.0
     lots: NDArray[np.intp] | None = None
     parts: tuple[SampleLoad, ...] = ()
+    of_ratios: bool = False
 
     def __repr__(self) -> str:
         valid = self.valid
@@ -92,11 +96,21 @@ class SampleLoad:
         entries = [(f"{share:.0%} quantile", f"{self.quantile(share).estimate:.4g} {self.unit}") for share in shares]
         return table(repr(self)[1:-1], [("nominal", f"{self.nominal:.4g} {self.unit}"), *entries])
 
+    @property
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper end of each load, (n,) each."""
+        return self.intervals.ends(self.values)
+
+    def each(self) -> Iterator[SampleLoad]:
+        """Yield the loads, or the ratios of load to limit, of which this is the largest."""
+        for part in self.parts:
+            yield part.of_limit() if self.of_ratios else part
+
     @cached_property
-    def sample(self) -> exceedance.Sample:
+    def sample(self) -> Sample:
         """Loads of the valid joints, ascending, and numbers of the others."""
-        sample = exceedance.sort_out(self.values, self.status, self.ends)
-        for array in (sample.valid, sample.lower, sample.upper):
+        sample = sort_out(self.values, self.status, self.intervals)
+        for array in sample[:4]:
             frozen(array)
         return sample
 
@@ -106,20 +120,20 @@ class SampleLoad:
         return weighted.sort_out(self.values, self.status, self.weights, self.ends, self.heaviest)
 
     @cached_property
-    def _parts(self) -> list[exceedance.Sample]:
+    def _parts(self) -> list[Sample]:
         """Loads of each replicate."""
         return self._sorted(np.split(np.arange(self.values.size), self.replicates))
 
     @cached_property
-    def of_lots(self) -> list[exceedance.Sample]:
+    def of_lots(self) -> list[Sample]:
         """Loads of each lot."""
         assert self.lots is not None
         changes = np.flatnonzero(np.diff(self.lots)) + 1  # joints of a lot are consecutive
         return self._sorted(np.split(np.arange(self.values.size), changes))
 
-    def _sorted(self, blocks: Sequence[NDArray[np.intp]]) -> list[exceedance.Sample]:
-        ends = self.ends
-        return [exceedance.sort_out(self.values[b], self.status[b], (ends[0][b], ends[1][b])) for b in blocks]
+    def _sorted(self, blocks: Sequence[NDArray[np.intp]]) -> list[Sample]:
+        (lower, upper), values = self.ends, self.values
+        return [sort_out(values[b], self.status[b], Intervals.of(values[b], (lower[b], upper[b]))) for b in blocks]
 
     @property
     def valid(self) -> FloatArray:
@@ -129,7 +143,7 @@ class SampleLoad:
     @cached_property
     def is_valid(self) -> Mask:
         """Which joints are valid, (n,)."""
-        return frozen(exceedance.split(self.values, self.status)[0])
+        return frozen(split(self.values, self.status)[0])
 
     @property
     def valid_or_nan(self) -> FloatArray:
@@ -154,6 +168,8 @@ class SampleLoad:
 
     def above(self, level: float, confidence: float = CONFIDENCE) -> Exceedance:
         """Share of the joints above one level; see `curve`."""
+        if self.weights is None and self.lots is None and self.replicates == 1 and "sample" not in vars(self):
+            return exceedance.above(self.values, self.status, self.intervals, level, confidence, self.iid)
         return Exceedance(*self.curve([level], confidence)[0].tolist())
 
     def quantile(self, share: float, confidence: float = CONFIDENCE) -> Quantile:
@@ -202,20 +218,38 @@ class SampleLoad:
         return prediction.of_share(found.outer_lower, found.outer_upper, number, confidence)
 
     def shifted(self, by: FloatArray) -> SampleLoad:
-        """Return the load of the same joints with `by`, (n,), added to values and ends."""
-        return self._changed(lambda loads: loads + by)
+        """Return the load of the same joints with `by`, (n,), added to values and intervals."""
+        at = by[self.intervals.joints]
+        intervals = Intervals(self.intervals.joints, self.intervals.lower + at, self.intervals.upper + at)
+        return replace(self, values=self.values + by, intervals=intervals)
+
+    def scaled(self, factor: float) -> SampleLoad:
+        """Return the load of the same joints with values and intervals times a factor."""
+        joints, lower, upper = self.intervals
+        return replace(self, values=factor * self.values, intervals=Intervals(joints, factor * lower, factor * upper))
 
     def of_limit(self) -> SampleLoad:
         """Return the ratio of load to limit of the same joints; its limit is 1."""
         assert self.limit is not None
         limit = self.limit
-        nominal, scale = self.nominal / limit, self.scale * limit
-        return self._changed(lambda loads: loads / limit, unit="1", limit=1.0, nominal=nominal, scale=scale)
+        joints, lower, upper = self.intervals
+        return replace(
+            self,
+            values=self.values / limit,
+            intervals=Intervals(joints, lower / limit, upper / limit),
+            unit="1",
+            limit=1.0,
+            nominal=self.nominal / limit,
+            scale=self.scale * limit,
+        )
 
     def only(self, samples: NDArray[np.intp] | Mask) -> SampleLoad:
         """Return the load of some of the joints."""
-        return self._changed(
-            lambda loads: loads[samples],
+        values, (lower, upper) = self.values[samples], self.ends
+        return replace(
+            self,
+            values=values,
+            intervals=Intervals.of(values, (lower[samples], upper[samples])),
             status=self.status[samples],
             replicates=1,
             weights=None if self.weights is None else self.weights[samples],
@@ -223,9 +257,3 @@ class SampleLoad:
             lots=None if self.lots is None else self.lots[samples],
             parts=tuple(part.only(samples) for part in self.parts),
         )
-
-    def _changed(self, change: Callable[[FloatArray], FloatArray], **others: Any) -> SampleLoad:
-        """Replace values and ends by what `change` makes of them, and other fields; ends that are values stay so."""
-        values = change(self.values)
-        lower, upper = (values if end is self.values else change(end) for end in self.ends)
-        return replace(self, values=values, ends=(lower, upper), **others)

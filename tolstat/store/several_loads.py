@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tolstat.analysis.sorted_loads import Intervals
 from tolstat.common.loads import ALL_LIMITS, Limit
 from tolstat.common.loads import load_of as of_name
-from tolstat.store.sample_load import SampleLoad
+from tolstat.store.sample_load import SampleLoad, frozen
 
 if TYPE_CHECKING:
     from tolstat.store.view import View
@@ -23,9 +24,7 @@ def load_of(view: View, limit: Limit) -> SampleLoad:
     """
     levels = zip(limit.loads, limit.levels, strict=True)
     loads = [replace(view.load(name), limit=level) for name, level in levels]
-    if not limit.has_one_level:
-        loads = [load.of_limit() for load in loads]
-    return loads[0] if limit.loads == (limit.name,) else largest_of(limit.name, loads)
+    return loads[0] if limit.loads == (limit.name,) else largest_of(limit.name, loads, not limit.has_one_level)
 
 
 def together(view: View) -> SampleLoad:
@@ -33,17 +32,32 @@ def together(view: View) -> SampleLoad:
     return load_of(view, Limit(ALL_LIMITS, tuple(view.limits), tuple(view.limits.values())))
 
 
-def largest_of(name: str, loads: Sequence[SampleLoad]) -> SampleLoad:
-    """Largest of several loads of the same joints; their limits are equal. Computed load by load to save memory."""
-    first = loads[0]
-    values, nominal = np.maximum.reduce([load.values for load in loads]), max(load.nominal for load in loads)
-    lower, upper = (
-        values
-        if all(load.ends[k] is load.values for load in loads)
-        else np.maximum.reduce([load.ends[k] for load in loads])
-        for k in (0, 1)
+def largest_of(name: str, parts: Sequence[SampleLoad], of_ratios: bool = False) -> SampleLoad:
+    """Largest of several loads of the same joints, whose limits are equal, or largest ratio of load to limit.
+
+    Computed load by load, and ratios are not kept, to save memory.
+    """
+    joints = np.unique(np.concatenate([part.intervals.joints for part in parts]))
+    found: SampleLoad | None = None
+    for load in replace(parts[0], parts=tuple(parts), of_ratios=of_ratios).each():
+        own = load.intervals.ends_of(joints, load.values)
+        if found is None:
+            found, values, ends, nominal = load, load.values.copy(), own, load.nominal
+        else:
+            np.maximum(values, load.values, out=values)
+            ends = np.maximum(ends[0], own[0]), np.maximum(ends[1], own[1])
+            nominal = max(nominal, load.nominal)
+    assert found is not None
+    intervals = Intervals.of(values[joints], ends).among(joints)
+    return replace(
+        found,
+        name=name,
+        nominal=nominal,
+        values=frozen(values),
+        intervals=intervals,
+        parts=tuple(parts),
+        of_ratios=of_ratios,
     )
-    return replace(first, name=name, nominal=nominal, values=values, ends=(lower, upper), parts=tuple(loads))
 
 
 def leading(view: View) -> tuple[str, ...]:

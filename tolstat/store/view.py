@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -154,8 +154,8 @@ class View:
         return known_parts.of(self)
 
     @property
-    def results(self) -> NDArray[np.void]:
-        """Fields `LOAD_FIELDS` of the results, (n,)."""
+    def results(self) -> dict[str, NDArray[Any]]:
+        """Columns `LOAD_FIELDS` of the results, (n, ...) each."""
         return self._tables.results
 
     def read_results(self, fields: Sequence[str]) -> NDArray[np.void]:
@@ -165,7 +165,7 @@ class View:
     @property
     def status(self) -> NDArray[np.uint8]:
         """Status of the joints, (n,)."""
-        return np.asarray(self.results["status"])
+        return self.results["status"]
 
     @property
     def nominal(self) -> NDArray[np.void]:
@@ -224,9 +224,9 @@ class View:
             load, skip = LOADS[name], self.store.first_sample
             drawn = frozen(self.store.origin()["component"][skip:] == 0) if self.aimed else None
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
-            values, _, (lower, upper) = worst.load_of([part.results for part in self.parts], load)
+            values, _, intervals = worst.load_of([part.results for part in self.parts], load)
             self._loads[name] = SampleLoad(
-                name, load.unit, self.limits.get(name), nominal, frozen(values), (frozen(lower), frozen(upper)),
+                name, load.unit, self.limits.get(name), nominal, values, intervals,
                 self.status, self.weights, self.iid, self.store.heaviest, self.replicates, drawn, lots=self.lots,
             )  # fmt: skip
         return self._loads[name]

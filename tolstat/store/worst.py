@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.analysis.sorted_loads import Intervals
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, split
+from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
+from tolstat.store.sample_load import frozen
 from tolstat.store.verification import Verification
 
 if TYPE_CHECKING:
@@ -34,23 +36,22 @@ def deciding(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.intp]:
     return np.asarray(np.argmax(_SEVERITY[np.stack(status)], axis=0))
 
 
-def together(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
+def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
     """Largest loads of the joints over some operating points.
 
     Parameters
     ----------
-    parts : sequence of (n,) tables
+    parts : sequence of Results
         Results at each operating point, with `LOAD_FIELDS` at least.
 
     Returns
     -------
-    ndarray, shape (n,)
-        Fields `LOAD_FIELDS`. A load is NaN if it is at one of the points. Ends of intervals are 1, and NaN for
+    dict of str to ndarray, shape (n, ...)
+        Columns `LOAD_FIELDS`. A load is NaN if it is at one of the points. Ends of intervals are 1, and NaN for
         stationary joints: loads of one kind may have theirs from different points, see `load_of`.
     """
-    found = np.empty(len(parts[0]), [(name, RESULT[name]) for name in LOAD_FIELDS])
     status = [part["status"] for part in parts]
-    found["status"] = np.choose(deciding(status), status)
+    found: dict[str, NDArray[Any]] = {"status": np.choose(deciding(status), status)}
     for kind in KINDS:
         found[f"{kind}_max"] = np.maximum.reduce([part[f"{kind}_max"] for part in parts])
         for end in ("lower", "upper"):
@@ -58,14 +59,12 @@ def together(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
     return found
 
 
-def load_of(
-    parts: Sequence[NDArray[np.void]], load: Load
-) -> tuple[FloatArray, NDArray[np.uint8], tuple[FloatArray, FloatArray]]:
-    """One load of the joints over some operating points.
+def load_of(parts: Sequence[Results], load: Load) -> tuple[FloatArray, NDArray[np.uint8], Intervals]:
+    """One load of the joints over some operating points, in arrays that cannot be written to.
 
     Parameters
     ----------
-    parts : sequence of (n,) tables
+    parts : sequence of Results
         Results at each operating point, with `LOAD_FIELDS` at least.
     load : Load
         The load.
@@ -76,16 +75,19 @@ def load_of(
         Largest value, SI.
     status : ndarray, shape (n,)
         See `deciding`.
-    ends : tuple of ndarray, shape (n,)
-        Interval of the value: the largest of the lower ends, and of the upper ones.
+    intervals : Intervals
+        Those of joints that are stationary at a point: the largest of the lower ends, and of the upper ones.
     """
-    status = [part["status"] for part in parts]
-    values = np.maximum.reduce([load.of(part) for part in parts])
-    decided = np.choose(deciding(status), status)
-    if not any((own == Status.STATIONARY).any() for own in status):
-        return values, decided, (values, values)  # one array: it is sorted and kept once
-    lower, upper = (np.maximum.reduce(ends) for ends in zip(*(load.ends(part) for part in parts), strict=True))
-    return values, decided, (lower, upper)
+    status, each = [part["status"] for part in parts], [load.of(part) for part in parts]
+    several = len(parts) > 1  # of one point the values are a column of its results, not a copy
+    values = np.maximum.reduce(each) if several else each[0]
+    decided = np.choose(deciding(status), status) if several else status[0]
+    joints = np.flatnonzero(np.logical_or.reduce([own == Status.STATIONARY for own in status]))
+    names = [f"{load.kind}_{of}" for of in ("max", "lower", "upper")]
+    ends = (load.ends({name: part[name][joints] for name in names}) for part in parts)
+    lower, upper = (np.maximum.reduce(own) for own in zip(*ends, strict=True))
+    intervals = Intervals.of(values[joints], (lower, upper)).among(joints)
+    return frozen(values), decided, Intervals(*map(frozen, intervals))
 
 
 def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:

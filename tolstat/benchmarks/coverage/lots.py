@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from tolstat.analysis import exceedance, lots
+from tolstat.analysis import lots, sorted_loads
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.benchmarks.coverage.laws import fresh_share, laws
 from tolstat.benchmarks.coverage.shares import ok
@@ -74,8 +74,8 @@ def _of_lots(law: _Law, share: float, number: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         loads = law.draw(rng, number, JOINTS, share)
-        parts = [exceedance.sort_out(own, ok(JOINTS)) for own in loads]
-        whole = exceedance.sort_out(loads.ravel(), ok(n))
+        parts = [sorted_loads.sort_out(own, ok(JOINTS)) for own in loads]
+        whole = sorted_loads.sort_out(loads.ravel(), ok(n))
         row, middle = lots.curve_of(whole, parts, [level])[0], lots.quantile_of(whole, parts, 1.0 - share)
         counts = (loads > level).sum(axis=1)
         ends = lots.law_of(counts, np.full(number, JOINTS)).delivery(DELIVERY).ends()

@@ -17,6 +17,7 @@ from tolstat.analysis import (
     quantile,
     replicates,
     sequential,
+    sorted_loads,
     strength,
 )
 from tolstat.analysis.exceedance import FloatArray
@@ -69,7 +70,7 @@ def _independent(law: Law, n: int) -> Experiment:
     truths = [float(law.sf(level)) for level in levels]
 
     def once(rng: Rng) -> list[Found]:
-        sample = exceedance.sort_out(law.draw(rng, n), ok(n))
+        sample = sorted_loads.sort_out(law.draw(rng, n), ok(n))
         rows = exceedance.curve_of(sample, levels)
         found = [Found(row["lower"], row["upper"], truth) for row, truth in zip(rows, truths, strict=True)]
         for share in QUANTILES:
@@ -80,7 +81,7 @@ def _independent(law: Law, n: int) -> Experiment:
     return Experiment(tuple(asked), once)
 
 
-def _band(law: Law, sample: exceedance.Sample) -> Found:
+def _band(law: Law, sample: sorted_loads.Sample) -> Found:
     """Interval of the largest difference of the truth from the estimate, on each side: it contains zero or not."""
     half = exceedance.simultaneous(sample.n)
     at, number = np.unique(sample.valid, return_counts=True)
@@ -199,8 +200,8 @@ def _replicated(method: str, dimensions: int, share: float, n: int = 1024, parts
 
         engine = qmc.Sobol if method == "Sobol'" else qmc.LatinHypercube
         points = [engine(dimensions, rng=rng).random(n // parts) for _ in range(parts)]
-        samples = [exceedance.sort_out(ndtri(x).sum(axis=1) / np.sqrt(dimensions), ok(len(x))) for x in points]
-        whole = exceedance.sort_out(np.concatenate([own.valid for own in samples]), ok(n))
+        samples = [sorted_loads.sort_out(ndtri(x).sum(axis=1) / np.sqrt(dimensions), ok(len(x))) for x in points]
+        whole = sorted_loads.sort_out(np.concatenate([own.valid for own in samples]), ok(n))
         row = replicates.curve_of(whole, samples, [level])[0]
         own = replicates.quantile_of(whole, samples, 1.0 - share)
         return [Found(row["lower"], row["upper"], share), Found(own.lower, own.upper, level)]

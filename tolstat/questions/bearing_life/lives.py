@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
+from tolstat.analysis.sorted_loads import EXACT
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import LIFE_EXPONENT, PINS, VALID
@@ -93,7 +94,7 @@ class Lives:
         return self._load(pin, "N", float(self.nominal_loads[k]), self.loads[:, k])
 
     def _load(self, name: str, unit: str, nominal: float, values: FloatArray) -> SampleLoad:
-        return SampleLoad(name, unit, None, nominal, values, (values, values), self.status, self.weights, self.iid)
+        return SampleLoad(name, unit, None, nominal, values, EXACT, self.status, self.weights, self.iid)
 
 
 def bearing_of(view: View) -> Bearing | None:

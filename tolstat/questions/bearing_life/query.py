@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from tolstat.analysis.sorted_loads import EXACT
 from tolstat.common.tables import LIFE_EXPONENT, PINS, Mode
 from tolstat.display import text
 from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, keeps_loads, lives_of
@@ -116,7 +117,7 @@ def _with_error(rate: SampleLoad, error: float) -> tuple[SampleLoad, SampleLoad]
     if np.isnan(error):
         return None
     factors = (max(0.0, 1.0 - error) ** LIFE_EXPONENT, (1.0 + error) ** LIFE_EXPONENT)
-    low, high = (replace(rate, values=f * rate.values, ends=(f * rate.ends[0], f * rate.ends[1])) for f in factors)
+    low, high = map(rate.scaled, factors)
     return low, high
 
 
@@ -142,7 +143,7 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
         row: dict[str, Any] = {"place": place}
         for name, mode in LOADED.items():
             values = own[:, :, mode].max(axis=1)
-            load = SampleLoad(name, "1", None, np.nan, values, (values, values), view.status, view.weights, view.iid)
+            load = SampleLoad(name, "1", None, np.nan, values, EXACT, view.status, view.weights, view.iid)
             found = load.above(MOSTLY, confidence)
             row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
         rows.append(row)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance, prediction, quantile, strength
+from tolstat.analysis import prediction, quantile, sorted_loads, strength
 from tolstat.analysis.cycles import FloatArray
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.strength import Collective, Failures, Line
@@ -146,7 +146,7 @@ def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
 
 def course_of(stressed: Stressed, points: Sequence[Evaluated]) -> Course:
     """Failures of the joints at some points; joints that are not settled, or never repeat, have no stresses."""
-    failed = exceedance.split(np.zeros(stressed.status.size), stressed.status)[1]
+    failed = sorted_loads.split(np.zeros(stressed.status.size), stressed.status)[1]
     done = stressed.status != Status.PENDING
     n_failed, n_without = int(failed.sum()), int((done & ~stressed.valid).sum())
     return Course(points, done, n_failed, n_without - n_failed, stressed.iid)

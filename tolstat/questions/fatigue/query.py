@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import cycles, damage, exceedance, prediction, quantile
+from tolstat.analysis import cycles, damage, exceedance, prediction, quantile, sorted_loads
 from tolstat.analysis.cycles import Cycles, FloatArray
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.shown import shown
@@ -146,7 +146,7 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
         for c, channel in enumerate(loading.cycles.channels):
             head = {"channel": channel, "unit": CHANNELS[channel], "m": m, "nominal": _only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))
-            sample = exceedance.sort_out(values[:, c], loading.status)
+            sample = sorted_loads.sort_out(values[:, c], loading.status)
             for share in shares:
                 found = quantile.of_sample(sample, share, confidence, loading.iid)
                 rows.append({**head, **found._asdict(), "confidence": confidence})
@@ -224,7 +224,7 @@ def spectra(
         numbers = _numbers(part)
         values = cycles.spectrum(part, numbers)[:, 0]
         nominal = cycles.spectrum(loading.nominal.of(channel), numbers)[:, 0]
-        samples = [exceedance.sort_out(own, loading.status) for own in values.T]
+        samples = [sorted_loads.sort_out(own, loading.status) for own in values.T]
         for share in shares:
             for number, sample, own in zip(numbers, samples, nominal.T, strict=True):
                 head = {"channel": channel, "unit": CHANNELS[channel], "cycles": number * loading.settings.revolutions}

@@ -19,7 +19,8 @@ import numpy as np
 
 from tolstat import sampling
 from tolstat.analysis import prediction
-from tolstat.analysis.exceedance import FloatArray, split
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.sorted_loads import split
 from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution

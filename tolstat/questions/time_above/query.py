@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import cycles, exceedance, quantile
+from tolstat.analysis import cycles, exceedance, quantile, sorted_loads
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.shown import shown
@@ -160,7 +160,7 @@ def _rows(
     """One row per load and level, as in `TimeAbove`."""
     for name, own in levels.items():
         for level, time in zip(own, shares[name].T, strict=True):
-            sample = exceedance.sort_out(time, np.full(time.size, int(Status.OK)))
+            sample = sorted_loads.sort_out(time, np.full(time.size, int(Status.OK)))
             above = exceedance.curve_of(sample, [0.0], confidence, iid)[0]
             row = {"load": name, "unit": CHANNELS[name], "level": float(level)}
             row |= _ends("joints_above", *(float(above[name]) for name in ("estimate", "lower", "upper")))

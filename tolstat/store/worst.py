@@ -87,7 +87,9 @@ def load_of(parts: Sequence[Results], load: Load) -> tuple[FloatArray, NDArray[n
     ends = (load.ends({name: part[name][joints] for name in names}) for part in parts)
     lower, upper = (np.maximum.reduce(own) for own in zip(*ends, strict=True))
     intervals = Intervals.of(values[joints], (lower, upper)).among(joints)
-    return frozen(values), decided, Intervals(*map(frozen, intervals))
+    for array in (values, *intervals):
+        frozen(array)
+    return values, decided, intervals
 
 
 def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:

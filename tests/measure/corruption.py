@@ -3,7 +3,8 @@
 ``python -m tests.measure.corruption FILE 1000 [FIRST [COMMAND ...]]`` corrupts a copy of FILE, a result file of 220
 joints, in 1000 ways, the first of them number FIRST (0), passes each to every command below, or to those named, and
 prints every traceback, signal, hang and silent difference. What a command writes is compared, too. FILE may have
-several operating points, and load histories or cycles: these pass through two commands more.
+several operating points, and load histories or cycles: these pass through two commands more. Beside FILE of an
+unfinished campaign lie its histories, and its study, of the same name: these pass through ``run``, too.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 import h5py
 
 from tests.support import corruption
+from tolstat.store.histories import parts_folder
 
 COMMANDS = (
     ("status", "FILE", "--json"),
@@ -32,15 +34,18 @@ OF_HISTORIES = (
     ("fatigue", "FILE", "--by", "cross1.F_t", "--json"),
 )
 """Commands that read load histories or cycles."""
+GO_ON = ("run", "STUDY", "--out", "FILE", "--workers", "1", "--no-report", "--no-verify")
 
 
 def _commands(path: Path) -> list[tuple[str, ...]]:
     """Commands for a file; a command that is about one operating point gets the first."""
     with h5py.File(path) as file:
         points = list(file.get("points", ()))
-        histories = "histories" in (file[f"points/{points[0]}"] if points else file)
+        unfinished = parts_folder(path).exists()
+        histories = unfinished or "histories" in (file[f"points/{points[0]}"] if points else file)
     point = ("--point", points[0]) if points else ()
-    commands = COMMANDS + OF_HISTORIES * histories
+    go_on = tuple(str(path.with_suffix(".toml").resolve()) if word == "STUDY" else word for word in GO_ON)
+    commands = COMMANDS + OF_HISTORIES * histories + (go_on,) * unfinished
     return [tuple(word for given in words for word in (point if given == "POINT" else (given,))) for words in commands]
 
 

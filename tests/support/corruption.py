@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 
 from tolstat import cli
 from tolstat.store import integrity, result_file
+from tolstat.store.histories import parts_folder
 
 LIMIT_S = 30
 """Processor seconds of a command."""
@@ -38,10 +39,19 @@ ODD: tuple[Any, ...] = (
 
 
 def corrupt(path: Path, rng: np.random.Generator) -> str:
-    """Change a file in one of the ways below; return what was done."""
-    ways = (flipped, flipped_early, cut, flipped_value, swapped, reshaped, mutated, mutated, odd_number)
-    way: Callable[[Path, np.random.Generator], str] = ways[rng.integers(len(ways))]
-    return f"{way.__name__} {way(path, rng)}"
+    """Change a file in one of the ways below; return what was done.
+
+    Where histories of an unfinished campaign lie beside it, mostly one of their parts is changed.
+    """
+    ways: tuple[Callable[[Path, np.random.Generator], str], ...]
+    ways = (flipped, flipped_early, cut, flipped_value, swapped, reshaped)
+    parts = sorted(parts_folder(path).glob("**/*.h5"))
+    if parts and rng.random() < 0.7:
+        path = parts[rng.integers(len(parts))]
+    else:
+        ways = (*ways, mutated, mutated, odd_number)
+    way = ways[rng.integers(len(ways))]
+    return f"{way.__name__} {path.name} {way(path, rng)}"
 
 
 def flipped(path: Path, rng: np.random.Generator, part: float = 1.0) -> str:
@@ -194,10 +204,10 @@ def run(words: Sequence[str], copied: Path) -> Ended:
     """
     folder = copied.parent
     ended = call([copied if word == "FILE" else word for word in words], folder)
-    page, whole = folder / "page.html", copied if words[0] == "extend" else folder / "whole.h5"
+    page, whole = folder / "page.html", folder / "whole.h5" if words[0] == "merge" else copied
     if page.exists():
         ended = ended._replace(out=ended.out + page.read_text(encoding="utf-8"))
-    if ended.code == 0 and words[0] in ("extend", "merge"):
+    if ended.code == 0 and words[0] in ("extend", "merge", "run"):
         with h5py.File(whole) as file:
             points = list(file.get("points", ()))
         for point in points or [None]:
@@ -256,7 +266,7 @@ def fault(ended: Ended, usual: Ended) -> str:
         return f"{ended.memory >> 20} MiB"
     if ended.code == 2:
         return "" if "error: " in ended.err and "hint: " in ended.err else "no message"
-    on_page = "is damaged:" in ended.out and "is damaged:" not in usual.out
+    on_page = "is damaged" in ended.out and "is damaged" not in usual.out
     told = on_page or "damaged" in ended.err or "pending" in ended.err
     return "" if ended.out == usual.out or told else "silent difference"
 
@@ -320,3 +330,5 @@ def _fresh(path: Path, folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     shutil.copy(path, folder / path.name)
+    if parts_folder(path).exists():
+        shutil.copytree(parts_folder(path), parts_folder(folder / path.name))

@@ -4,7 +4,8 @@
 joints, in 1000 ways, the first of them number FIRST (0), passes each to every command below, or to those named, and
 prints every traceback, signal, hang and silent difference. What a command writes is compared, too. FILE may have
 several operating points, and load histories or cycles: these pass through two commands more. Beside FILE of an
-unfinished campaign lie its histories, and its study, of the same name: these pass through ``run``, too.
+unfinished campaign lie its histories, and its study, of the same name: ``run`` goes on with it, ``extend`` and ``merge``
+would refuse it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import h5py
 from tests.support import corruption
 from tolstat.store.histories import parts_folder
 
-COMMANDS = (
+READING = (
     ("status", "FILE", "--json"),
     ("export", "FILE", "--csv", "-", "--quiet", "POINT"),
     ("export", "FILE", "--statistics", "-", "--quiet"),
@@ -26,6 +27,8 @@ COMMANDS = (
     ("causes", "FILE", "--by", "cross1.F", "--json"),
     ("verify", "FILE", "--near", "cross1.F > 1500 N", "--joints", "50", "--json", "--workers", "1"),
     ("replay", "FILE", "--row", "1", "--json", "POINT"),
+)
+WRITING = (
     ("extend", "FILE", "--n", "230", "--workers", "1", "--no-report"),
     ("merge", "FILE", "--out", "whole.h5"),
 )
@@ -45,7 +48,8 @@ def _commands(path: Path) -> list[tuple[str, ...]]:
         histories = unfinished or "histories" in (file[f"points/{points[0]}"] if points else file)
     point = ("--point", points[0]) if points else ()
     go_on = tuple(str(path.with_suffix(".toml").resolve()) if word == "STUDY" else word for word in GO_ON)
-    commands = COMMANDS + OF_HISTORIES * histories + (go_on,) * unfinished
+    changing = (go_on,) if unfinished else WRITING
+    commands = READING + OF_HISTORIES * histories + changing
     return [tuple(word for given in words for word in (point if given == "POINT" else (given,))) for words in commands]
 
 

@@ -321,10 +321,10 @@ def test_what_a_command_tells(tmp_path):
     assert (quiet.exit_code, quiet.stdout, quiet.stderr) == (0, "", "")
     lines = log.read_text(encoding="utf-8").splitlines()
     assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ (INFO|DEBUG) ", line) for line in lines)
-    assert lines[-1].endswith(f" INFO wrote {tmp_path / 'a.csv'}: 60 joints")
-    assert re.search(r" DEBUG reading the file: \d+\.\d\d s$", lines[-2])
+    assert lines[-2].endswith(f" INFO wrote {tmp_path / 'a.csv'}: 60 joints")
+    assert re.search(r" DEBUG export: \d+\.\d\d s$", lines[-1])
     loud = call("export", path, "--csv", tmp_path / "a.csv", "--verbose", "--log", log)
-    assert re.search(r"^reading the file: \d+\.\d\d s$", loud.stderr, flags=re.MULTILINE)
+    assert re.search(r"^export: \d+\.\d\d s$", loud.stderr, flags=re.MULTILINE)
     assert len(log.read_text(encoding="utf-8").splitlines()) == 2 * len(lines)
     failed = call("status", tmp_path / "none.h5", "--quiet", "--log", log)
     assert failed.exit_code == 2

@@ -4,8 +4,8 @@
 joints, in 1000 ways, the first of them number FIRST (0), passes each to every command below, or to those named, and
 prints every traceback, signal, hang and silent difference. What a command writes is compared, too. FILE may have
 several operating points, and load histories or cycles: these pass through two commands more. Beside FILE of an
-unfinished campaign lie its histories, and its study, of the same name: ``run`` goes on with it, ``extend`` and ``merge``
-would refuse it.
+unfinished campaign lie its histories, and its study, of the same name: ``run`` goes on with it, while ``extend`` and
+``merge`` would refuse it.
 """
 
 from __future__ import annotations

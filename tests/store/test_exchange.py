@@ -2,6 +2,7 @@
 
 import json
 
+import h5py
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
@@ -15,7 +16,7 @@ from tolstat.common.loads import BUSHING_LOADS
 from tolstat.questions.capability import query as capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import summary
-from tolstat.store import Reader
+from tolstat.store import Reader, frame
 
 
 def export(*arguments):
@@ -60,6 +61,32 @@ def test_what_is_not_installed_is_said_before_anything_is_written(tmp_path, monk
     assert not out.exists()
     with Reader.open(path) as store, pytest.raises(InputError, match="pip install xarray"):
         store.to_xarray()
+
+
+def test_tables_are_written_block_by_block(tmp_path, monkeypatch):
+    for source in (synthetic.store(tmp_path, failed=2), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):
+        written = {}
+        for rows in (10**6, 7):
+            monkeypatch.setattr(frame, "AT_ONCE", rows)
+            out = tmp_path / f"{rows}.csv"
+            assert export(source, "--csv", out, "--nominal").exit_code == 0
+            written[rows] = out.read_text(encoding="utf-8")
+        assert written[7] == written[10**6]
+        found = pd.read_csv(out, header=[0, 1], index_col=0)
+        found.columns = found.columns.get_level_values(0)
+        with Reader.open(source) as store:
+            pd.testing.assert_frame_equal(found, store.to_pandas(nominal=True), check_dtype=False, check_names=False)
+
+
+def test_damage_is_found_before_anything_goes_to_standard_output(tmp_path, monkeypatch):
+    monkeypatch.setattr(frame, "AT_ONCE", 7)
+    path = synthetic.store(tmp_path)
+    with h5py.File(path, "r+") as file:
+        file["errors/pin1.offset_t"][50] += 1e-6
+    done = export(path, "--csv", "-")
+    assert done.exit_code == 2
+    assert "errors of row 50 do not match" in done.stderr
+    assert not done.stdout
 
 
 def test_parquet_has_columns_units_and_rows(tmp_path):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from importlib.util import find_spec
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from tolstat.store import Reader
     from tolstat.store.view import View
 
 
@@ -91,7 +94,7 @@ def export(
     for target in targets.values():
         if target != "-":
             check_target(Path(target), file)
-    with progress("reading the file"), Reader.open(file) as opened:
+    with progress("export"), Reader.open(file) as opened:
         view = opened.view().at(point or "")
         store = view.store
         if workbook is not None:
@@ -100,15 +103,15 @@ def export(
             _write(cycles, *_collectives(view, nominal))
         if statistics is not None:
             _write(statistics, *_statistics(view, by or (), accepted))
-        if out is None and parquet is None and workbook is None:
+        if out is not None:
+            _write_csv(store, nominal, out)
+        if parquet is None and workbook is None:
             return
         frame = store.to_pandas(nominal)
         if workbook is not None:
             with output_file(Path(workbook)) as temporary:
                 excel.write(store, frame, temporary)
             say(f"wrote {workbook}: {len(frame)} joints")
-    if out is not None:
-        _write(out, lambda stream: _write_table(frame, stream), f"{len(frame)} joints")
     if parquet is not None:
         _write_parquet(frame, Path(parquet))
         say(f"wrote {parquet}: {len(frame)} joints")
@@ -165,12 +168,41 @@ def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
         frame.to_parquet(temporary, engine="pyarrow")
 
 
-def _write_table(frame: pd.DataFrame, stream: TextIO) -> None:
+def _write_csv(store: Reader, nominal: bool, out: str) -> None:
+    """Write errors and results block by block; damage is found before anything goes to standard output."""
+    from tolstat.store.frame import in_blocks
+
+    if out == "-":
+        for _ in in_blocks(store, nominal):
+            pass
+    number = store.n - (0 if nominal else store.first_sample)
+    _write(out, lambda stream: _write_table(in_blocks(store, nominal), stream), f"{number} joints")
+
+
+def _write_table(blocks: Iterator[pd.DataFrame], stream: TextIO) -> None:
+    """Write blocks of a table, as many at once as there are cores: turning numbers into text takes longest."""
     import csv
 
-    from tolstat.display.text import cells
+    from tolstat.common.aside import mapped
+    from tolstat.common.cores import available_cores
 
+    cores, first = available_cores(), next(blocks)
     heads = csv.writer(stream, lineterminator="\n")
-    heads.writerow(["row", *frame.columns])
-    heads.writerow(["1", *frame.attrs["units"].values()])
-    cells(frame).to_csv(stream, header=False, lineterminator="\n")
+    heads.writerow(["row", *first.columns])
+    heads.writerow(["1", *first.attrs["units"].values()])
+    blocks = chain([first], blocks)
+    while some := list(islice(blocks, cores)):
+        for text in mapped([partial(_as_csv, block) for block in some], cores):
+            stream.write(text)
+
+
+def _as_csv(frame: pd.DataFrame) -> str:
+    import csv
+    from io import StringIO
+
+    from tolstat.display.text import csv_rows
+
+    text = StringIO(newline="")
+    columns = (frame[name].tolist() for name in frame)
+    csv.writer(text, lineterminator="\n").writerows(csv_rows([frame.index.tolist(), *columns]))
+    return text.getvalue()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from csv import writer
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,8 +43,13 @@ def csv(table: Mapping[str, Sequence[Any]] | pd.DataFrame, stem: Path, what: str
     with atomic_write(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         out = writer(stream, lineterminator="\n")
         out.writerow(columns)
-        out.writerows(zip(*map(_written, columns.values()), strict=True))
+        out.writerows(csv_rows(columns.values()))
     return path
+
+
+def csv_rows(columns: Iterable[Sequence[Any]]) -> Iterable[tuple[Any, ...]]:
+    """Rows of a CSV file from its columns: NaN becomes an empty cell, text is no formula."""
+    return zip(*map(_written, columns), strict=True)
 
 
 def columns_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:

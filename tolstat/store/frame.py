@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,9 +18,10 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-    from tolstat.store.checked_tables import CheckedTables
     from tolstat.store.reader import Reader
 
+AT_ONCE = 8192
+"""Maximum number of rows of a block of `in_blocks`."""
 OPERATING = {
     "operation.alpha": "misalignment of the shafts",
     "operation.speed": "angular velocity of the input shaft",
@@ -36,18 +38,26 @@ def described(store: Reader) -> dict[str, Column]:
 
 def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
     """Export a campaign to one DataFrame, see `Reader.to_pandas`."""
+    first = 0 if nominal else store.first_sample
+    return _frame(store, slice(first, store.n), nominal, _listed(store))
+
+
+def in_blocks(store: Reader, nominal: bool) -> Iterator[pd.DataFrame]:
+    """Yield the rows of `to_pandas` in blocks of at most `AT_ONCE`, one at least."""
+    first, listed = 0 if nominal else store.first_sample, _listed(store)
+    for begin in range(first, max(store.n, first + 1), AT_ONCE):
+        yield _frame(store, slice(begin, min(begin + AT_ONCE, store.n)), nominal, listed)
+
+
+def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
+    """Rows of a campaign; `listed` as from `_listed`."""
     import pandas as pd
 
-    first = 0 if nominal else store.first_sample
-    rows = slice(first, None)
     errors, results = store.errors(rows), store.results(rows)
     data: dict[str, NDArray[Any]] = {}
     if nominal:
-        data["nominal"] = np.arange(store.n) < store.first_sample
-    if store.case_names:
-        data |= _design(store)
-    elif store.variants:
-        data |= {name: values[rows] for name, values in recorded.swept(store).items()}
+        data["nominal"] = np.arange(rows.start, rows.stop) < store.first_sample
+    data |= {name: values[rows] for name, values in listed.items()}
     drawn = draw_records.columns(store.sampling)
     if drawn:
         origin = store.origin(rows)
@@ -58,7 +68,7 @@ def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
     if store.retries:
         data["attempt"] = store.attempt(rows)
     data |= {name: labels[data[name]] for name, labels in LABELS.items()}
-    frame = pd.DataFrame(data, index=pd.RangeIndex(store.rows[first:], name="row"))
+    frame = pd.DataFrame(data, index=pd.RangeIndex(store.rows[rows], name="row"))
     columns = described(store)
     frame.attrs["units"] = {name: columns[name].unit if name in columns else "1" for name in data}
     return frame
@@ -79,8 +89,10 @@ def to_xarray(store: Reader, nominal: bool) -> xarray.Dataset:
     return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": store.study_name})
 
 
-def _design(store: CheckedTables) -> dict[str, NDArray[Any]]:
-    """Case, variant, family and group of each row; case and family by name, variant and group by index."""
+def _listed(store: Reader) -> dict[str, NDArray[Any]]:
+    """Columns of joints that the study lists: case and family by name, variant and group by index; or of a sweep."""
+    if not store.case_names:
+        return recorded.swept(store) if store.variants else {}
     design = store.design()
     families = np.array([variant.family for variant in store.variants], dtype=object)
     return {

@@ -15,7 +15,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5g, h5s, h5t
+from h5py import h5a, h5d, h5f, h5g, h5p, h5s, h5t
 from numpy.typing import NDArray
 
 from tolstat.common import draw_records, tables
@@ -185,8 +185,7 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
         # h5py would turn an empty file that it opens for writing into an HDF5 file
         raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
     try:
-        # Readers take no lock: a writer only changes numbers in place, so a campaign under way can be read.
-        file = h5py.File(path, mode, locking=False if mode == "r" else "best-effort")
+        file = _for_reading(path) if mode == "r" else h5py.File(path, mode, locking="best-effort")
     except OSError as error:
         if not path.is_file():
             raise store_error(
@@ -210,6 +209,19 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
         file.close()
         raise store_error(path, "is being written by another process", "wait until that process ends, or stop it")
     return file
+
+
+def _for_reading(path: Path) -> h5py.File:
+    """Open a file, also while a campaign writes it.
+
+    Without a lock, since a writer only changes numbers in place; and without HDF5's sieve buffer, which would show
+    an open dataset as it was when it was read before.
+    """
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fclose_degree(h5f.CLOSE_STRONG)
+    access.set_file_locking(False, False)
+    access.set_sieve_buf_size(0)
+    return h5py.File(h5f.open(os.fsencode(path), h5f.ACC_RDONLY, access))
 
 
 def is_at(file: h5py.File, path: Path) -> bool:

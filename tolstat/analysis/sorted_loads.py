@@ -114,7 +114,8 @@ class Sample(NamedTuple):
     @classmethod
     def exact(cls, valid: FloatArray) -> Sample:
         """Make a sample of joints that are all valid; their loads are exact, and ascending."""
-        return cls(valid, *EXACT[1:], EXACT.upper, 0, 0)
+        none = np.empty(0)
+        return cls(valid, none, none, none, 0, 0)
 
     @property
     def n(self) -> int:

@@ -213,7 +213,8 @@ def run(words: Sequence[str], copied: Path) -> Ended:
         for point in points or [None]:
             after = call(["export", whole, "--csv", "-", "--quiet", *(("--point", point) if point else ())], folder)
             memory = max(ended.memory, after.memory)
-            ended = after._replace(out=ended.out + after.out, err=ended.err + after.err, memory=memory)
+            code = after.code or ended.code  # one point that is refused decides
+            ended = after._replace(code=code, out=ended.out + after.out, err=ended.err + after.err, memory=memory)
     return ended
 
 

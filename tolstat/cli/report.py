@@ -93,7 +93,7 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None, point: s
     with viewed(file) as view:
         store, held = view.store, bool(revolutions.held(view.store))
         if again is None:
-            with progress("reading"):
+            with progress("reading the file"):
                 done = view.counts.done == view.counts.total
             again = page.REPLAYED if held or done else 0
             if not again:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -38,11 +39,11 @@ class CheckedTables(Numbering):
         return self._handle.file
 
     def _held(self) -> h5py.Group:
-        """Group of the file with the tables of the operating point; raises as `_place`."""
+        """Group with the tables of the operating point; exceptions as of `_place`."""
         return self._file[self._place()]
 
     def _place(self) -> str:
-        """Path of that group.
+        """Path of the group with the tables of the operating point.
 
         Raises
         ------
@@ -188,9 +189,9 @@ class CheckedTables(Numbering):
         StoreError
             When it cannot be read.
         """
-        place = self._place() if group in POINT_GROUPS else "/"
+        path = posixpath.join(self._place() if group in POINT_GROUPS else "/", group, name)
         try:
-            return np.asarray(self._handle.dataset(f"{place.rstrip('/')}/{group}/{name}")[slots])
+            return np.asarray(self._handle.dataset(path)[slots])
         except checks.DAMAGE_ERRORS as error:
             if not self._file:
                 raise

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tolstat.store.reader import Reader
 
 AT_ONCE = 16_384
-"""Rows read at once: column by column they are written to a table, which is faster the more of it the cache holds."""
+"""Rows read at once. They are written to a table column by column, faster where it fits the processor's cache."""
 MAX_LISTED = 12
 """Number of joints without a valid load whose complete results are kept."""
 

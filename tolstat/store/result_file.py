@@ -58,7 +58,7 @@ class Handle:
         self._datasets: dict[str, h5py.Dataset] = {}
 
     def dataset(self, path: str) -> h5py.Dataset:
-        """A dataset; that of a file open for reading is looked up once, which takes longer than to read 65 536 rows."""
+        """Look up a dataset; in a file open for reading once, since that takes longer than reading 65 536 numbers."""
         found = self._datasets.get(path)
         if found is None:
             found = self._file[path]
@@ -214,8 +214,8 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
 def _for_reading(path: Path) -> h5py.File:
     """Open a file, also while a campaign writes it.
 
-    Without a lock, since a writer only changes numbers in place; and without HDF5's sieve buffer, which would show
-    an open dataset as it was when it was read before.
+    It takes no lock, since a writer only changes numbers in place, and has no sieve buffer: with one, HDF5 would read
+    a dataset that stays open from its memory, as it was before.
     """
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fclose_degree(h5f.CLOSE_STRONG)

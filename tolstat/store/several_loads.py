@@ -38,19 +38,18 @@ def largest_of(name: str, parts: Sequence[SampleLoad], of_ratios: bool = False) 
     Computed load by load, and ratios are not kept, to save memory.
     """
     joints = np.unique(np.concatenate([part.intervals.joints for part in parts]))
-    found: SampleLoad | None = None
-    for load in replace(parts[0], parts=tuple(parts), of_ratios=of_ratios).each():
+    loads = replace(parts[0], parts=tuple(parts), of_ratios=of_ratios).each()
+    first = next(loads)
+    values, nominal = first.values.copy(), first.nominal
+    lower, upper = first.intervals.ends_of(joints, first.values)
+    for load in loads:
         own = load.intervals.ends_of(joints, load.values)
-        if found is None:
-            found, values, ends, nominal = load, load.values.copy(), own, load.nominal
-        else:
-            np.maximum(values, load.values, out=values)
-            ends = np.maximum(ends[0], own[0]), np.maximum(ends[1], own[1])
-            nominal = max(nominal, load.nominal)
-    assert found is not None
-    intervals = Intervals.of(values[joints], ends).among(joints)
+        lower, upper = np.maximum(lower, own[0]), np.maximum(upper, own[1])
+        np.maximum(values, load.values, out=values)
+        nominal = max(nominal, load.nominal)
+    intervals = Intervals.of(values[joints], (lower, upper)).among(joints)
     return replace(
-        found,
+        first,
         name=name,
         nominal=nominal,
         values=frozen(values),

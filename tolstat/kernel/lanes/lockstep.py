@@ -70,9 +70,11 @@ from tolstat.kernel.simd.borrow import without_refcount
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import WIDTH, any_of, bits_of, count_of, where
 
-PATIENCE = 3
+PATIENCE = 1 + WIDTH // 4
 """Number of lanes in need of a new tangent at which it is computed: it costs as much for one lane as for all, and lanes
 that wait stand still."""
+STANDSTILL = 2 * WIDTH
+"""Rounds that lanes have waited, summed over the lanes, at which a tangent is computed for fewer: it costs no more."""
 
 
 @njit
@@ -241,7 +243,8 @@ def lockstep(rows, words, starts, left, options, patience, alone, batch, samples
     options : Options
         Numerical settings; quasi-static, or dynamic with BDF2 or with error-controlled steps.
     patience : int
-        Number of lanes in need of a new tangent at which it is computed; no result depends on it.
+        Number of lanes in need of a new tangent at which it is computed, or after `STANDSTILL`; no result depends on
+        it.
     alone : Scratch
         Work arrays of one joint.
     batch : Batch
@@ -269,7 +272,7 @@ def lockstep(rows, words, starts, left, options, patience, alone, batch, samples
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
     lanes, own, at = (par, work, motion), batch.motion, batch.control
     pasts = batch.pasts
-    queued, controlled = 0, follows_error(options)
+    queued, waited, controlled = 0, 0, follows_error(options)
     for lane in range(WIDTH):
         put_joint(lane, words[0], batch)
         empty(lane, batch)
@@ -282,8 +285,11 @@ def lockstep(rows, words, starts, left, options, patience, alone, batch, samples
         tally[0] += 1
         tally[1] += count_of(control.live > 0)
         waiting = count_of(stale)
-        if waiting >= patience or (waiting > 0 and not any_of(solved | failed | moving)):
+        waited += waiting
+        nothing_else = waiting > 0 and not any_of(solved | failed | moving)
+        if waiting >= patience or waited >= STANDSTILL or nothing_else:
             good = refactorise(stale, control, par, work, kept)
+            waited = 0
             tally[2] += 1
             control.before = where(stale, now, control.before)
             failed, moving = failed | (stale & ~good), moving | (stale & good)

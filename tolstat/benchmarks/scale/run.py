@@ -116,7 +116,7 @@ def commands(setup: Setup, n: int, folder: Path) -> dict[str, tuple[list[str], P
 
 
 def measure(setup: Setup, folder: Path | None, say: Callable[[str], None]) -> list[Row]:
-    """Measure each command at each number of joints.
+    """Measure each command at each number of joints, after a run of the fewest that compiles the kernels.
 
     Parameters
     ----------
@@ -133,6 +133,10 @@ def measure(setup: Setup, folder: Path | None, say: Callable[[str], None]) -> li
         By number of joints, then in the order of the commands.
     """
     rows: list[Row] = []
+    fewest = min(setup.joints)
+    with tempfile.TemporaryDirectory(prefix="tolstat-scale-", dir=folder, ignore_cleanup_errors=True) as own:
+        _measure(fewest, "run", *commands(setup, fewest, Path(own))["run"])
+    say(f"{fewest} joints, run: done once, not counted, so that kernels are compiled")
     for n in setup.joints:
         with tempfile.TemporaryDirectory(prefix="tolstat-scale-", dir=folder, ignore_cleanup_errors=True) as own:
             for word, (arguments, file) in commands(setup, n, Path(own)).items():

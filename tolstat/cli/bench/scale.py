@@ -42,10 +42,10 @@ def scale(
 ) -> None:
     """Measure time and memory over the number of joints.
 
-    Runs tolstat run, report (the page), causes and export --csv one after the other, each as a user does, and prints
-    time, processor time of all processes, memory of the largest of them, and size of the file written. Growth is the
-    exponent of the processor time over the number of joints. Takes three minutes on two cores, and 4 kB of disk a
-    joint. Use a machine without other load. Exit code 1: a command failed.
+    Runs tolstat run, report (the page), causes and export --csv one after the other, each as a user does, after a run
+    that compiles the kernels. Prints time, processor time of all processes, memory of the largest of them, and size of
+    the file written. Growth is the exponent of the processor time over the number of joints. Takes three minutes on
+    two cores, and 4 kB of disk a joint. Use a machine without other load. Exit code 1: a command failed.
 
     Example: tolstat bench scale studies/iso2768_f.toml --joints 1000,10000
     """

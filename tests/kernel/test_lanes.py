@@ -7,7 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from tests.conftest import REFERENCE
 from tolstat import joint as joints
+from tolstat import sampling, study
+from tolstat.benchmarks.cost import iteration
 from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status, iterations_allowed
 from tolstat.joint.contact import FROM_COEFFICIENTS
 from tolstat.kernel.lanes import lockstep
@@ -16,6 +19,7 @@ from tolstat.kernel.simd.jit import njit_inner
 from tolstat.kernel.simd.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
 from tolstat.solver import simulation, stationary
 
+STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"
 FAST = Options(steps_per_rev=45, max_revs=6, max_refinements=0)
 STATIC = FAST._replace(fidelity=int(Fidelity.QUASISTATIC))
 
@@ -166,3 +170,14 @@ def test_no_result_depends_on_lane_neighbours_order_or_patience(mixed, options, 
     for patience in (1, WIDTH):
         monkeypatch.setattr(lockstep, "PATIENCE", patience)
         assert_same(simulation.simulate_rows(mixed, options).results, results)
+
+
+def test_lanes_wait_for_a_tangent_no_longer_than_allowed(monkeypatch):
+    plan = study.load(STUDY)
+    options = plan.solver.options()._replace(max_refinements=0, peak_substeps=1)
+    params = joints.perturb(plan.joint, plan.operation, sampling.draw(plan, range(1, 25)))
+    results = simulation.simulate_rows(params, options).results
+    evaluations = sum(int(results[name].sum()) for name in ("newton_iterations", "steps", "halvings"))
+    monkeypatch.setattr(lockstep, "PATIENCE", WIDTH + 1)
+    _, filled, tangents = iteration.tally(iteration.Sample(params, options))
+    assert 0 < (filled - evaluations) / tangents <= lockstep.STANDSTILL

@@ -95,14 +95,14 @@ def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
     return batch
 
 
-def _tally(these: Sample) -> NDArray[np.int64]:
+def tally(these: Sample) -> NDArray[np.int64]:
     """Counts of all joints in lock-step: rounds, lanes with a joint summed over rounds, rounds with new tangents."""
     from tolstat.kernel.integrators.state import UNLIMITED
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
     params, options = these
-    batch, tally = simulation.lanes(options), np.zeros(3, np.int64)
+    batch, counts = simulation.lanes(options), np.zeros(3, np.int64)
     batch.par.n_stations = params["n_stations"][0]
     words = params.view(np.float64).reshape(len(params), -1)
     out = np.zeros(len(params), KERNEL_RESULT).view(np.recarray)
@@ -110,8 +110,8 @@ def _tally(these: Sample) -> NDArray[np.int64]:
     rows = params.view(np.recarray)
     left, scratch = np.full(len(params), UNLIMITED), simulation.scratch(options)
     starts = simulation.starts(rows, options)
-    lockstep(rows, words, starts, left, options, PATIENCE, scratch, batch, samples, blocks, out, tally)
-    return tally
+    lockstep(rows, words, starts, left, options, PATIENCE, scratch, batch, samples, blocks, out, counts)
+    return counts
 
 
 def _start_counts(these: Sample, n: int) -> tuple[float, float]:
@@ -152,7 +152,7 @@ def measure(these: Sample, rounds: int) -> Iteration:
     once = {"lanes": _once(times, "lanes", TIMES * WIDTH), "alone": _once(times, "alone", TIMES * len(snaps))}
     results = times.returned["lanes"].results
     mean = {name: float(results[name].mean()) for name in ("steps", "newton_iterations", "factorisations", "halvings")}
-    rounds_done, filled, renewals = (int(x) for x in _tally(these))
+    rounds_done, filled, renewals = (int(x) for x in tally(these))
     start_iterations, start_tangents = _start_counts(these, len(params))
     iterations, tangents = mean["newton_iterations"] - start_iterations, mean["factorisations"] - start_tangents
     one = np.array([iterations + mean["steps"] + mean["halvings"], tangents, iterations])

@@ -243,8 +243,8 @@ def lockstep(rows, words, starts, left, options, patience, alone, batch, samples
     options : Options
         Numerical settings; quasi-static, or dynamic with BDF2 or with error-controlled steps.
     patience : int
-        Number of lanes in need of a new tangent at which it is computed, or after `STANDSTILL`; no result depends on
-        it.
+        Number of lanes in need of a new tangent at which it is computed; for fewer, see `STANDSTILL`. No result depends
+        on it.
     alone : Scratch
         Work arrays of one joint.
     batch : Batch

@@ -74,7 +74,8 @@ PATIENCE = 1 + WIDTH // 4
 """Number of lanes in need of a new tangent at which it is computed: it costs as much for one lane as for all, and lanes
 that wait stand still."""
 STANDSTILL = 2 * WIDTH
-"""Rounds that lanes have waited, summed over the lanes, at which a tangent is computed for fewer: it costs no more."""
+"""Rounds that lanes have waited for a tangent, summed over the lanes, at which it is computed even for fewer than
+`PATIENCE`: these rounds took longer than a tangent does."""
 
 
 @njit

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_source import PaperStudy
-from tolstat.common.tables import CONTACTS, INNER, OUTER
+from tolstat.common.load_kinds import CONTACTS, INNER, OUTER
 from tolstat.display import style
 from tolstat.joint import ideal
 

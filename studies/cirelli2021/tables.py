@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import BUSHINGS
+from tolstat.common.load_kinds import BUSHINGS
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]

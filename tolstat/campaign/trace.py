@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
+from tolstat.common.load_kinds import BUSHINGS, COMPONENTS, CONTACTS, PINS
 from tolstat.common.shown import shown
-from tolstat.common.tables import BUSHINGS, CONTACTS, PINS, Motion, Options, Simulation, Status
+from tolstat.common.tables import Motion, Options, Simulation, Status
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tolstat.study import Case
-
-LOADS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 
 @shown
@@ -106,7 +105,7 @@ class CaseResult(NamedTuple):
             "Psi": (tau - speed_ratio(theta, self.alpha)) / tau,
         }
         for b, bushing in enumerate(BUSHINGS):
-            for k, load in enumerate(LOADS):
+            for k, load in enumerate(COMPONENTS):
                 columns[f"{bushing}.{load}"] = histories["loads"][:, b, k]
         for p, pin in enumerate(PINS):
             for i, of in enumerate(CONTACTS):

@@ -12,11 +12,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
 from tolstat.common.loads import put_largest
 from tolstat.common.tables import (
     RESULT,
     SIMULATED,
-    SPAN,
     Fidelity,
     Options,
     Start,
@@ -264,6 +264,6 @@ def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | 
 
 
 def _change(before: Largest, last: Largest) -> float:
-    """Largest change of any bushing's largest load, relative to the largest of its kind."""
-    pairs = [(before[SPAN[kind]], last[SPAN[kind]]) for kind in ("F", "T")]
-    return max(float(np.abs(b - a).max() / max(b.max(), 1e-300)) for a, b in pairs)
+    """Largest change of any largest load that decides, relative to the largest of its measure."""
+    spans = [(SPAN[kind.key], SPAN[measure_of(kind).key]) for kind in LOAD_KINDS if kind.decides]
+    return max(float(np.abs(last[own] - before[own]).max() / max(last[of].max(), 1e-300)) for own, of in spans)

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import progress_memory
+from tolstat.common.load_kinds import CONTACTS, SPAN
 from tolstat.common.tables import (
-    CONTACTS,
     KERNEL_RESULT,
     RESULT,
     SIMULATED,
-    SPAN,
     Fidelity,
     HistorySpec,
     Method,

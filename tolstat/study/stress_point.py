@@ -10,8 +10,8 @@ from pydantic import AfterValidator, Field, model_validator
 from tolstat.analysis.strength import Line
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.strict import Strict, did_you_mean, refuse
-from tolstat.common.tables import BUSHINGS
 from tolstat.study.selection import select
 
 Positive = Annotated[units.Number, AfterValidator(units.positive)]

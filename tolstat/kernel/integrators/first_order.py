@@ -1,7 +1,7 @@
 """The joint as a first-order system, y = (q, q'), for third-party integrators: rate, Jacobian, loads."""
 
 from tolstat.kernel.mechanics.dynamics import acceleration, forces
-from tolstat.kernel.mechanics.loads import all_loads
+from tolstat.kernel.mechanics.loads import N_INSTANT, load_at, output_speed, write_loads
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.simd.jit import njit
@@ -67,9 +67,11 @@ def sample(times, states, par, work, value):
         The solution, s; m and rad, per s.
     par, work : records of PARAM and WORK
         The joint; scratch.
-    value : ndarray, shape (m, N_LOADS)
-        Written: as by `loads.all_loads`, SI.
+    value : ndarray, shape (m, N_INSTANT)
+        Written: loads at these times, SI.
     """
     for k in range(times.size):
         forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
-        all_loads(0, par, work, states[k, N_DOF:], value[k])
+        write_loads(0, output_speed(0, par, work, states[k, N_DOF:])[1], work)
+        for i in range(N_INSTANT):
+            value[k, i] = load_at(i, 0, work)

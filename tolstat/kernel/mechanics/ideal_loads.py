@@ -14,7 +14,8 @@ the couple T / cos(gamma) on the cross along its normal, and the secondary coupl
 
 import math
 
-from tolstat.common.tables import INNER, OUTER, RESULTANT, Mode
+from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
+from tolstat.common.tables import Mode
 from tolstat.kernel.mechanics.bushing import accumulate, markers
 from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion

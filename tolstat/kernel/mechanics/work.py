@@ -8,6 +8,7 @@ took five times as long.) All 6 x 6 blocks lie in one array: a kernel is compile
 import numpy as np
 
 from tolstat.common.parameters import MAX_STATIONS
+from tolstat.kernel.mechanics.loads import N_INSTANT
 from tolstat.kernel.mechanics.topology import N_BODIES, N_DOF, N_LUMPS
 
 # columns of work.station
@@ -34,6 +35,7 @@ FIELDS = {
     "load": (8, 6),  # bushing loads on the lump, in the base marker's (e, t, z)
     "contact": (4, 3),  # normal force at the outer and inner end station of each pin, resultant of all its stations
     "mode": (4,),  # contact mode of each pin
+    "loads": (N_INSTANT,),  # as `loads.write_loads` writes them
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
     "block": (N_LUMPS + 16, 6, 6),  # matrices of the tangent, see `HUB_PIN` to `ARM_PIN`; factorised in place
     "edge": (18, 6),  # its column and row psi, see `ARM_PSI` to `PSI_HUB`; those of pins and hub are fill-in

@@ -6,14 +6,19 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.kernel.mechanics.loads import (
-    FORCES,
+    DECIDING,
     INTERPOLATED,
     N_AVERAGED,
-    N_LOADS,
-    TORQUES,
-    modulus,
-    other_loads,
+    N_INSTANT,
+    N_MEASURES,
+    OF_FORCES,
+    OF_MEASURE,
+    OF_TORQUES,
+    OTHERS,
+    load_at,
     output_speed,
+    size_of,
+    write_loads,
 )
 from tolstat.kernel.mechanics.scale import stiffness
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
@@ -28,8 +33,8 @@ from tolstat.kernel.simd.lane import pick
 SAMPLE = np.dtype(
     [
         ("components", "f8", (8, 6)),  # of the bushing loads along and about e, t, z; N, N m
-        ("loads", "f8", (N_LOADS,)),  # kind after kind
-        ("change", "f8", (2,)),  # largest change of |F| and |T| against the revolution before
+        ("loads", "f8", (N_INSTANT,)),  # kind after kind
+        ("change", "f8", (N_MEASURES,)),  # largest change of a load that decides against the revolution before
         ("tau", "f8"),
         ("mode", "u1", (4,)),
         ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
@@ -80,8 +85,8 @@ def pressed(pin, lane, par, work):
 
 
 @njit
-def record(k, lane, in_full, par, work, v, samples):
-    """Record the loads of a grid point, and the change of the bushing loads since the revolution before.
+def record(k, lane, par, work, v, samples):
+    """Record a grid point, and the change of the loads that decide since the revolution before.
 
     Parameters
     ----------
@@ -89,12 +94,10 @@ def record(k, lane, in_full, par, work, v, samples):
         Number of the grid point, counted from the start; it overwrites sample k modulo n.
     lane : int
         Lane of the joint; has no effect where there is one joint only.
-    in_full : bool
-        Whether to record the whole sample; otherwise only load moduli and their changes.
     par : record of PARAM
         The joint.
     work : record of WORK
-        The joint's last evaluation.
+        The joint's last evaluation; its ``loads`` are written.
     v : ndarray, shape (55,)
         Velocities at that evaluation, m/s and rad/s.
     samples : ndarray of SAMPLE, shape (n,)
@@ -102,23 +105,24 @@ def record(k, lane, in_full, par, work, v, samples):
     """
     sample = samples[k % samples.size]
     fetch(samples[(k + 2) % samples.size])
-    for kind in (0, 1):
+    sample.tau, psi = output_speed(lane, par, work, v)
+    write_loads(lane, psi, work)
+    for measure in range(N_MEASURES):
         change = 0.0
-        for b in range(8):
-            i, load = (FORCES, TORQUES)[kind] + b, modulus(3 * kind, b, lane, work)
+        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+            i = DECIDING[j]
+            load = load_at(i, lane, work)
             change = larger(change, abs(load - sample.loads[i]))  # NaN in the first revolution
             sample.loads[i] = load
-        sample.change[kind] = change
-    if not in_full:
-        return
-    other_loads(lane, par, work, v, sample.loads)
+        sample.change[measure] = change
+    for i in OTHERS:
+        sample.loads[i] = load_at(i, lane, work)
     for b in range(8):
         for i in range(6):
             sample.components[b, i] = pick(work.load[b, i], lane)
     for pin in range(4):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin] = pressed(pin, lane, par, work)
-    sample.tau, _ = output_speed(lane, par, work, v)
 
 
 @njit
@@ -158,18 +162,17 @@ def predict_increment(k, q, v, ahead, samples):
 
 @njit
 def closure_error(first, last, samples):
-    """Largest change of any bushing load's modulus since the revolution before, relative to the largest of its kind.
+    """Largest change of any load that decides since the revolution before, relative to its measure.
 
     Changes count at samples `first` to `last` - 1.
     """
     worst = 0.0
-    for kind in (0, 1):
+    for measure in range(N_MEASURES):
         change = largest = 0.0
         for s in range(first, last):
-            change = larger(change, samples[s].change[kind])
+            change = larger(change, samples[s].change[measure])
         for s in range(samples.size):
-            for b in range(8):
-                largest = max(largest, samples[s].loads[(FORCES, TORQUES)[kind] + b])
+            largest = max(largest, size_of(measure, samples[s].loads))
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
     return worst
@@ -210,9 +213,8 @@ def step_error(par, samples):
     """
     force = torque = 0.0
     for s in range(samples.size):
-        for b in range(8):
-            force = max(force, samples[s].loads[FORCES + b])
-            torque = max(torque, samples[s].loads[TORQUES + b])
+        force = max(force, size_of(OF_FORCES, samples[s].loads))
+        torque = max(torque, size_of(OF_TORQUES, samples[s].loads))
     total = 0.0
     for s in range(samples.size):
         q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q
@@ -233,7 +235,7 @@ def step_error(par, samples):
 def summarise(par, samples, out):
     """Write the statistics of the recorded revolution of the joint `par` to a row of KERNEL_RESULT."""
     n = samples.size
-    for i in range(N_LOADS):
+    for i in range(N_INSTANT):
         if i < N_AVERAGED:
             top, low = extremes(samples.loads[:, i])
             total = 0.0

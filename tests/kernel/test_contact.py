@@ -29,7 +29,7 @@ def contacts_alone(params, random_errors, law):
         par[name] = 0.0
     par.clearance[:] = 1e-5
     rng = np.random.default_rng(3)
-    q = rng.normal(0, 2e-5, N_DOF)
+    q = np.append(rng.normal(0, 2e-5, S), 0.0)
     q[: 6 * N_LUMPS].reshape(N_LUMPS, 6)[:, 3:] = rng.normal(0, 3e-4, (N_LUMPS, 3))
     return par, q
 

@@ -58,8 +58,8 @@ def dense(work: np.record) -> NDArray[np.float64]:
         s[i, j], s[j, i] = m[PIN_ARM + p], m[ARM_PIN + p]
     for a in range(4):
         rows = slice(6 * (ARM + a), 6 * (ARM + a) + 6)
-        for i, of in ((PSI, OF_PSI), (S, OF_S)):
-            s[rows, i], s[i, rows] = e[of, ARM_SHAFT + a], e[of, SHAFT_ARM + a]
+        for unknown, of in ((PSI, OF_PSI), (S, OF_S)):
+            s[rows, unknown], s[unknown, rows] = e[of, ARM_SHAFT + a], e[of, SHAFT_ARM + a]
     s[PSI : S + 1, PSI : S + 1] = work.corner
     return s
 

@@ -49,7 +49,7 @@ OTHERS = np.setdiff1d(np.arange(N_INSTANT), DECIDING)
 
 @njit
 def output_speed(lane, par, work, v):
-    """Speed ratio tau and its error Psi, eq. (13), from the velocities `v`, (55,)."""
+    """Speed ratio tau and its error Psi, eq. (13), from the velocities `v`, (56,)."""
     omega, rate = pick(par.omega, lane), pick(v[PSI], lane)
     tau = (pick(work.shaft[0], lane) + rate) / omega
     return tau, rate / (omega * tau)

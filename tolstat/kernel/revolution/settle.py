@@ -20,8 +20,8 @@ from tolstat.kernel.mechanics.loads import (
     size_of,
     write_loads,
 )
-from tolstat.kernel.mechanics.scale import stiffness
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
+from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
+from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, OUTPUT_SHAFT
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
@@ -34,7 +34,8 @@ SAMPLE = np.dtype(
     [
         ("components", "f8", (8, 6)),  # of the bushing loads along and about e, t, z; N, N m
         ("loads", "f8", (N_INSTANT,)),  # kind after kind
-        ("change", "f8", (N_MEASURES,)),  # largest change of a load that decides against the revolution before
+        ("change", "f8", (N_MEASURES,)),  # largest change of a load that decides, or of s as a force, in a revolution
+        ("s", "f8"),  # displacement of the output shaft along its axis, m
         ("tau", "f8"),
         ("mode", "u1", (4,)),
         ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
@@ -98,7 +99,7 @@ def record(k, lane, par, work, v, samples):
         The joint.
     work : record of WORK
         The joint's last evaluation; its ``loads`` are written.
-    v : ndarray, shape (55,)
+    v : ndarray, shape (56,)
         Velocities at that evaluation, m/s and rad/s.
     samples : ndarray of SAMPLE, shape (n,)
         Written.
@@ -115,6 +116,10 @@ def record(k, lane, par, work, v, samples):
             change = larger(change, abs(load - sample.loads[i]))  # NaN in the first revolution
             sample.loads[i] = load
         sample.change[measure] = change
+    s = pick(work.pos[OUTPUT_SHAFT, 2], lane)
+    shift = centring_stiffness(lane, par) * abs(s - sample.s)
+    sample.change[OF_FORCES] = larger(sample.change[OF_FORCES], shift)
+    sample.s = s
     for i in OTHERS:
         sample.loads[i] = load_at(i, lane, work)
     for b in range(8):
@@ -135,9 +140,9 @@ def predict_increment(k, q, v, ahead, samples):
     ----------
     k : int
         Number of the grid point, counted from the start.
-    q, v : ndarray, shape (55,)
+    q, v : ndarray, shape (56,)
         Unknowns (m, rad) and velocities (per s).
-    ahead : ndarray, shape (55,)
+    ahead : ndarray, shape (56,)
         Written: predicted increment of q.
     samples : ndarray of SAMPLE, shape (n,)
         The last revolution; written.

@@ -87,12 +87,12 @@ def test_ideal_loads_and_equations_of_motion_fill_the_same_fields(params) -> Non
     state.q0[:] = state.v0[:] = 0.0
     dynamic = written(lambda work: dynamics.forces(0.01, state.q0, state.v0, par, work))
     ideal = written(lambda work: ideal_loads.ideal_loads(0.5, par, state, work))
-    for name in ("load", "contact", "mode", "force", "shaft", "frame_w"):
+    for name in ("load", "contact", "mode", "force", "shaft", "turned", "pos", "vel"):
         assert dynamic[name].all(), name
         assert ideal[name].all(), name
     work = make_work()
     ideal_loads.ideal_loads(0.5, par, state, work)
-    loads.write_loads(0, 0.0, work)
+    loads.write_loads(0, 0.0, par, work)
     assert np.isfinite(work.loads).all()
 
 

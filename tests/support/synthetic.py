@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tolstat.common.load_kinds import LOAD_KINDS
+from tolstat.common.load_kinds import JOINT, LOAD_KINDS
 from tolstat.common.tables import ERROR, RESULT, Status
 from tolstat.solver import stationary
 
@@ -36,7 +36,8 @@ def results(n, seed=8, failed=0, unsettled=0):
     scatter = rng.gamma(3.0, 0.03, (n, 8)) * np.array([1, 1, 0.15, 0.15, 0.15, 0.15, 1, 1])
     scatter[0] = 0.0
     for kind in LOAD_KINDS:
-        own = scatter[:, : len(kind.places)].reshape(n, *kind.shape[:1], *(1 for _ in kind.shape[1:]))
+        places = kind.shape[:1] if kind.places != JOINT else ()
+        own = scatter[:, : len(kind.places)].reshape(n, *places, *(1 for _ in kind.shape[len(places) :]))
         own = own * RISE.get(kind.key, 1.0)
         table[f"{kind.key}_max"] = np.array(BASE.get(kind.key, 100.0)) * (1.0 + own)
         if kind.averaged:

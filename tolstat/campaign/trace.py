@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
-from tolstat.common.load_kinds import BUSHINGS, COMPONENTS, CONTACTS, PINS
+from tolstat.common.load_kinds import BUSHINGS, COMPONENTS, CONTACTS, PINS, SHAFT_COMPONENTS, SHAFTS
 from tolstat.common.shown import shown
 from tolstat.common.tables import Motion, Options, Simulation, Status
 from tolstat.solver.compilation import warm_up
@@ -89,7 +89,8 @@ class CaseResult(NamedTuple):
         """Trace of the last revolution, one row per input angle.
 
         Columns: ``theta`` (deg), ``tau``, ``Psi``, then ``cross1.F_e`` … ``fork4.T_z`` (N and N m, on the lump, in
-        the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N) and
+        the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N),
+        ``input.f_x`` … ``output.m_z`` (force and moment about O on the shafts, N and N m, in axes that do not turn) and
         ``pin1.mode`` …
         """
         import pandas as pd
@@ -110,6 +111,9 @@ class CaseResult(NamedTuple):
         for p, pin in enumerate(PINS):
             for i, of in enumerate(CONTACTS):
                 columns[f"{pin}.contact_{of}"] = histories["contact"][:, p, i]
+        for s, shaft in enumerate(SHAFTS):
+            for k, load in enumerate(SHAFT_COMPONENTS):
+                columns[f"{shaft}.{load}"] = histories["shafts"][:, s, k]
         for p, pin in enumerate(PINS):
             columns[f"{pin}.mode"] = histories["mode"][:, p]
         return pd.DataFrame(columns)

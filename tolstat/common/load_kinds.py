@@ -55,6 +55,8 @@ def _places(*groups: str) -> tuple[str, ...]:
 
 
 BUSHINGS, PINS, SHAFTS = _places("cross", "fork"), _places("pin"), _places("shaft")
+SHAFT_COMPONENTS = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
+"""Components of a shaft's load in histories: force, and moment about the joint's centre."""
 CONTACTS = ("outer", "inner", "resultant")
 """Contact forces of a pin: normal force of its outermost and of its innermost station, and the resultant of all."""
 OUTER, INNER, RESULTANT = range(3)
@@ -160,6 +162,8 @@ class Kind(NamedTuple):
 
 
 OVER = "over the revolutions that count"
+ORDERS = (1, 2, 3, 4)
+"""Multiples of the input speed whose amplitudes are loads."""
 LOAD_KINDS = (
     Kind(
         "F",
@@ -197,6 +201,54 @@ LOAD_KINDS = (
         CONTACTS,
     ),
     Kind("psi", "psi", "|Psi|", "1", "|Psi|, relative error of the speed ratio, eq. (13)", interpolated=False),
+    Kind(
+        "axial",
+        "axial",
+        "axial force",
+        "N",
+        f"force along the shaft, of a sliding output shaft that on its bearing, {OVER}",
+        SHAFTS,
+        measure="F",
+    ),
+    Kind(
+        "lateral",
+        "lateral",
+        "lateral force",
+        "N",
+        f"force across the shaft {OVER}",
+        SHAFTS,
+        measure="F",
+        modulus=True,
+    ),
+    Kind(
+        "moment",
+        "moment",
+        "bending moment",
+        "N*m",
+        f"bending moment of the shaft about the joint's centre {OVER}",
+        SHAFTS,
+        measure="T",
+        modulus=True,
+    ),
+    Kind("drive", "drive", "driving torque", "N*m", f"torque about the input shaft {OVER}", ("input",), measure="T"),
+    *(
+        Kind(
+            f"{symbol}_orders",
+            symbol,
+            f"amplitude of the {noun}",
+            unit,
+            f"amplitude of the {noun} at multiples of the input speed, in axes that do not turn, of any revolution",
+            places,
+            orders=ORDERS,
+            measure=measure,
+        )
+        for symbol, noun, unit, places, measure in (
+            ("lateral", "lateral force", "N", SHAFTS, "F"),
+            ("moment", "bending moment", "N*m", SHAFTS, "T"),
+            ("drive", "driving torque", "N*m", ("input",), "T"),
+            ("psi", "speed error Psi", "1", JOINT, "psi"),
+        )
+    ),
 )
 """Registry of the kinds, in the order of reports."""
 KIND = {kind.key: kind for kind in LOAD_KINDS}

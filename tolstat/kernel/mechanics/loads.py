@@ -8,11 +8,12 @@ import math
 import numpy as np
 
 from tolstat.common.load_kinds import CONTACTS, LOAD_KINDS, SPAN, measure_of
-from tolstat.kernel.mechanics.topology import PSI
+from tolstat.kernel.mechanics.topology import INPUT_SHAFT, PSI
 from tolstat.kernel.simd.jit import njit
-from tolstat.kernel.simd.lane import pick
+from tolstat.kernel.simd.lane import pick, where
 
 FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR = (SPAN[key].start for key in ("F", "T", "contact", "psi"))
+AXIAL, LATERAL, MOMENT, DRIVE = (SPAN[key].start for key in ("axial", "lateral", "moment", "drive"))
 """First element of each kind."""
 _INSTANT = [kind for kind in LOAD_KINDS if not kind.orders]
 _SIZES = [kind.size for kind in _INSTANT]
@@ -56,7 +57,32 @@ def output_speed(lane, par, work, v):
 
 
 @njit
-def write_loads(lane, psi, work):
+def shaft_load(shaft, lane, par, work):
+    """Force (N) and moment about O (N m) that the joint exerts on a shaft, in axes of its ideal frame.
+
+    Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a.
+
+    Parameters
+    ----------
+    shaft : int
+        0 input shaft, 1 output shaft.
+    lane, par, work
+        As in `write_loads`.
+    """
+    body = INPUT_SHAFT + shaft
+    x, y, z = pick(work.force[body, 0], lane), pick(work.force[body, 1], lane), pick(work.force[body, 2], lane)
+    m_x, m_y = pick(work.force[body, 3], lane), pick(work.force[body, 4], lane)
+    m_z = pick(work.force[body, 5], lane)
+    if shaft == 1:
+        s, rate = pick(work.pos[body, 2], lane), pick(work.vel[body, 2], lane)
+        carried = pick(par.k_a, lane) * s + pick(par.c_a, lane) * rate - pick(par.F_a, lane)
+        z = where(pick(par.slides, lane) > 0, carried, z)
+        m_x, m_y = m_x - s * y, m_y + s * x
+    return (x, y, z), (m_x, m_y, m_z)
+
+
+@njit
+def write_loads(lane, psi, par, work):
     """Write all loads at one instant to ``work.loads``, in place of moduli (`MODULUS`) their squares.
 
     Parameters
@@ -65,8 +91,10 @@ def write_loads(lane, psi, work):
         Lane of the joint, or `ALL` for all lanes at once.
     psi : float
         Error of the speed ratio, eq. (13).
+    par : record of PARAM
+        The joint.
     work : record of WORK
-        Holds bushing loads and contact forces.
+        Holds bushing loads, contact forces, and the resultants on the shafts.
     """
     loads = work.loads
     for b in range(8):
@@ -78,6 +106,13 @@ def write_loads(lane, psi, work):
         for i in range(len(CONTACTS)):
             loads[CONTACT_FORCES + len(CONTACTS) * pin + i] = pick(work.contact[pin, i], lane)
     loads[SPEED_ERROR] = abs(psi)
+    for shaft in range(2):
+        f, m = shaft_load(shaft, lane, par, work)
+        loads[AXIAL + shaft] = abs(f[2])
+        loads[LATERAL + shaft] = f[0] * f[0] + f[1] * f[1]
+        loads[MOMENT + shaft] = m[0] * m[0] + m[1] * m[1]
+        if shaft == 0:
+            loads[DRIVE] = abs(m[2])
 
 
 @njit

@@ -29,6 +29,7 @@ FIELDS = {
     "relative": (3, 3, 3),  # components in C to components in I, -, F
     "relative_w": (3, 3),  # angular velocity of C relative to I, -, F
     "shaft": (2,),  # ideal speed and acceleration of the output shaft
+    "turned": (2, 2),  # cosine and sine of the angle theta of the input, and theta_o of the output shaft
     "pos": (N_BODIES, 3),  # X + u
     "vel": (N_BODIES, 3),  # u'
     "rot": (N_BODIES, 3, 3),  # exp(phi x)

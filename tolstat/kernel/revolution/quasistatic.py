@@ -75,7 +75,7 @@ def keep(solved, state):
 
 @njit
 def speed_ratios(par, samples):
-    """Write ``tau`` and its error |Psi|, eq. (13), of the samples.
+    """Write ``tau`` and its error Psi, eq. (13), of the samples.
 
     Before, ``tau`` holds the output shaft's angular deviation. Its derivative with respect to the input angle is taken
     by periodic central differences.
@@ -88,7 +88,8 @@ def speed_ratios(par, samples):
         slope = (ahead - before) * by_sample
         before = here
         samples[s].tau = speed_ratio(2 * math.pi * s / n, par.alpha) + slope
-        samples[s].loads[SPEED_ERROR] = abs(slope / samples[s].tau)
+        samples[s].psi = slope / samples[s].tau
+        samples[s].loads[SPEED_ERROR] = abs(samples[s].psi)
 
 
 def build_quasistatic(hold, relax, record):

@@ -17,6 +17,7 @@ from tolstat.kernel.mechanics.loads import (
     OTHERS,
     load_at,
     output_speed,
+    shaft_load,
     size_of,
     write_loads,
 )
@@ -25,6 +26,7 @@ from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, OUTPUT_SHAFT
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
+from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.revolution.trail import make_notes
 from tolstat.kernel.simd.borrow import fetch
 from tolstat.kernel.simd.jit import njit
@@ -36,7 +38,9 @@ SAMPLE = np.dtype(
         ("loads", "f8", (N_INSTANT,)),  # kind after kind
         ("change", "f8", (N_MEASURES,)),  # largest change of a load that decides, or of s as a force, in a revolution
         ("s", "f8"),  # displacement of the output shaft along its axis, m
+        ("shafts", "f8", (2, 6)),  # force and moment about O on input and output shaft, in axes that do not turn
         ("tau", "f8"),
+        ("psi", "f8"),  # its error, eq. (13)
         ("mode", "u1", (4,)),
         ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
         ("q", "f8", (N_DOF,)),  # m, rad
@@ -106,8 +110,8 @@ def record(k, lane, par, work, v, samples):
     """
     sample = samples[k % samples.size]
     fetch(samples[(k + 2) % samples.size])
-    sample.tau, psi = output_speed(lane, par, work, v)
-    write_loads(lane, psi, work)
+    sample.tau, sample.psi = output_speed(lane, par, work, v)
+    write_loads(lane, sample.psi, par, work)
     for measure in range(N_MEASURES):
         change = 0.0
         for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
@@ -125,9 +129,21 @@ def record(k, lane, par, work, v, samples):
     for b in range(8):
         for i in range(6):
             sample.components[b, i] = pick(work.load[b, i], lane)
+    for shaft in range(2):
+        write_shaft(shaft, lane, par, work, sample.shafts[shaft])
     for pin in range(4):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin] = pressed(pin, lane, par, work)
+
+
+@njit
+def write_shaft(shaft, lane, par, work, out):
+    """Write force and moment on a shaft to `out`, (6,), in G for the input shaft, in Ry(alpha) for the output shaft."""
+    cosine, sine = pick(work.turned[shaft, 0], lane), pick(work.turned[shaft, 1], lane)
+    first = 0
+    for x, y, z in shaft_load(shaft, lane, par, work):
+        out[first], out[first + 1], out[first + 2] = cosine * x - sine * y, sine * x + cosine * y, z
+        first += 3
 
 
 @njit
@@ -260,3 +276,4 @@ def summarise(par, samples, out):
                 count += samples[s].mode[pin] == mode
             out.mode_share[pin, mode] = count / n
     write_equivalent_loads(par.alpha, samples, out)
+    write_orders(samples, out)

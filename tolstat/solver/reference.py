@@ -41,7 +41,7 @@ MAX_REVS = 6
 """Number of revolutions after which a joint whose largest loads still change is not periodic."""
 
 Largest = FloatArray
-"""Largest values of all loads of a joint, (values,), SI, in the order of `tables.SPAN`."""
+"""Largest values of all loads of a joint, (values,), SI, in the order of `load_kinds.SPAN`."""
 
 
 class FirstOrder(NamedTuple):

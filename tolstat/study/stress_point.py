@@ -110,7 +110,7 @@ class StressPoint(NamedTuple):
     name : str
         Name in the study; with the bushing where the study names several.
     bushing : str
-        One of `tables.BUSHINGS`.
+        One of `load_kinds.BUSHINGS`.
     per_load : tuple of float
         Stress per load component along e, t, z: three forces, 1/m^2, and three torques, 1/m^3.
     line : Line

@@ -29,7 +29,7 @@ from tolstat.kernel.mechanics.loads import (
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
 from tolstat.kernel.revolution.closeup import extend
-from tolstat.kernel.revolution.settle import closure_error, summarise
+from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, summarise
 from tolstat.kernel.revolution.trail import (
     Trail,
     closure_trend,
@@ -62,7 +62,7 @@ SETTLING = 16
 """Minimum number of revolutions with steps half as long before a joint is given up."""
 LONGEST_PERIOD = 8
 """Longest period that is recognised, revolutions."""
-MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.1, 10.0, 4.0
+MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.2, 10.0, 4.0
 """Minimum fall of log10(closure) over the revolutions kept that counts as settling. It must also exceed its scatter by
 the second factor (closure errors of chaotic joints wander, and fell by four to five times their scatter in some), or by
 the third if the Lyapunov exponent is not positive."""
@@ -387,7 +387,7 @@ def after_revolution(point, par, options, samples, past, out):
         return NOT_FINITE, False
     turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
-        closure = closure_error(0, samples.size, samples)
+        closure = closure_error(0, samples.size, ALL_LOADS, samples)
         note_closure(turns.revolution, closure, trail.notes)
         out.closure = still_to_come(turns.revolution, par, trail.notes) * closure
         if repeats(last, options, trail, turns, out):

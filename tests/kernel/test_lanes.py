@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.conftest import REFERENCE
+from tests.conftest import REFERENCE, sliding
 from tolstat import joint as joints
 from tolstat import sampling, study
 from tolstat.benchmarks.cost import iteration
@@ -94,7 +94,10 @@ def test_records_are_read_and_written_lane_by_lane():
 
 @pytest.fixture(scope="module")
 def mixed(cirelli):
-    """Joints of all laws, tight and wide, some that halve their steps, some that fail, some outside the model."""
+    """Joints of all laws, tight and wide, some that halve their steps, some that fail, some outside the model.
+
+    The output shafts of a third of them slide, with and without support.
+    """
     rng = np.random.default_rng(11)
     rows = []
     for law in FROM_COEFFICIENTS:
@@ -113,6 +116,8 @@ def mixed(cirelli):
     params = np.concatenate(rows)
     params["clearance"][6] = -1e-5
     params["clearance"][9], params["c_t"][16] = 0.0, 0.0
+    free, held = sliding(params[::4].copy(), 0.0, 2e4, 0.0), sliding(params[1::4].copy())
+    params = np.concatenate([params, free, held])
     return params[rng.permutation(len(params))]
 
 

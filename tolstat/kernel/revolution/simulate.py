@@ -39,7 +39,7 @@ from tolstat.kernel.revolution.settle import (
     step_error,
     summarise,
 )
-from tolstat.kernel.revolution.trail import closure_trend, note_closure, still_to_come
+from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_slow_decay
 from tolstat.kernel.simd.jit import njit
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
@@ -214,14 +214,15 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
     out.revolutions = k / n
     if k == n + 2 * twelfth:
-        out.closure = still_to_come(out.revolutions, par, notes) * closure_error(twelfth + 1, 2 * twelfth + 1, samples)
+        closure = closure_error(twelfth + 1, 2 * twelfth + 1, samples)
+        out.closure = with_slow_decay(closure, out.revolutions, par, notes)
         smooth = out.closure <= EARLY_CLOSURE * options.settle_tol and step_error(par, samples) <= EARLY_STEP_ERROR
         if smooth:
             return OK
     if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
         closure = closure_error(0, n, samples)
         note_closure(out.revolutions, closure, notes)
-        out.closure = still_to_come(out.revolutions, par, notes) * closure
+        out.closure = with_slow_decay(closure, out.revolutions, par, notes)
         if out.closure <= options.settle_tol:
             return OK
     return NEWTON_FAILED if iterations > MAX_ITERATIONS * n * options.max_revs else NOT_SETTLED

@@ -36,12 +36,17 @@ DEFAULT_KIND = blocks.default_kind
 
 def with_law(par: np.recarray, law: str) -> np.recarray:
     """Give joints of PARAM the contact stations that `law` names; returns them."""
-    stations = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
     still = joints.Operation.model_construct(alpha=0, speed=1, torque=0)
-    own = joints.perturb(stations, still, joints.nominal_errors(1))
-    for name in ("n_stations", "station_s", "station_k1", "station_k2", "station_weight"):
+    own = joints.perturb(joint_with_law(law), still, joints.nominal_errors(1))
+    for name in (*(name for name in PARAM.names if name.startswith("station_")), "n_stations", "needle_b"):
         par[name] = own[name][0]
     return par
+
+
+def joint_with_law(law: str) -> joints.Joint:
+    """Load the joint of Cirelli et al. with another contact law, and needle bearings for it."""
+    bearing = {"needles": 32, "needle_length": "22 mm"}
+    return joints.load("cirelli2021", {"contact": {"law": law}, "bearing": bearing}, "test", None)
 
 
 @pytest.fixture(scope="session")

@@ -328,7 +328,7 @@ def _lowered(joint: Joint, written: object) -> Iterator[Fault]:
     used = joint.contact.fit_load
     if written is None or used is None or math.isclose(used, units.to_si(written, "N"), rel_tol=1e-9):
         return
-    text = _written(used, "N", written)
+    text = str(units.written(used, "N", written))
     found = f"up to {written} eq. (3) gives no stiffening contact, so that k1u and k2u are fitted up to {text}"
     yield Fault("contact.fit_load", found, f'write fit_load = "{text}", or give k1u and k2u')
 

@@ -76,9 +76,8 @@ def fit_needles(load: float, clearance: float, needles: int, length: float) -> F
     """Fit of the kernels' formula to `needle_force` from ``load / 100`` to `load`.
 
     Least squares of the relative error of force at displacements whose logarithms are equally spaced. From clearances
-    of a tenth of the largest displacement on, force is within 1.2 % and slope within 2.5 % at this clearance. Below, the
-    fit is made at that tenth, where the exponent 9/8 does not stand for 10/9 alone: without clearance they are within
-    5 and 4 %.
+    of a tenth of the largest displacement on, force is within 1.2 % and slope within 2.5 % at this clearance. Smaller
+    ones have the fit of that tenth, by which they are within 5 and 4 % without clearance.
 
     Parameters
     ----------

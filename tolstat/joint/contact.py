@@ -192,7 +192,7 @@ LAWS = {
     ),
     "needles": Law(
         _needles,
-        (("n Gauss–Legendre points on `bearing.needle_length`, weights w_j that sum to 2", "w_j k3/2, b", "w_j"),),
+        (("n Gauss–Legendre points on `bearing.needle_length`, weights w_j that sum to 2", "w_j k3/2; b", "w_j"),),
         needs=("n_stations", "fit_load"),
         of_bearing=("needles", "needle_length"),
         from_coefficients=False,

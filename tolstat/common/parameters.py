@@ -39,7 +39,7 @@ PARAM_FIELDS = (
     Field("station_k2", "N/m", "linear coefficient of each station's force", shape=(MAX_STATIONS,)),
     Field("station_k3", "N/m^(9/8)", "coefficient of each station's needles", shape=(MAX_STATIONS,)),
     Field("station_weight", "1", "weight of each station's damping and film", shape=(MAX_STATIONS,)),
-    Field("needle_b", "1", "share b of the clearance in the force of needles"),
+    Field("needle_b", "1", "share b of the clearance in the force of needles; 0: no needles"),
     Field("clearance", "m", "radial clearance c of each pin", shape=(4,)),
     Field("pin_point", "m", "P less the pin's reference point, in axes of C", shape=(4, 3)),
     Field("pin_axis", "1", "direction of the pin axis, in axes of C", shape=(4, 3)),

@@ -11,7 +11,7 @@ import math
 from tolstat.kernel.mechanics.bushing import accumulate, markers
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.scale import typical_force
-from tolstat.kernel.mechanics.spring import elastic, penetration
+from tolstat.kernel.mechanics.spring import elastic, has_needles, penetration
 from tolstat.kernel.mechanics.topology import (
     ARM,
     ARM_OF_PIN,
@@ -90,7 +90,7 @@ def multiply(h, depth, par, work):
     for pin in range(4):
         body = PIN + pin
         for j in range(par.n_stations):
-            _, slope = elastic(j, depth, par.clearance[pin], par)
+            _, slope = elastic(j, depth, par.clearance[pin], has_needles(par), par)
             across = press_on(h, slope, max(par.c_d, par.c_t) * par.station_weight[j])
             at = scale(par.station_s[j], row(TRIAD[body], 0))
             connect(body, ARM + ARM_OF_PIN[pin], at, at, (0.0, across, across), (0.0, 0.0, 0.0), work)
@@ -184,4 +184,4 @@ def largest_force(steps, par, work):
         if not eigenvalue(h, DEEPER * depth, par, work) <= STABLE:
             break
         depth *= DEEPER
-    return elastic(0, depth, widest(par), par)[0]
+    return elastic(0, depth, widest(par), has_needles(par), par)[0]

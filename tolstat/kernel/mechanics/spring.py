@@ -16,7 +16,13 @@ ACCURATE = 1e-12
 
 
 @njit
-def elastic(j, delta, clearance, par):
+def has_needles(par):
+    """Whether pins of any lane turn on needles."""
+    return any_of(par.needle_b > 0)
+
+
+@njit
+def elastic(j, delta, clearance, needles, par):
     """Force (N) of station `j` at a penetration above zero, and its slope (N/m); no numbers at others.
 
     Parameters
@@ -27,24 +33,34 @@ def elastic(j, delta, clearance, par):
         Penetration, m.
     clearance : float or lanes
         Radial clearance of the pin, m.
+    needles : bool
+        `has_needles`: asked once for many stations, it costs nothing where there are none.
     par : record of PARAM
         The joint.
     """
     force = (par.station_k1[j] * delta + par.station_k2[j]) * delta
     slope = 2 * par.station_k1[j] * delta + par.station_k2[j]
-    has_needles = par.station_k3[j] > 0
-    if any_of(has_needles):
+    if needles:
         lost = par.needle_b * clearance
         share = 1 / (delta + lost)
         secant = par.station_k3[j] * math.sqrt(math.sqrt(math.sqrt(delta))) * math.sqrt(delta * share)
-        force += where(has_needles, secant * delta, 0.0)
-        slope += where(has_needles, secant * (1.125 + 0.5 * lost * share), 0.0)
+        own = par.station_k3[j] > 0
+        force += where(own, secant * delta, 0.0)
+        slope += where(own, secant * (1.125 + 0.5 * lost * share), 0.0)
     return force, slope
 
 
 @njit
 def penetration(force, j, clearance, par):
-    """Penetration (m) at which station `j` carries `force` (N); 0 for a station without stiffness."""
+    """Penetration (m) at which station `j` carries a force; 0 for a station without stiffness.
+
+    Parameters
+    ----------
+    force : float
+        Force, N.
+    j, clearance, par
+        As in `elastic`.
+    """
     k1, k2 = par.station_k1[j], par.station_k2[j]
     slope = k2 + math.sqrt(k2 * k2 + 4 * k1 * force)
     found = 2 * force / slope if slope > 0 else 0.0
@@ -53,7 +69,7 @@ def penetration(force, j, clearance, par):
     if found == 0:
         found = (force / par.station_k3[j]) ** (8 / 9)
     for _ in range(TRIES):  # Newton's iteration in the logarithms, in which the force is nearly straight
-        own, rise = elastic(j, found, clearance, par)
+        own, rise = elastic(j, found, clearance, True, par)
         found *= (force / own) ** (own / (rise * found))
         if abs(own - force) <= ACCURATE * force:
             break

@@ -92,6 +92,7 @@ def inside_model(par):
     bears = False
     for j in range(par.n_stations):
         good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0 and par.station_k3[j] >= 0
+        good = good and (par.needle_b > 0 or par.station_k3[j] == 0)
         bears = bears or par.station_k2[j] > 0 or par.station_k3[j] > 0
     good = good and bears
     for pin in range(4):

@@ -153,11 +153,13 @@ def test_needles_are_enough_of_a_bearing_and_other_laws_need_none():
 
 
 def test_keys_of_a_bearing_that_affect_results():
-    given = {law: joint_with_law(law).given("json") for law in ("needles", "mode")}
-    assert affecting_results(given["needles"])["bearing"] == {"needles": 32, "needle_length": "0.022 m"}
-    assert not affecting_results(given["mode"])["bearing"]
-    given["needles"]["bearing"]["C"] = "22 kN"
-    assert "C" not in affecting_results(given["needles"])["bearing"]
+    bearing = {"needles": 32, "needle_length": "22 mm", "C": "22 kN"}
+    for law, decide in (("needles", {"bearing.needles", "bearing.needle_length"}), ("mode", set())):
+        given = joints.load("cirelli2021", {"contact": {"law": law}, "bearing": bearing}, "x").given("json")
+        kept = affecting_results(given)
+        assert {key for key in kept if key.startswith("bearing")} == decide
+        assert "description" not in kept
+        assert kept["contact.law"] == law
 
 
 def test_laws_can_be_changed_to_needles_and_back():

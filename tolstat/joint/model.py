@@ -37,13 +37,9 @@ def affects_results(key: str, law: str | None = None) -> bool:
 
 
 def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Sections of a joint, as `Joint.given` returns them, without the keys that affect no result of its simulation."""
-    law = given["contact"]["law"]
-    return {
-        section: {key: value for key, value in keys.items() if affects_results(f"{section}.{key}", law)}
-        for section, keys in given.items()
-        if isinstance(keys, Mapping)  # all but the description
-    }
+    """Values of a joint by dotted key, of sections as `Joint.given` returns them, that affect results."""
+    values = leaves(given)
+    return {key: value for key, value in values.items() if affects_results(key, values.get("contact.law"))}
 
 
 class Joint(Strict):

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from tests.conftest import REFERENCE, sliding
+from tests.conftest import REFERENCE, joint_with_law, sliding
 from tolstat import joint as joints
 from tolstat import sampling, study
 from tolstat.benchmarks.cost import iteration
 from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status, iterations_allowed
-from tolstat.joint.contact import FROM_COEFFICIENTS
+from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
 from tolstat.kernel.simd.jit import njit_inner
@@ -100,8 +100,8 @@ def mixed(cirelli):
     """
     rng = np.random.default_rng(11)
     rows = []
-    for law in FROM_COEFFICIENTS:
-        joint = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
+    for law in PREDEFINED:
+        joint = joint_with_law(law)
         n = 7
         operation = joints.Operation.model_construct(alpha=0.3, speed=52.0, torque=100.0)
         errors = joints.nominal_errors(n)

@@ -88,11 +88,13 @@ def inside_model(par):
     """Whether a joint lies within the scope of the model; written so that NaN does not."""
     good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
     good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0
-    linear = 0.0
+    good = good and par.needle_b >= 0
+    bears = False
     for j in range(par.n_stations):
-        good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0
-        linear += par.station_k2[j]
-    good = good and linear > 0
+        good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0 and par.station_k3[j] >= 0
+        good = good and (par.needle_b > 0 or par.station_k3[j] == 0)
+        bears = bears or par.station_k2[j] > 0 or par.station_k3[j] > 0
+    good = good and bears
     for pin in range(4):
         good = good and par.clearance[pin] >= 0
     return good

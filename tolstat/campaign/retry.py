@@ -13,6 +13,7 @@ from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import HistorySpec, Options, Status
+from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
 from tolstat.store import ResultStore
 
@@ -82,6 +83,8 @@ def parse(statuses: str, settings: Sequence[str], study: Study) -> Retry:
     with gather(faults):
         new = {key.removeprefix("solver."): value for key, value in changed.items()}
         solver = strict.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
+    if study.has_axial_force and solver.fidelity == "ideal":
+        faults.append(Fault("--set: solver.fidelity", *NO_CLOSED_FORM))
     if faults:
         raise InputError(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))

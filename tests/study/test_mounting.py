@@ -58,7 +58,7 @@ def test_an_axial_force_is_part_of_the_operating_point(tmp_path: Path) -> None:
     assert s.identity()["operation.axial_force"] == -200.0
     assert s.points[0].in_words == "15 deg, 500 rpm, 100 N m, axial force -200 N"
     assert load(tmp_path, NO_FORCE).points[0].in_words == "15 deg, 500 rpm, 100 N m"
-    assert s.scene == "output shaft free along its axis; contact law mode"
+    assert s.joint_in_words == "output shaft free along its axis; contact law mode"
     assert s.has_axial_force
     assert not load(tmp_path, NO_FORCE).has_axial_force
 
@@ -120,7 +120,10 @@ def test_stiffness_and_force_are_swept(tmp_path: Path) -> None:
     ]
     assert [float(p["k_a"][0]) for p in at] == [0.0, 1e6, 1e6, 5.05e7, 5.05e7, 1e8, 1e8]
     assert [float(p["F_a"][0]) for p in at] == [0.0, 0.0, 100.0, 0.0, 100.0, 0.0, 100.0]
-    assert "shafts rigid along their axes in 1 of 4 variants, output shaft held with 1e+06 to 1e+08 N/m" in s.scene
+    assert (
+        "shafts rigid along their axes in 1 of 4 variants, output shaft held with 1e+06 to 1e+08 N/m"
+        in s.joint_in_words
+    )
     found = faults(tmp_path, ('from = "1e6 N/m"', 'from = "free"'), text=HEAD + SWEEP)
     assert "sweep.shaft.axial.from: 'free' is not a number with a unit" in found
     only = SWEEP.replace('shaft.axial = { from = "1e6 N/m", to = "1e8 N/m", points = 3 }\n', "")

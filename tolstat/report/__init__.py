@@ -20,8 +20,9 @@ from tolstat.common.tables import VALID
 from tolstat.display import table, text
 from tolstat.display.asked import silent
 from tolstat.display.table import WIDTH
+from tolstat.joint.mounting import in_words
 from tolstat.solver import fidelity
-from tolstat.store import Reader, viewed
+from tolstat.store import Reader, recorded, viewed
 from tolstat.store.view import View
 
 
@@ -31,7 +32,7 @@ class Report(NamedTuple):
     Attributes
     ----------
     table : str
-        The numbers that the study asks for, as aligned text.
+        Mounting of the shafts and contact law; the numbers that the study asks for, as aligned text.
     notes : str
         How many joints were evaluated, and what the intervals cover.
     files : list of Path
@@ -111,8 +112,10 @@ def build(
             folder = view.path.parent if folder is None else folder
             stem = folder / view.path.stem
             stands_on = fidelity.sentence(store.options, store.fidelity)
+            mounted = text.sentence(in_words(*recorded.mountings(store)))
+            mounted = mounted if width is None else textwrap.fill(mounted, width)
             if store.case_names:
-                return _noted(_cases(store, stem, width), stands_on)
+                return _headed(_noted(_cases(store, stem, width), stands_on), mounted)
             stem = stem.with_name(f"{stem.name}_{point}") if point else stem
             report = (
                 _sweep(view, stem, width)
@@ -122,10 +125,14 @@ def build(
             stopped = _stopped(store.stop) if store.stop.get("reached") else ""
             for note in (query.not_kept(view), stopped, stands_on):
                 report = _noted(report, note)
-            return report
+            return _headed(report, mounted)
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
         raise InputError([Fault(str(folder), found, "give another folder with --out")]) from error
+
+
+def _headed(report: Report, mounted: str) -> Report:
+    return report._replace(table=f"{mounted}\n\n{report.table}")
 
 
 def _noted(report: Report, note: str) -> Report:

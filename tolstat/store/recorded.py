@@ -15,6 +15,7 @@ from tolstat.joint import Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
+from tolstat.study import mounting
 from tolstat.study.design import nested
 from tolstat.study.model import Solver
 from tolstat.study.swept import KEYS
@@ -97,7 +98,7 @@ def swept(store: Reader) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def scene(store: Reader) -> tuple[list[float | str], list[str]]:
+def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
     """``shaft.axial`` and ``contact.law`` of each variant whose joints are in the file, see `mounting.in_words`.
 
     Raises
@@ -110,6 +111,13 @@ def scene(store: Reader) -> tuple[list[float | str], list[str]]:
     own = [store.variants[number].values for number in numbers] or [{}]
     axial = [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in own]
     return axial, [values.get("contact.law", nominal.contact.law) for values in own]
+
+
+def note_on_mounting(store: Reader) -> str:
+    """Note where rigid shafts meet errors along them, see `mounting.note`; empty for other files."""
+    names = {".".join(key.split(".")[1:3]) for key in store.identity if key.startswith("tolerances.")}
+    joint, name = joint_of(store, 0), store.study_name
+    return mounting.note(names, mountings(store)[0], mounting.command(f"{name}.toml", name, joint))
 
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from shlex import quote
 from typing import NamedTuple
 
 from tolstat.joint import Joint, Operation
@@ -59,6 +60,22 @@ def refusals(settings: Sequence[Setting], varied: Collection[str]) -> Iterator[t
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
     if any(own.fidelity == "ideal" and own.moved(varied) for own in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
+
+
+def command(study: str, stem: str, joint: Joint) -> str:
+    """Command that runs a study with an output shaft that is free along its axis.
+
+    Parameters
+    ----------
+    study, stem : str
+        Study file, and its name without ending.
+    joint : Joint
+        The study's joint; what a free shaft needs and it lacks is in the command, too.
+    """
+    needed = {"mass": "5 kg", "axial_damping": "2e4 N*s/m"}
+    lacking = [f'"joint.shaft.{key}={value}"' for key, value in needed.items() if getattr(joint.shaft, key) is None]
+    settings = " ".join(f"--set {setting}" for setting in ("joint.shaft.axial=free", *lacking))
+    return f"tolstat run {quote(study)} {settings} --out {quote(f'{stem}_free.h5')}"
 
 
 def note(toleranced: Iterable[str], axial: Iterable[float | str], command: str) -> str:

@@ -110,7 +110,7 @@ class Study(Case):
         return any(own.moved(self._force_varies) for own in self._settings)
 
     @property
-    def scene(self) -> str:
+    def joint_in_words(self) -> str:
         """Mounting of the shafts and contact law, in words."""
         joints = self.joints
         return in_words([own.shaft.axial for own in joints], [own.contact.law for own in joints])

@@ -44,6 +44,13 @@ def with_law(par: np.recarray, law: str) -> np.recarray:
     return par
 
 
+def sliding(par: np.recarray, k_a: float = 2e7, c_a: float = 2e3, F_a: float = 200.0) -> np.recarray:
+    """Let the output shafts of joints of PARAM slide, with a mass of 5 kg; returns them."""
+    for name, value in {"slides": 1.0, "m_s": 5.0, "k_a": k_a, "c_a": c_a, "F_a": F_a}.items():
+        par[name] = value
+    return par
+
+
 @pytest.fixture(scope="session")
 def cirelli() -> joints.Joint:
     return joints.load("cirelli2021", {}, "test", None)

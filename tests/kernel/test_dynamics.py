@@ -5,28 +5,34 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.conftest import with_law
+from tests.conftest import sliding, with_law
 from tests.support import naive
 from tolstat.benchmarks.cost.dense import dense
 from tolstat.common.tables import RESULTANT, Mode, Options
 from tolstat.joint.contact import FROM_COEFFICIENTS
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.motion import ideal_motion
-from tolstat.kernel.mechanics.topology import N_DOF, PSI
+from tolstat.kernel.mechanics.topology import N_DOF, PSI, S
 from tolstat.kernel.mechanics.work import make_work
 
 OPTIONS = Options()
 
 
-def loaded(params, random_errors, law, seed=1, alpha=0.4):
+SHAFTS = pytest.mark.parametrize("shaft", ["rigid", "sliding"])
+
+
+def loaded(params, random_errors, law, seed=1, alpha=0.4, shaft="rigid"):
     """A joint with errors in the midst of contact: pins pressed some 10 um into their holes, all moving."""
     par = params(alpha=alpha, speed=80.0, **random_errors(seed))[0]
     with_law(par, law)
+    if shaft == "sliding":
+        sliding(par)
     par.clearance[:] = 1e-5
     rng = np.random.default_rng(seed)
     q = rng.normal(0, 2e-5, N_DOF)
     q[:PSI].reshape(9, 6)[:, 3:] = rng.normal(0, 5e-3, (9, 3))
     v = rng.normal(0, 1e-2, N_DOF)
+    v[S] = 0.1
     return par, 0.017, q, v
 
 
@@ -57,9 +63,10 @@ def test_frames_are_those_of_the_output_shaft(theta, alpha):
         np.testing.assert_allclose(work.relative_w[k], against, atol=1e-13 * (1 + np.tan(alpha) ** 2))
 
 
+@SHAFTS
 @pytest.mark.parametrize("law", FROM_COEFFICIENTS)
-def test_loads_are_those_of_the_naive_twin(params, random_errors, law):
-    par, t, q, v = loaded(params, random_errors, law)
+def test_loads_are_those_of_the_naive_twin(params, random_errors, law, shaft):
+    par, t, q, v = loaded(params, random_errors, law, shaft=shaft)
     work = make_work()
     dynamics.forces(t, q, v, par, work)
     assert (work.contact[:, RESULTANT] > 100).all(), "the test wants every pin in contact"
@@ -81,11 +88,12 @@ def test_contact_modes_are_those_of_the_naive_twin(params, random_errors, law):
     assert seen == set(Mode.__members__), "the test wants to see every mode"
 
 
+@SHAFTS
 @pytest.mark.parametrize("law", FROM_COEFFICIENTS)
 @pytest.mark.parametrize("seed", [1, 2])
-def test_accelerations_balance_the_naive_twin(params, random_errors, law, seed):
+def test_accelerations_balance_the_naive_twin(params, random_errors, law, seed, shaft):
     """Momentum and angular momentum of every body change by the forces on it, in world coordinates."""
-    par, t, q, v = loaded(params, random_errors, law, seed)
+    par, t, q, v = loaded(params, random_errors, law, seed, shaft=shaft)
     work, a = make_work(), np.full(N_DOF, np.nan)
     dynamics.acceleration(t, q, v, par, OPTIONS, work, a)
     force = work.force.copy()
@@ -93,20 +101,24 @@ def test_accelerations_balance_the_naive_twin(params, random_errors, law, seed):
     for name, difference in off.items():
         scale = np.abs(force).max() if name != "out" else np.abs(force[10, 5])
         assert np.abs(difference).max() < 2e-4 * scale, name
+    assert ("axial" in off) == (shaft == "sliding")
+    assert (a[S] == 0) == (shaft == "rigid")
 
 
-def test_residual_of_the_acceleration_is_zero(params, random_errors):
-    par, t, q, v = loaded(params, random_errors, "mode")
+@SHAFTS
+def test_residual_of_the_acceleration_is_zero(params, random_errors, shaft):
+    par, t, q, v = loaded(params, random_errors, "mode", shaft=shaft)
     work, a, out = make_work(), np.full(N_DOF, np.nan), np.full(N_DOF, np.nan)
     dynamics.acceleration(t, q, v, par, OPTIONS, work, a)
     dynamics.residual(t, q, v, a, par, OPTIONS, work, out)
     assert np.abs(out).max() < 1e-11 * np.abs(work.force).max()
 
 
+@SHAFTS
 @pytest.mark.parametrize("law", FROM_COEFFICIENTS)
-def test_tangent_is_the_derivative_of_the_residual(params, random_errors, law):
+def test_tangent_is_the_derivative_of_the_residual(params, random_errors, law, shaft):
     """Up to what the tangent leaves out on purpose, which must cost Newton less than a tenth a step."""
-    par, t, q, v = loaded(params, random_errors, law)
+    par, t, q, v = loaded(params, random_errors, law, shaft=shaft)
     work, cv = make_work(), 2000.0
     ca = cv * cv
     a = np.zeros(N_DOF)
@@ -120,18 +132,22 @@ def test_tangent_is_the_derivative_of_the_residual(params, random_errors, law):
             dynamics.residual(t, q + d, v + cv * d, a + ca * d, par, OPTIONS, work, out[k])
         derivative[:, j] = (out[0] - out[1]) / 2e-9
     dynamics.residual(t, q, v, a, par, OPTIONS, work, out[0])
-    tangent.assemble(cv, ca, par, work)
+    tangent.assemble(cv, ca, cv, par, work)
+    if shaft == "rigid":  # its s stays as it is: residual zero, tangent one
+        assert not derivative[S].any()
+        assert not derivative[:, S].any()
+        derivative[S, S] = 1.0
     contraction = np.eye(N_DOF) - np.linalg.solve(dense(work), derivative)
     assert np.abs(np.linalg.eigvals(contraction)).max() < 0.1
 
 
+@SHAFTS
 @pytest.mark.parametrize("law", ["mode", "sliced"])
-@pytest.mark.slow
-def test_block_elimination_is_lapack(params, random_errors, law):
-    par, t, q, v = loaded(params, random_errors, law)
+def test_block_elimination_is_lapack(params, random_errors, law, shaft):
+    par, t, q, v = loaded(params, random_errors, law, shaft=shaft)
     work = make_work()
     dynamics.forces(t, q, v, par, work)
-    tangent.assemble(2000.0, 4e6, par, work)
+    tangent.assemble(2000.0, 4e6, 2000.0, par, work)
     full = dense(work)
     rhs = np.random.default_rng(0).normal(size=N_DOF)
     expected = np.linalg.solve(full, rhs)
@@ -144,7 +160,7 @@ def test_block_elimination_is_lapack(params, random_errors, law):
 def test_a_singular_block_is_reported(params):
     work = make_work()
     dynamics.forces(0.0, np.zeros(N_DOF), np.zeros(N_DOF), params()[0], work)
-    tangent.assemble(2000.0, 4e6, params()[0], work)
+    tangent.assemble(2000.0, 4e6, 2000.0, params()[0], work)
     work.block[5, 0, 0] = 0.0
     assert not linsolve.factorise(work)
     work.block[5, 0, 0] = np.nan

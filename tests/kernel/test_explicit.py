@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.conftest import sliding
 from tolstat.common.tables import Options
 from tolstat.kernel.integrators.stability import depth_at, eigenvalue, fewest_steps, largest_force
 from tolstat.kernel.integrators.state import make_state_record
@@ -23,6 +24,7 @@ from tolstat.kernel.mechanics.topology import (
     PIN,
     PSI,
     TRIAD,
+    S,
 )
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution.peaks import PEAKS, follow_value, forget
@@ -56,7 +58,7 @@ def test_steps_are_stable_up_to_the_limit(share: float) -> None:
 
 
 def dense(h: float, depth: float, par: np.record) -> np.ndarray:
-    """M^-1/2 (h^2/4 K + h C) M^-1/2, (55, 55), spring by spring."""
+    """M^-1/2 (h^2/4 K + h C) M^-1/2, (56, 56), spring by spring."""
     found, mass = np.zeros((N_DOF, N_DOF)), np.zeros(N_DOF)
 
     def add(one: int, other: int, on_one: np.ndarray, on_other: np.ndarray, k: float, c: float) -> None:
@@ -65,7 +67,7 @@ def dense(h: float, depth: float, par: np.record) -> np.ndarray:
         if other < N_LUMPS:
             row[6 * other : 6 * other + 6] -= on_other
         elif other == OUTPUT_SHAFT:
-            row[PSI] = -on_other[5]
+            row[PSI], row[S] = -on_other[5], -par.slides * on_other[2]
         found[:] += (h * h / 4 * k + h * c) * np.outer(row, row)
 
     for lump, base in zip(BUSHING_LUMP, BUSHING_BASE, strict=True):
@@ -87,12 +89,17 @@ def dense(h: float, depth: float, par: np.record) -> np.ndarray:
         name = "hub" if body == HUB else "pin" if body < ARM else "arm"
         mass[6 * body : 6 * body + 3] = par[f"{name}_mass"]
         mass[6 * body + 3 : 6 * body + 6] = np.abs(TRIAD[body].T @ par[f"{name}_inertia"])
-    mass[PSI] = par.Js
+    mass[PSI], mass[S] = par.Js, par.m_s if par.slides else 1.0
+    found[S, S] += h * h / 4 * par.k_a + h * par.c_a
     return found / np.sqrt(np.outer(mass, mass))
 
 
-def test_the_largest_eigenvalue_is_that_of_the_matrices(params, random_errors) -> None:
+@pytest.mark.parametrize("mass", [None, 5.0, 0.05])
+def test_the_largest_eigenvalue_is_that_of_the_matrices(params, random_errors, mass) -> None:
+    """With rigid shafts, and with an output shaft that slides: its mass matters where it is light."""
     par = params(**random_errors(4))[0]
+    if mass:
+        sliding(par).m_s = mass
     work = make_work()
     for h in (2e-6, 5e-6, 1e-4):
         for depth in (0.0, 2e-5, 2e-4):

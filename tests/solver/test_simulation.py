@@ -359,7 +359,7 @@ def python(code, **environment):
 
 
 ACCELERATION = """
-q, out = np.linspace(-1e-4, 2e-4, 55), np.empty(55)
+q, out = np.linspace(-1e-4, 2e-4, 56), np.empty(56)
 dynamics.acceleration(0.01, q, q, par[0], Options(), simulate.make_work(), out)
 print(out.tolist())
 """

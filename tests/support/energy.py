@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from tolstat.common.tables import PARAM, Options, Status
 
-STORED = ("kinetic", "bushings", "contacts")
+STORED = ("kinetic", "bushings", "contacts", "support")
 GAINS = {
     "input": 1.0,
+    "axial": 1.0,
     "load": -1.0,
     "bushing_damping": -1.0,
     "contact_damping": -1.0,
     "film": -1.0,
+    "support_damping": -1.0,
     "bushing_moments": 1.0,
 }
 """Powers of the balance and the sign with which they change what is stored."""
@@ -29,7 +31,7 @@ class Trajectory(NamedTuple):
     ----------
     t : ndarray, shape (n,)
         Time, s.
-    points : ndarray, shape (n, 3, 55)
+    points : ndarray, shape (n, 3, 56)
         Deviations q from the ideal motion (m, rad), their rates and accelerations.
     status : Status
         ``OK``, ``NEWTON_FAILED`` or ``OUTSIDE_MODEL``.

@@ -2,7 +2,8 @@
 
 With them
 
-    d/dt (kinetic + bushings + contacts) = input - load - bushing_damping - contact_damping - film + bushing_moments
+    d/dt (kinetic + bushings + contacts + support)
+        = input + axial - load - bushing_damping - contact_damping - film - support_damping + bushing_moments
 
 holds exactly along a solution. The last is the power of what is not the gradient of a potential: a bushing's moment
 K phi works on the angular velocity, its potential phi . K phi / 2 changes with the rate of the rotation vector.
@@ -15,7 +16,7 @@ from tolstat.common.fields import Field, dtype_of
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.dynamics import RAMP, forces, mass_of, resisting_torque
-from tolstat.kernel.mechanics.topology import BUSHING_BASE, BUSHING_LUMP, FRAME, HUB, INPUT_SHAFT, N_LUMPS, PSI
+from tolstat.kernel.mechanics.topology import BUSHING_BASE, BUSHING_LUMP, FRAME, HUB, INPUT_SHAFT, N_LUMPS, PSI, S
 from tolstat.kernel.mechanics.triad import to_triad
 from tolstat.kernel.mechanics.vector import add, cross, dot, row, sub, turn_back
 from tolstat.kernel.mechanics.work import DELTA, FORCE, V_NORMAL, V_TANGENT
@@ -25,11 +26,14 @@ ENERGY_FIELDS = (
     Field("kinetic", "J", "kinetic energy of the lumps and the output shaft, absolute motion"),
     Field("bushings", "J", "elastic energy of the 8 bushings"),
     Field("contacts", "J", "elastic energy of the contact stations"),
+    Field("support", "J", "elastic energy of the output shaft's axial support"),
     Field("input", "W", "power of the drive on the input shaft"),
+    Field("axial", "W", "power of the axial force on the output shaft"),
     Field("load", "W", "power that the resisting torque takes"),
     Field("bushing_damping", "W", "power that the bushings' dampers take"),
     Field("contact_damping", "W", "power that the contacts' normal damping takes"),
     Field("film", "W", "power that the lubricant film takes"),
+    Field("support_damping", "W", "power that the axial damping of the output shaft takes"),
     Field("bushing_moments", "W", "power of the bushings' elastic moments beyond their potential"),
 )
 ENERGY = dtype_of(ENERGY_FIELDS)
@@ -38,7 +42,7 @@ ENERGY = dtype_of(ENERGY_FIELDS)
 @njit
 def kinetic_energy(v, par, work):
     """Kinetic energy of the lumps and the output shaft in the ground frame, J."""
-    energy = 0.5 * par.Js * (work.shaft[0] + v[PSI]) ** 2
+    energy = 0.5 * par.Js * (work.shaft[0] + v[PSI]) ** 2 + 0.5 * par.slides * par.m_s * v[S] ** 2
     for body in range(N_LUMPS):
         mass, inertia = mass_of(body, par)
         omega = row(work.frame_w, FRAME[body])
@@ -91,7 +95,7 @@ def measure(t, q, v, rows, options, work, out):
     ----------
     t : float
         Time, s.
-    q, v : ndarray, shape (55,)
+    q, v : ndarray, shape (56,)
         Unknowns and their rates; m and rad.
     rows : ndarray of PARAM, shape (3,)
         The joint; the same with bushing stiffness 1, no bushing damping and no contact damping; the same with bushing
@@ -108,6 +112,8 @@ def measure(t, q, v, rows, options, work, out):
     out.kinetic = kinetic_energy(v, par, work)
     out.input = -work.force[INPUT_SHAFT, 5] * par.omega
     out.load = resisting_torque(t, par, options.start == RAMP) * (work.shaft[0] + v[PSI])
+    out.support, out.axial = 0.5 * par.slides * par.k_a * q[S] ** 2, par.slides * par.F_a * v[S]
+    out.support_damping = par.slides * par.c_a * v[S] ** 2
     out.bushings = out.contacts = 0.0
     out.bushing_damping = out.contact_damping = out.film = out.bushing_moments = 0.0
     for pin in range(4):
@@ -118,6 +124,6 @@ def measure(t, q, v, rows, options, work, out):
 
 @njit
 def measure_all(t, points, rows, options, work, out):
-    """`measure` every state of a trajectory: ``points``, shape (n, 3, 55), at times `t`, to `out`, shape (n,)."""
+    """`measure` every state of a trajectory: ``points``, shape (n, 3, 56), at times `t`, to `out`, shape (n,)."""
     for k in range(t.size):
         measure(t[k], points[k, 0], points[k, 1], rows, options, work, out[k])

@@ -48,7 +48,7 @@ class Bodies:
             u, phi = q[6 * k : 6 * k + 3], q[6 * k + 3 : 6 * k + 6]
             self.position[name] = frame @ (par.R * e + u)
             self.attitude[name] = frame @ Rotation.from_rotvec(phi).as_matrix()
-        self.position["in"] = self.position["out"] = np.zeros(3)
+        self.position["in"], self.position["out"] = np.zeros(3), f @ (par.slides * q[55] * Z)
         self.attitude["in"], self.attitude["out"] = i, f @ turn(Z, q[54])
 
 
@@ -79,7 +79,7 @@ def contact_mode(stations):
 
 def forces(t, q, v, par):
     """World force and torque about the reference point of every body, loads of the bushings, contact modes."""
-    body, velocity, spin = motion(t, q, v, np.zeros(55), par)
+    body, velocity, spin = motion(t, q, v, np.zeros(56), par)
     force = {name: np.zeros(6) for name in body.position}
     loads = np.zeros((8, 6))
     modes: list[str] = []
@@ -147,14 +147,14 @@ def forces(t, q, v, par):
 
 
 def imbalance(t, q, v, a, par, resisting):
-    """World momentum rates less forces and torques of every lump, and of the shaft about its axis."""
+    """World momentum rates less forces and torques of every lump, and of the shaft about and along its axis."""
     force, _, _ = forces(t, q, v, par)
     h = 1e-6
     lumps = ["hub"] + [f"pin{k}" for k in (1, 2, 3, 4)] + [f"arm{k}" for k in (1, 2, 3, 4)]
     momentum = []
     for s in (-h, h):
         body, velocity, spin = motion(t + s, q + v * s + a * s * s / 2, v + a * s, a, par)
-        momentum.append((body, velocity, spin))
+        momentum.append((body.position, velocity, spin, body.attitude))
     off = {}
     for name in lumps:
         if name == "hub":
@@ -165,8 +165,8 @@ def imbalance(t, q, v, a, par, resisting):
             inertia = par.pin_inertia if pin else par.arm_inertia
             local = triad((PIN_AXES if pin else ARM_AXES)[int(name[-1])])
         linear, angular = [], []
-        for body, velocity, spin in momentum:
-            attitude = body.attitude[name] @ local.T
+        for _, velocity, spin, attitudes in momentum:
+            attitude = attitudes[name] @ local.T
             linear.append(mass * velocity[name])
             angular.append(attitude @ (inertia * (attitude.T @ spin[name])))
         off[name] = np.concatenate(
@@ -178,6 +178,10 @@ def imbalance(t, q, v, a, par, resisting):
     shaft = np.array([np.sin(par.alpha), 0, np.cos(par.alpha)])
     rate = (momentum[1][2]["out"] - momentum[0][2]["out"]) @ shaft / (2 * h)
     off["out"] = par.Js * rate - force["out"][3:] @ shaft + resisting
+    if par.slides:
+        place, speed = (np.array([of[k]["out"] @ shaft for of in momentum]) for k in (0, 1))
+        support = par.k_a * place.mean() + par.c_a * speed.mean()
+        off["axial"] = par.m_s * np.diff(speed)[0] / (2 * h) - force["out"][:3] @ shaft - par.F_a + support
     return off
 
 

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 Code = Literal["Radau", "BDF", "LSODA", "CVODE", "Exudyn"]
 Outcome = Literal["ok", "failed", "over_time"]
 Found = tuple[FloatArray, FloatArray] | None
-"""Times (m,) and states there (m, 110), or nothing."""
+"""Times (m,) and states there (m, 112), or nothing."""
 
 MAX_STEPS = 10**9
 """Step limit of CVODE, whose default is 500; here the CPU time limits its work."""
@@ -169,7 +169,7 @@ def solve(
 def _scipy(
     system: FirstOrder, integrator: Integrator, counted: _Counted, times: FloatArray, settings: dict[str, Any]
 ) -> Found:
-    """`times` and the states there, (m, 110); None where the integrator gives up."""
+    """`times` and the states there, (m, 112); None where the integrator gives up."""
     from scipy.integrate import solve_ivp
 
     if integrator.jacobian:

@@ -9,7 +9,7 @@ t : float
     Time, s; theta is omega t.
 h : float
     Length of a step, s.
-q, v, a : ndarray, shape (55,)
+q, v, a : ndarray, shape (56,)
     Unknowns and their first and second derivatives; m and rad, per s, per s^2. Textbook equations have (n,).
 cv, ca : float
     dv/dq (1/s) and da/dq (1/s^2) of the integration formula.

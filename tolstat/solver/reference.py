@@ -45,24 +45,24 @@ Largest = FloatArray
 
 
 class FirstOrder(NamedTuple):
-    """A joint as y' = f(t, y), y = (q, q') of 110 components (m and rad, per s), and an initial state.
+    """A joint as y' = f(t, y), y = (q, q') of 112 components (m and rad, per s), and an initial state.
 
     Attributes
     ----------
     rate : callable
-        (t, y) -> y', (110,); t in s.
+        (t, y) -> y', (112,); t in s.
     jacobian : callable
-        (t, y) -> df/dy, (110, 110).
+        (t, y) -> df/dy, (112, 112).
     t0 : float
         Time of the initial state, s; for a settled one, time within its revolution.
-    y0 : ndarray, shape (110,)
+    y0 : ndarray, shape (112,)
         Initial state.
     period : float
         Time of a revolution, s.
-    scale : ndarray, shape (110,)
+    scale : ndarray, shape (112,)
         Size of each component below which its error is absolute: ``atol = rtol * scale``.
     largest : callable
-        Times (m,) and states (m, 110) -> Largest.
+        Times (m,) and states (m, 112) -> Largest.
     settled : ndarray of RESULT, shape (1,)
         Result of the solver for the joint. If its status is one without results, there is no initial state.
     """
@@ -141,7 +141,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
 
 def _start(par: np.record, options: Options) -> FloatArray:
-    """Initial state of the solver at time zero, (110,)."""
+    """Initial state of the solver at time zero, (112,)."""
     from tolstat.kernel.revolution.simulate import make_scratch
     from tolstat.kernel.revolution.trajectory import follow
 

@@ -305,7 +305,7 @@ def simulate_together(
 
 
 def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
-    """Where the search for the start of each joint begins, (n, 55), see `kernel.revolution.starts`.
+    """Where the search for the start of each joint begins, (n, 56), see `kernel.revolution.starts`.
 
     The kernel is not called, and so not compiled, for joints with negative clearance alone: these end at once.
     """

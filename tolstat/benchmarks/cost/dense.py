@@ -43,9 +43,9 @@ class Dense:
 
 
 def dense(work: np.record) -> NDArray[np.float64]:
-    """Tangent as one matrix, (55, 55): the blocks of ``work`` after assembly and before elimination."""
-    from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, N_DOF, PIN, PSI
-    from tolstat.kernel.mechanics.work import ARM_PIN, ARM_PSI, HUB_PIN, PIN_ARM, PIN_HUB, PSI_ARM
+    """Tangent as one matrix, (56, 56): the blocks of ``work`` after assembly and before elimination."""
+    from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, N_DOF, PIN, PSI, S
+    from tolstat.kernel.mechanics.work import ARM_PIN, ARM_SHAFT, HUB_PIN, OF_PSI, OF_S, PIN_ARM, PIN_HUB, SHAFT_ARM
 
     s = np.zeros((N_DOF, N_DOF))
     m, e = work.block, work.edge
@@ -58,8 +58,9 @@ def dense(work: np.record) -> NDArray[np.float64]:
         s[i, j], s[j, i] = m[PIN_ARM + p], m[ARM_PIN + p]
     for a in range(4):
         rows = slice(6 * (ARM + a), 6 * (ARM + a) + 6)
-        s[rows, PSI], s[PSI, rows] = e[ARM_PSI + a], e[PSI_ARM + a]
-    s[PSI, PSI] = work.psi_psi[0]
+        for unknown, of in ((PSI, OF_PSI), (S, OF_S)):
+            s[rows, unknown], s[unknown, rows] = e[of, ARM_SHAFT + a], e[of, SHAFT_ARM + a]
+    s[PSI : S + 1, PSI : S + 1] = work.corner
     return s
 
 
@@ -72,7 +73,7 @@ def systems(snaps: Sequence[Snapshot], options: Options) -> Iterator[tuple[NDArr
         par = snap.params.view(np.recarray)[0]
         state.q[:], state.v[:], state.a[:] = snap.q, snap.v, snap.a
         residual(snap.t, state.q, state.v, state.a, par, options, work, state.residual)
-        assemble(snap.cv, snap.ca, par, work)
+        assemble(snap.cv, snap.ca, snap.cv, par, work)
         yield np.asfortranarray(dense(work)), -state.residual
 
 

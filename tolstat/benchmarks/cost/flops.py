@@ -30,7 +30,7 @@ class Snapshot(NamedTuple):
         The joint.
     t, cv, ca : float
         Time, s; derivatives of velocity and acceleration by the unknowns in a step, 1/s and 1/s^2.
-    q, v, a : ndarray, shape (55,)
+    q, v, a : ndarray, shape (56,)
         Unknowns and derivatives; m, rad and s.
     """
 
@@ -143,7 +143,7 @@ def count(snapshot: Snapshot) -> dict[str, int]:
     parts: dict[str, Callable[[], Any]] = {
         "residual": lambda: dynamics.residual(t, q, v, a, par, Options(), work, out),
         "contact": lambda: [contacts.contact_load(pin, par, work) for pin in range(4)],
-        "assembly": lambda: tangent.assemble(cv, ca, par, work),
+        "assembly": lambda: tangent.assemble(cv, ca, cv, par, work),
         "elimination": lambda: linsolve.factorise(work),
         "substitution": lambda: linsolve.solve(q, work),
     }

@@ -17,7 +17,7 @@ CHAINS = 10
 def repeat(part, times, t, cv, ca, motion, par, options, work):
     """Execute a part `times` times at the state ``motion.q``, ``v``, ``a`` of time `t`; cv, ca as from `predict`."""
     residual(t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
-    assemble(cv, ca, par, work)
+    assemble(cv, ca, cv, par, work)
     eliminate(work)
     for _ in range(times):
         if part == RESIDUAL:
@@ -26,9 +26,9 @@ def repeat(part, times, t, cv, ca, motion, par, options, work):
             for pin in range(4):
                 contact_load(pin, par, work)
         elif part == ASSEMBLY:
-            assemble(cv, ca, par, work)
+            assemble(cv, ca, cv, par, work)
         elif part == ELIMINATION:
-            assemble(cv, ca, par, work)
+            assemble(cv, ca, cv, par, work)
             eliminate(work)
         else:
             for i in range(N_DOF):

@@ -18,11 +18,11 @@ def rate(t, y, par, options, work, out):
     ----------
     t : float
         Time, s.
-    y : ndarray, shape (110,)
+    y : ndarray, shape (112,)
         Unknowns, then their velocities; m and rad, per s.
     par, options, work
         As in `dynamics.residual`.
-    out : ndarray, shape (110,)
+    out : ndarray, shape (112,)
         Written: y'.
     """
     for i in range(N_DOF):
@@ -32,7 +32,7 @@ def rate(t, y, par, options, work, out):
 
 @njit
 def jacobian(t, y, par, options, work, column, out):
-    """Write d(rate)/dy at `y` to `out`, (110, 110), by forward differences; `column`, (3, 110), is scratch."""
+    """Write d(rate)/dy at `y` to `out`, (112, 112), by forward differences; `column`, (3, 112), is scratch."""
     base, moved, there = column[0], column[1], column[2]
     rate(t, y, par, options, work, base)
     copy(y, moved)
@@ -63,7 +63,7 @@ def sample(times, states, par, work, value):
 
     Parameters
     ----------
-    times, states : ndarray, shapes (m,) and (m, 110)
+    times, states : ndarray, shapes (m,) and (m, 112)
         The solution, s; m and rad, per s.
     par, work : records of PARAM and WORK
         The joint; scratch.

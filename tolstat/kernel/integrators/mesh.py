@@ -18,7 +18,7 @@ from tolstat.kernel.integrators import trbdf2
 from tolstat.kernel.integrators.state import FORCE, LAST_ITERATION_BELOW, TOLERANCE, TORQUE
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.scale import set_weight, stiffness, typical_force
-from tolstat.kernel.mechanics.topology import N_LUMPS, PSI
+from tolstat.kernel.mechanics.topology import N_LUMPS, PSI, S
 from tolstat.kernel.simd.jit import njit
 
 errors = trbdf2.errors
@@ -59,7 +59,9 @@ def load_error(h, par, state):
             kind = 0 if j < 3 else 2
             worst = max(worst, max(of[kind] * abs(of_q), of[kind + 1] * abs(of_v)))
     of_q, of_v = errors(PSI, h, state)
-    return max(worst, max(force * k * par.R * abs(of_q), force * math.sqrt(k * par.Js) * abs(of_v)))
+    worst = max(worst, max(force * k * par.R * abs(of_q), force * math.sqrt(k * par.Js) * abs(of_v)))
+    of_q, of_v = errors(S, h, state)
+    return max(worst, max(force * k * abs(of_q), force * math.sqrt(k * par.m_s) * abs(of_v)))
 
 
 @njit

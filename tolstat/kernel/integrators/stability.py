@@ -105,12 +105,19 @@ def eigenvalue(h, depth, par, work):
             work.vel[body, k] = 0.5 + (7 * k + 3 * body) % 5
             work.spin[body, k] = (0.5 + (5 * k + 4 * body) % 7) / par.R
     work.spin[OUTPUT_SHAFT, 2] = 1 / par.R
+    work.vel[OUTPUT_SHAFT, 2] = par.slides
+    axial_mass = par.m_s if par.slides > 0 else 1.0
     found = 0.0
     for _ in range(ITERATIONS):
         multiply(h, depth, par, work)
         work_done = work.spin[OUTPUT_SHAFT, 2] * work.force[OUTPUT_SHAFT, 5]
         energy = par.Js * work.spin[OUTPUT_SHAFT, 2] ** 2
         work.spin[OUTPUT_SHAFT, 2] = work.force[OUTPUT_SHAFT, 5] / par.Js
+        along = work.vel[OUTPUT_SHAFT, 2]
+        force = par.slides * (work.force[OUTPUT_SHAFT, 2] + press_on(h, par.k_a, par.c_a) * along)
+        work_done += along * force
+        energy += axial_mass * along * along
+        work.vel[OUTPUT_SHAFT, 2] = force / axial_mass
         for body in range(N_LUMPS):
             mass, inertia = mass_of(body, par)
             turning = to_triad(body, row(work.spin, body))

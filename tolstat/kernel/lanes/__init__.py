@@ -14,7 +14,7 @@ joint : int
     Row of the joint among those simulated together.
 words : ndarray, shape (n, words)
     The memory of `rows` as doubles.
-starts : ndarray, shape (n, 55)
+starts : ndarray, shape (n, 56)
     Where the search for each joint's start begins, see `revolution.starts`.
 steps : ndarray of int, shape (n,)
     Steps of the first revolution of each joint.

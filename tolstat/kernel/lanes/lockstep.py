@@ -236,7 +236,7 @@ def lockstep(rows, words, starts, left, options, patience, alone, batch, samples
         The joints, n > 0.
     words : ndarray, shape (n, words)
         The same memory as doubles.
-    starts : ndarray, shape (n, 55)
+    starts : ndarray, shape (n, 56)
         Where the search for each joint's start begins, see `starts.write_starts`.
     left : ndarray of int, shape (n,)
         Newton iterations still allowed to each joint; reduced by those taken. A joint without any ends as

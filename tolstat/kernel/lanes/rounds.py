@@ -130,11 +130,12 @@ def keep_rows(mask, new, old):
 def refactorise(mask, control, par, work, kept):
     """Compute new tangents in the lanes of the mask; return where, of all lanes, the factorisation succeeded."""
     held = control.cv == CV_STATIC
-    assemble(where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca), par, work)
+    cv, ca = where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca)
+    assemble(cv, ca, where(held, 0.0, control.cv), par, work)
     good = eliminate(work)
     keep_blocks(mask, work.block, kept.block)
-    keep_rows(mask, work.edge, kept.edge)
-    kept.psi_psi[0] = retain(mask, work.psi_psi[0], kept.psi_psi[0])
+    keep_blocks(mask, work.edge, kept.edge)
+    keep_rows(mask, work.corner, kept.corner)
     control.factorised = where(mask, control.cv, control.factorised)
     control.factorisations = where(mask, control.factorisations + 1, control.factorisations)
     return good

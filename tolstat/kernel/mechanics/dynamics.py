@@ -11,10 +11,22 @@ from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.motion import ideal_motion
 from tolstat.kernel.mechanics.rotation import exponential, spin, spin_bias, spin_rate, unspin
-from tolstat.kernel.mechanics.topology import ARM, FRAME, HUB, INPUT_SHAFT, N_BODIES, N_LUMPS, OUTPUT_SHAFT, PSI, TRIAD
+from tolstat.kernel.mechanics.topology import (
+    ARM,
+    FRAME,
+    HUB,
+    INPUT_SHAFT,
+    N_BODIES,
+    N_LUMPS,
+    OUTPUT_SHAFT,
+    PSI,
+    TRIAD,
+    S,
+)
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.vector import add, axpy, cross, put, row, scale, sub, turn, turn_back
 from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import where
 
 RAMP = int(Start.RAMP)
 
@@ -31,7 +43,7 @@ def mass_of(body, par):
 
 @njit
 def set_bodies(q, v, par, work):
-    """Write position, attitude and velocity of every body relative to its ideal frame to `work`; `q`, `v`: (55,)."""
+    """Write position, attitude and velocity of every body relative to its ideal frame to `work`; `q`, `v`: (56,)."""
     for body in range(N_LUMPS):
         i = 6 * body
         distance = 0.0 if body == HUB else par.R
@@ -40,18 +52,29 @@ def set_bodies(q, v, par, work):
         put(work.vel, body, (v[i], v[i + 1], v[i + 2]))
         exponential(phi, work.rot, body)
         put(work.spin, body, spin(phi, (v[i + 3], v[i + 4], v[i + 5])))
-    place_shaft(INPUT_SHAFT, 0.0 * q[PSI], 0.0 * v[PSI], work)
-    place_shaft(OUTPUT_SHAFT, q[PSI], v[PSI], work)
+    still = 0.0 * q[PSI]
+    place_shaft(INPUT_SHAFT, (still, still), (still, still), work)
+    place_shaft(OUTPUT_SHAFT, (q[PSI], v[PSI]), (par.slides * q[S], par.slides * v[S]), work)
 
 
 @njit
-def place_shaft(body, angle, rate, work):
-    """Write attitude and angular velocity of a shaft turned about z by `angle` (rad), at `rate` (rad/s)."""
-    zero = angle - angle  # of the type of the angle: tuples of one type go through one compiled version
-    put(work.pos, body, (zero, zero, zero))
-    put(work.vel, body, (zero, zero, zero))
-    exponential((zero, zero, angle), work.rot, body)
-    put(work.spin, body, (zero, zero, rate))
+def place_shaft(body, turned, shifted, work):
+    """Write position, attitude and velocities of a shaft.
+
+    Parameters
+    ----------
+    body : int
+        `INPUT_SHAFT` or `OUTPUT_SHAFT`.
+    turned, shifted : tuple of float
+        Rotation about z (rad) and its rate; displacement along z (m) and its rate.
+    work : record of WORK
+        Written.
+    """
+    zero = turned[0] - turned[0]  # of the type of the angle: tuples of one type go through one compiled version
+    put(work.pos, body, (zero, zero, shifted[0]))
+    put(work.vel, body, (zero, zero, shifted[1]))
+    exponential((zero, zero, turned[0]), work.rot, body)
+    put(work.spin, body, (zero, zero, turned[1]))
 
 
 @njit
@@ -74,6 +97,12 @@ def resisting_torque(t, par, ramped):
     if not ramped:
         return par.torque
     return par.torque * smooth_step(t * abs(par.omega) / (0.5 * math.pi))
+
+
+@njit
+def axial_force(q, v, par, work):
+    """Force along the output shaft that accelerates it, N: of its arms, F_a, and of the bearings; 0 if it is held."""
+    return par.slides * (work.force[OUTPUT_SHAFT, 2] + par.F_a - par.k_a * q[S] - par.c_a * v[S])
 
 
 @njit
@@ -105,7 +134,7 @@ def residual(t, q, v, a, par, options, work, out):
     ----------
     t : float
         Time, s.
-    q, v, a : ndarray, shape (55,)
+    q, v, a : ndarray, shape (56,)
         Unknowns and their first and second derivatives; m and rad.
     par : record of PARAM
         The joint.
@@ -113,7 +142,7 @@ def residual(t, q, v, a, par, options, work, out):
         ``start`` decides whether the resisting torque is ramped.
     work : record of WORK
         Scratch; holds the state and the loads afterwards.
-    out : ndarray, shape (55,)
+    out : ndarray, shape (56,)
         Written: N and N m.
     """
     forces(t, q, v, par, work)
@@ -127,6 +156,7 @@ def residual(t, q, v, a, par, options, work, out):
             out[i + 3 + k] = torque[k] - work.force[body, 3 + k]
     resisting = resisting_torque(t, par, options.start == RAMP)
     out[PSI] = par.Js * (work.shaft[1] + a[PSI]) - work.force[OUTPUT_SHAFT, 5] + resisting
+    out[S] = par.slides * par.m_s * a[S] - axial_force(q, v, par, work)
 
 
 @njit
@@ -148,3 +178,4 @@ def acceleration(t, q, v, par, options, work, out):
             out[i + 3 + k] = ddphi[k]
     resisting = resisting_torque(t, par, options.start == RAMP)
     out[PSI] = (work.force[OUTPUT_SHAFT, 5] - resisting) / par.Js - work.shaft[1]
+    out[S] = axial_force(q, v, par, work) / where(par.slides > 0, par.m_s, 1.0)

@@ -1,6 +1,8 @@
 """Initial guess for the equilibrium: a rigid cross in rigid forks, placed so that all four pins just touch.
 
-In the plane of the cross, a rotation and a displacement of the cross and a rotation of the output shaft bring the four
+An output shaft that may slide moves along its axis first, so that the pins of the input and of the output fork have the
+same displacement across the plane of the cross: without axial force loaded pins centre it there. In the plane of the
+cross, a rotation and a displacement of the cross and a rotation of the output shaft bring the four
 pins into contact. Across that plane, the cross tilts and moves so that the pins are centred, up to a part of their
 displacements that a rigid cross cannot remove, of the same size for all pins. Rotations are small.
 """
@@ -10,8 +12,9 @@ import math
 from tolstat.kernel.mechanics.contact import locate
 from tolstat.kernel.mechanics.dynamics import set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion
-from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, HUB, PIN, PSI, TRIAD
-from tolstat.kernel.mechanics.vector import add, cross, dot, row, scale, turn_back
+from tolstat.kernel.mechanics.scale import centring_stiffness, mean_clearance
+from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, HUB, PIN, PSI, TRIAD, S
+from tolstat.kernel.mechanics.vector import add, axpy, cross, dot, row, scale, turn_back
 from tolstat.kernel.mechanics.work import NORMAL, RHO
 from tolstat.kernel.simd.jit import njit
 
@@ -75,9 +78,12 @@ def rigid_guess(t, par, work, state):
     q[:] = 0.0
     state.v0[:] = 0.0
     ideal_motion(par.omega * t, par.alpha, par.omega, work)
-    set_bodies(q, state.v0, par, work)
-    for pin in range(4):
-        locate(pin, par, work)
+    locate_all(q, state.v0, par, work)
+    if par.slides > 0:
+        q[S] = shift_along_axis(par, work)
+        for body in (ARM + 2, ARM + 3):
+            q[6 * body + 2] = q[S]
+        locate_all(q, state.v0, par, work)
     z0, z1, z2, z3 = middle(0, par, work), middle(1, par, work), middle(2, par, work), middle(3, par, work)
     about_x, about_y = -(z0 - z1) / (2 * par.R), (z2 - z3) / (2 * par.R)
     up = -0.25 * (z0 + z1 + z2 + z3)
@@ -97,8 +103,31 @@ def rigid_guess(t, par, work, state):
         distance = 0.0 if body == HUB else par.R
         put_body(q, body, add(shift, cross(turned, scale(distance, row(TRIAD[body], 0)))), turned)
     for body in (ARM + 2, ARM + 3):
-        put_body(q, body, scale(psi * par.R, row(TRIAD[body], 1)), scale(psi, Z))
+        put_body(q, body, axpy(psi * par.R, row(TRIAD[body], 1), scale(q[S], Z)), scale(psi, Z))
     q[PSI] = psi
+
+
+@njit
+def locate_all(q, v, par, work):
+    """Write bodies and stations of all pins at the unknowns `q` and velocities `v`."""
+    set_bodies(q, v, par, work)
+    for pin in range(4):
+        locate(pin, par, work)
+
+
+@njit
+def shift_along_axis(par, work):
+    """Displacement s (m) of an output shaft that may slide: where the pins centre it, but for axial force and support.
+
+    The stations of all pins are as `locate` wrote them at s = 0.
+    """
+    apart = middle(0, par, work) + middle(1, par, work) - middle(2, par, work) - middle(3, par, work)
+    centred = 0.5 * apart / work.relative[FRAME_F, 2, 2]
+    stiffness = centring_stiffness(0, par) + par.k_a
+    if stiffness == 0:
+        return centred
+    reach = 2 * mean_clearance(0, par)
+    return centred + max(-reach, min(reach, (par.F_a - par.k_a * centred) / stiffness))
 
 
 @njit

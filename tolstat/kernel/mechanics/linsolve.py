@@ -1,24 +1,27 @@
 """Direct solution of the tangent system by block elimination along the joint's structure.
 
-Four chains pin - arm are connected to the hub; the arms of the output fork also to psi. Arms are eliminated into pins
-and psi, pins into hub and psi, and the hub and psi remain. Each 6 x 6 block on the diagonal is inverted: a product with
-the inverse is six independent sums, while substitutions are one long chain of dependent operations. Every diagonal has
-bushing stiffness, so the blocks are inverted without pivoting; a zero or NaN pivot is reported.
+Four chains pin - arm are connected to the hub; the arms of the output fork also to psi and s of the output shaft. Arms
+are eliminated into pins and shaft, pins into hub and shaft; of hub and shaft, the hub first, then psi, then s. Each 6 x
+6 block on the diagonal is inverted: a product with the inverse is six independent sums, while substitutions are one
+long chain of dependent operations. Every diagonal has bushing stiffness, so the blocks are inverted without pivoting; a
+zero or NaN pivot is reported. A shaft that is held has 1 on the diagonal of s and zeros beside it.
 """
 
 from tolstat.kernel.mechanics.rotation import unspin
-from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, HUB, N_LUMPS, PIN, PSI
+from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, HUB, N_LUMPS, PIN, PSI, S
 from tolstat.kernel.mechanics.work import (
     ARM_PIN,
-    ARM_PSI,
+    ARM_SHAFT,
     HUB_PIN,
-    HUB_PSI,
+    HUB_SHAFT,
+    OF_PSI,
+    OF_S,
     PIN_ARM,
     PIN_HUB,
-    PIN_PSI,
-    PSI_ARM,
-    PSI_HUB,
-    PSI_PIN,
+    PIN_SHAFT,
+    SHAFT_ARM,
+    SHAFT_HUB,
+    SHAFT_PIN,
 )
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import fma
@@ -26,7 +29,7 @@ from tolstat.kernel.simd.lane import fma
 
 @njit
 def six(x, i):
-    """Entries `i` to `i` + 5 of the vector `x`, shape (55,)."""
+    """Entries `i` to `i` + 5 of the vector `x`, shape (56,)."""
     return (x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4], x[i + 5])
 
 
@@ -37,15 +40,15 @@ def put_six(x, i, a):
 
 
 @njit
-def edge(e, i):
-    """Vector `i` of `e`, shape (n, 6)."""
-    return (e[i, 0], e[i, 1], e[i, 2], e[i, 3], e[i, 4], e[i, 5])
+def edge(e, of, i):
+    """Vector `i` of the unknown `of` of the output shaft; `e`: shape (2, n, 6)."""
+    return (e[of, i, 0], e[of, i, 1], e[of, i, 2], e[of, i, 3], e[of, i, 4], e[of, i, 5])
 
 
 @njit
-def put_edge(e, i, a):
-    """Write `a` to vector `i` of `e`."""
-    e[i, 0], e[i, 1], e[i, 2], e[i, 3], e[i, 4], e[i, 5] = a
+def put_edge(e, of, i, a):
+    """Write `a` to vector `i` of the unknown `of` of the output shaft in `e`."""
+    e[of, i, 0], e[of, i, 1], e[of, i, 2], e[of, i, 3], e[of, i, 4], e[of, i, 5] = a
 
 
 @njit
@@ -178,11 +181,11 @@ def factorise(work):
     bool
         False when a block is singular or not finite.
     """
-    m, e = work.block, work.edge
+    m = work.block
     good = True
-    for i in range(6):
-        e[HUB_PSI, i] = e[PSI_HUB, i] = 0.0
-    to_psi, from_psi, rest = edge(e, HUB_PSI), edge(e, PSI_HUB), work.psi_psi[0]
+    for of in (OF_PSI, OF_S):
+        for i in range(6):
+            work.edge[of, HUB_SHAFT, i] = work.edge[of, SHAFT_HUB, i] = 0.0
     for p in range(4):
         pin, a = PIN + p, ARM_OF_PIN[p]
         arm = ARM + a
@@ -192,27 +195,48 @@ def factorise(work):
         good = good & invert(m, pin)
         multiply_columns(m, pin, PIN_HUB + p)
         subtract_product(m, HUB, HUB_PIN + p, PIN_HUB + p)
-        for i in range(6):
-            e[PIN_PSI + p, i] = e[PSI_PIN + p, i] = 0.0
         if a >= 2:  # output fork
-            of_psi = edge(e, PSI_ARM + a)
-            by_arm = product(m, arm, edge(e, ARM_PSI + a))
-            put_edge(e, ARM_PSI + a, by_arm)
-            by_pin = product(m, pin, product(m, PIN_ARM + p, minus(by_arm)))
-            put_edge(e, PIN_PSI + p, by_pin)
-            for i in range(6):
-                e[PSI_PIN + p, i] = -dot(of_psi, column(m, ARM_PIN + p, i))
-            row_of_pin = edge(e, PSI_PIN + p)
-            rest -= dot(of_psi, by_arm) + dot(row_of_pin, by_pin)
-            to_psi = plus_product(to_psi, m, HUB_PIN + p, minus(by_pin))
-            from_psi = minus_row_product(from_psi, row_of_pin, m, PIN_HUB + p)
+            eliminate_into_shaft(p, work)
     good = good & invert(m, HUB)
-    by_hub = product(m, HUB, to_psi)
-    put_edge(e, HUB_PSI, by_hub)
-    put_edge(e, PSI_HUB, from_psi)
-    pivot = 1 / (rest - dot(from_psi, by_hub))
-    work.psi_psi[0] = pivot
-    return good & (abs(pivot) < 1e300)
+    return good & factorise_corner(work)
+
+
+@njit
+def eliminate_into_shaft(p, work):
+    """Eliminate pin `p` and its arm from the columns and rows of the output shaft; their blocks are inverted."""
+    m, e, corner = work.block, work.edge, work.corner
+    pin, a = PIN + p, ARM_OF_PIN[p]
+    for of in (OF_PSI, OF_S):
+        by_arm = product(m, ARM + a, edge(e, of, ARM_SHAFT + a))
+        put_edge(e, of, ARM_SHAFT + a, by_arm)
+        by_pin = product(m, pin, product(m, PIN_ARM + p, minus(by_arm)))
+        put_edge(e, of, PIN_SHAFT + p, by_pin)
+        of_arm = edge(e, of, SHAFT_ARM + a)
+        for i in range(6):
+            e[of, SHAFT_PIN + p, i] = -dot(of_arm, column(m, ARM_PIN + p, i))
+        put_edge(e, of, HUB_SHAFT, plus_product(edge(e, of, HUB_SHAFT), m, HUB_PIN + p, minus(by_pin)))
+        of_pin = edge(e, of, SHAFT_PIN + p)
+        put_edge(e, of, SHAFT_HUB, minus_row_product(edge(e, of, SHAFT_HUB), of_pin, m, PIN_HUB + p))
+    for i in (OF_PSI, OF_S):
+        of_arm, of_pin = edge(e, i, SHAFT_ARM + a), edge(e, i, SHAFT_PIN + p)
+        for j in (OF_PSI, OF_S):
+            corner[i, j] -= dot(of_arm, edge(e, j, ARM_SHAFT + a)) + dot(of_pin, edge(e, j, PIN_SHAFT + p))
+
+
+@njit
+def factorise_corner(work):
+    """Eliminate the hub from psi and s, and psi from s; return False when a pivot is zero or not finite."""
+    e, corner = work.edge, work.corner
+    for of in (OF_PSI, OF_S):
+        put_edge(e, of, HUB_SHAFT, product(work.block, HUB, edge(e, of, HUB_SHAFT)))
+    for i in (OF_PSI, OF_S):
+        for j in (OF_PSI, OF_S):
+            corner[i, j] -= dot(edge(e, i, SHAFT_HUB), edge(e, j, HUB_SHAFT))
+    pivot = 1 / corner[OF_PSI, OF_PSI]
+    factor = corner[OF_S, OF_PSI] * pivot
+    last = 1 / (corner[OF_S, OF_S] - factor * corner[OF_PSI, OF_S])
+    corner[OF_PSI, OF_PSI], corner[OF_S, OF_PSI], corner[OF_S, OF_S] = pivot, factor, last
+    return (abs(pivot) < 1e300) & (abs(last) < 1e300)
 
 
 @njit
@@ -232,10 +256,10 @@ def minus_row_product(c, a, m, b):
 def solve(q, work):
     """Solve the factorised system for ``work.solution``, in place; the result is an increment of the unknowns.
 
-    Increments of attitude are converted to increments of the rotation vectors in `q`, shape (55,).
+    Increments of attitude are converted to increments of the rotation vectors in `q`, shape (56,).
     """
     x, m, e = work.solution, work.block, work.edge
-    hub, rest = six(x, 0), x[PSI]
+    hub, of_psi, of_s = six(x, 0), x[PSI], x[S]
     for p in range(4):
         pin, a = 6 * (PIN + p), ARM_OF_PIN[p]
         arm = 6 * (ARM + a)
@@ -243,23 +267,27 @@ def solve(q, work):
         of_pin = product(m, PIN + p, plus_product(six(x, pin), m, PIN_ARM + p, minus(of_arm)))
         hub = plus_product(hub, m, HUB_PIN + p, minus(of_pin))
         if a >= 2:
-            rest -= dot(edge(e, PSI_ARM + a), of_arm) + dot(edge(e, PSI_PIN + p), of_pin)
+            of_psi -= dot(edge(e, OF_PSI, SHAFT_ARM + a), of_arm) + dot(edge(e, OF_PSI, SHAFT_PIN + p), of_pin)
+            of_s -= dot(edge(e, OF_S, SHAFT_ARM + a), of_arm) + dot(edge(e, OF_S, SHAFT_PIN + p), of_pin)
         put_six(x, arm, of_arm)
         put_six(x, pin, of_pin)
     hub = product(m, HUB, hub)
-    psi = work.psi_psi[0] * (rest - dot(edge(e, PSI_HUB), hub))
-    x[PSI] = psi
-    hub = less(hub, psi, edge(e, HUB_PSI))
+    of_psi -= dot(edge(e, OF_PSI, SHAFT_HUB), hub)
+    of_s -= dot(edge(e, OF_S, SHAFT_HUB), hub)
+    s = work.corner[OF_S, OF_S] * (of_s - work.corner[OF_S, OF_PSI] * of_psi)
+    psi = work.corner[OF_PSI, OF_PSI] * (of_psi - work.corner[OF_PSI, OF_S] * s)
+    x[PSI], x[S] = psi, s
+    hub = less(less(hub, psi, edge(e, OF_PSI, HUB_SHAFT)), s, edge(e, OF_S, HUB_SHAFT))
     put_six(x, 0, hub)
     for p in range(4):
         pin, a = 6 * (PIN + p), ARM_OF_PIN[p]
         arm = 6 * (ARM + a)
         of_pin = plus_product(six(x, pin), m, PIN_HUB + p, minus(hub))
         if a >= 2:
-            of_pin = less(of_pin, psi, edge(e, PIN_PSI + p))
+            of_pin = less(less(of_pin, psi, edge(e, OF_PSI, PIN_SHAFT + p)), s, edge(e, OF_S, PIN_SHAFT + p))
         of_arm = plus_product(six(x, arm), m, ARM_PIN + p, minus(of_pin))
         if a >= 2:
-            of_arm = less(of_arm, psi, edge(e, ARM_PSI + a))
+            of_arm = less(less(of_arm, psi, edge(e, OF_PSI, ARM_SHAFT + a)), s, edge(e, OF_S, ARM_SHAFT + a))
         put_six(x, pin, of_pin)
         put_six(x, arm, of_arm)
     for body in range(N_LUMPS):

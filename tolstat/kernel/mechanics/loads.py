@@ -34,7 +34,7 @@ def modulus(first, bushing, lane, work):
 
 @njit
 def output_speed(lane, par, work, v):
-    """Speed ratio tau and its error Psi, eq. (13), from the velocities `v`, (55,)."""
+    """Speed ratio tau and its error Psi, eq. (13), from the velocities `v`, (56,)."""
     omega, rate = pick(par.omega, lane), pick(v[PSI], lane)
     tau = (pick(work.shaft[0], lane) + rate) / omega
     return tau, rate / (omega * tau)
@@ -61,7 +61,7 @@ def all_loads(lane, par, work, v, loads):
 def loads_to_follow(work, v, loads):
     """Write squares of the bushings' moduli and all other loads to `loads`, (N_LOADS,), in all lanes at once.
 
-    `v`: velocities that ``work`` was evaluated at, (55,).
+    `v`: velocities that ``work`` was evaluated at, (56,).
     """
     for b in range(8):
         for kind in range(2):

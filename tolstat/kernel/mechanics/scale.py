@@ -1,7 +1,10 @@
-"""Typical force of a joint, estimated from its parameters, and weights that make residuals relative to a force."""
+"""Typical force and stiffness of a joint, estimated from its parameters; weights of residuals relative to a force."""
 
-from tolstat.kernel.mechanics.topology import ARM, N_LUMPS, PSI
+import math
+
+from tolstat.kernel.mechanics.topology import ARM, N_LUMPS, PSI, S
 from tolstat.kernel.simd.jit import njit
+from tolstat.kernel.simd.lane import pick
 
 SMALLEST_FORCE = 1e-3
 """Smallest typical force (N), for a joint that neither rotates nor transmits torque."""
@@ -21,10 +24,43 @@ def stiffness(body, par):
 
 
 @njit
+def mean_clearance(lane, par):
+    """Mean radial clearance of the four pins, m; at least the penetration over which contact damping rises."""
+    total = 0.0
+    for pin in range(4):
+        total += pick(par.clearance[pin], lane)
+    return max(0.25 * total, pick(par.delta_d, lane))
+
+
+@njit
+def centring_stiffness(lane, par):
+    """Axial stiffness (N/m) by which loaded pins, centred in round holes, hold an output shaft; 0 if it is rigid.
+
+    A pin that a force presses across a clearance is centred in the hole by the force over the clearance; both pins of
+    an axis act together, and the two axes one after the other: T_r / (2 (R + s_0) c), s_0 the outermost station's s.
+    """
+    radius = pick(par.R, lane) + pick(par.station_s[0], lane)
+    held = abs(pick(par.torque, lane)) / (2 * radius * mean_clearance(lane, par))
+    return held if pick(par.slides, lane) > 0 else 0.0
+
+
+@njit
+def axial_decay(par):
+    """Share of a deviation along the output shaft that is left after a revolution, estimated; 0 if it is rigid.
+
+    Inertia plays no part in such a slow motion: its rate is the axial stiffness over the damping c_a.
+    """
+    if not (par.slides > 0 and par.c_a > 0):
+        return 0.0
+    return math.exp(-2 * math.pi / abs(par.omega) * (centring_stiffness(0, par) + par.k_a) / par.c_a)
+
+
+@njit
 def set_weight(force, par, weight):
-    """Write the weights of residuals to `weight`, (55,): 1 / `force` (1/N), for torques 1 / (`force` R)."""
+    """Write the weights of residuals to `weight`, (56,): 1 / `force` (1/N), for torques 1 / (`force` R)."""
     for body in range(N_LUMPS):
         for k in range(3):
             weight[6 * body + k] = 1 / force
             weight[6 * body + 3 + k] = 1 / force / par.R
     weight[PSI] = 1 / force / par.R
+    weight[S] = 1 / force

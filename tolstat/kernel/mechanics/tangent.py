@@ -24,16 +24,18 @@ from tolstat.kernel.mechanics.topology import (
 from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn, turn_back
 from tolstat.kernel.mechanics.work import (
     ARM_PIN,
-    ARM_PSI,
+    ARM_SHAFT,
     DELTA,
     FORCE,
     HUB_PIN,
     NORMAL,
+    OF_PSI,
+    OF_S,
     PIN_ARM,
     PIN_HUB,
     POINT,
-    PSI_ARM,
     RHO,
+    SHAFT_ARM,
     SLOPE,
     TANGENT,
     V_NORMAL,
@@ -50,10 +52,11 @@ def clear(work):
         for i in range(6):
             for j in range(6):
                 work.block[b, i, j] = 0.0
-    for a in range(4):
-        for i in range(6):
-            work.edge[ARM_PSI + a, i] = work.edge[PSI_ARM + a, i] = 0.0
-    work.psi_psi[0] = 0.0
+    for of in (OF_PSI, OF_S):
+        for a in range(4):
+            for i in range(6):
+                work.edge[of, ARM_SHAFT + a, i] = work.edge[of, SHAFT_ARM + a, i] = 0.0
+        work.corner[of, OF_PSI] = work.corner[of, OF_S] = 0.0
 
 
 @njit
@@ -148,7 +151,7 @@ def bushing_tangent(i, cv, par, work):
     a = spread(work.rot, base, lump, (fma(cv, c[0], k[0]), fma(cv, c[1], k[1]), fma(cv, c[2], k[2])))
     b = spread(work.rot, base, lump, (fma(cv, c[3], k[3]), fma(cv, c[4], k[4]), fma(cv, c[5], k[5])))
     by_lump, by_base = turning(a, lever), turning(a, base_lever)
-    block, edge = work.block, work.edge
+    block = work.block
     put(block, lump, 0, 0, a)
     put(block, lump, 0, 3, by_lump)
     put(block, lump, 3, 0, transposed(by_lump))
@@ -168,14 +171,24 @@ def bushing_tangent(i, cv, par, work):
         take(block, HUB_PIN + pin, 0, 3, by_lump)
         take(block, HUB_PIN + pin, 3, 0, transposed(by_base))
         take(block, HUB_PIN + pin, 3, 3, transposed(between))
-    elif base == OUTPUT_SHAFT:  # the only unknown of the shaft is its rotation about z
-        arm = lump - ARM
-        for n in range(3):
-            edge[ARM_PSI + arm, n] -= by_base[2][n]
-            edge[PSI_ARM + arm, n] -= by_base[2][n]
-            edge[ARM_PSI + arm, 3 + n] -= between[2][n]
-            edge[PSI_ARM + arm, 3 + n] -= between[2][n]
-        work.psi_psi[0] += b[2][2] + cross(base_lever, by_base[2])[2]
+    elif base == OUTPUT_SHAFT:  # its unknowns are rotation about z and, where it slides, displacement along z
+        arm, slides = lump - ARM, par.slides
+        connect_shaft(OF_PSI, arm, by_base[2], between[2], work.edge)
+        connect_shaft(OF_S, arm, scale(slides, a[2]), scale(slides, transposed(by_lump)[2]), work.edge)
+        work.corner[OF_PSI, OF_PSI] += b[2][2] + cross(base_lever, by_base[2])[2]
+        work.corner[OF_PSI, OF_S] += slides * by_base[2][2]
+        work.corner[OF_S, OF_PSI] += slides * by_base[2][2]
+        work.corner[OF_S, OF_S] += slides * a[2][2]
+
+
+@njit
+def connect_shaft(of, arm, f, torque, edge):
+    """Subtract `f` and `torque` from column and row of the shaft's unknown `of` in `edge`, at the places of `arm`."""
+    for n in range(3):
+        edge[of, ARM_SHAFT + arm, n] -= f[n]
+        edge[of, SHAFT_ARM + arm, n] -= f[n]
+        edge[of, ARM_SHAFT + arm, 3 + n] -= torque[n]
+        edge[of, SHAFT_ARM + arm, 3 + n] -= torque[n]
 
 
 @njit
@@ -237,13 +250,15 @@ def contact_tangent(pin, cv, par, work):
 
 
 @njit
-def assemble(cv, ca, par, work):
+def assemble(cv, ca, cv_axial, par, work):
     """Assemble the tangent at the state that ``dynamics.forces`` was last evaluated at.
 
     Parameters
     ----------
     cv, ca : float
         dv/dq (1/s) and da/dq (1/s^2) of the integration formula.
+    cv_axial : float
+        That dv/dq for the damping of the output shaft along its axis: 0 for an equilibrium, 1/s.
     par : record of PARAM
         The joint.
     work : record of WORK
@@ -256,4 +271,6 @@ def assemble(cv, ca, par, work):
         bushing_tangent(i, cv, par, work)
     for pin in range(4):
         contact_tangent(pin, cv, par, work)
-    work.psi_psi[0] += ca * par.Js
+    work.corner[OF_PSI, OF_PSI] += ca * par.Js
+    support = ca * par.m_s + cv_axial * par.c_a + par.k_a
+    work.corner[OF_S, OF_S] += where(par.slides > 0, support, 1.0)

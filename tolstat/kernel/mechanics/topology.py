@@ -1,7 +1,8 @@
 """Topology of the joint as constant arrays (docs/model.md, "Parts" and "Frames").
 
 Bodies 0 hub, 1-4 pins 1-4, 5-8 arms 1-4, 9 input shaft, 10 output shaft. The unknowns are six per lump
-(three displacements, three rotations, in axes of the lump's ideal frame), then psi: 9 * 6 + 1 = 55.
+(three displacements, three rotations, in axes of the lump's ideal frame), then psi and s of the output
+shaft, its rotation about its axis and its displacement along it: 9 * 6 + 2 = 56.
 """
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 HUB, PIN, ARM, INPUT_SHAFT, OUTPUT_SHAFT = 0, 1, 5, 9, 10
 N_BODIES, N_LUMPS = 11, 9
 PSI = 6 * N_LUMPS
-N_DOF = PSI + 1
+S = PSI + 1
+N_DOF = S + 1
 
 FRAME_I, FRAME_C, FRAME_F = 0, 1, 2
 FRAME = np.array([FRAME_C] * 5 + [FRAME_I] * 2 + [FRAME_F] * 2 + [FRAME_I, FRAME_F])

@@ -17,8 +17,10 @@ N_STATION = 15
 
 HUB_PIN, PIN_HUB, PIN_ARM, ARM_PIN = N_LUMPS, N_LUMPS + 4, N_LUMPS + 8, N_LUMPS + 12
 """First matrix of each kind in ``work.block``, after those of the lumps: rows hub, columns pin p; and so on."""
-ARM_PSI, PSI_ARM, PIN_PSI, PSI_PIN, HUB_PSI, PSI_HUB = 0, 4, 8, 12, 16, 17
-"""First vector of each kind in ``work.edge``: column psi, rows of an arm; row psi, columns of an arm; and so on."""
+ARM_SHAFT, SHAFT_ARM, PIN_SHAFT, SHAFT_PIN, HUB_SHAFT, SHAFT_HUB = 0, 4, 8, 12, 16, 17
+"""First vector of each kind in ``work.edge[of]``, `OF_PSI` or `OF_S`: column of the output shaft's unknown, rows of an
+arm; its row, columns of an arm; and so on."""
+OF_PSI, OF_S = 0, 1
 
 FIELDS = {
     "frame_w": (3, 3),  # angular velocity of I, C, F in their own axes
@@ -36,8 +38,8 @@ FIELDS = {
     "mode": (4,),  # contact mode of each pin
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
     "block": (N_LUMPS + 16, 6, 6),  # matrices of the tangent, see `HUB_PIN` to `ARM_PIN`; factorised in place
-    "edge": (18, 6),  # its column and row psi, see `ARM_PSI` to `PSI_HUB`; those of pins and hub are fill-in
-    "psi_psi": (1,),  # its last diagonal entry
+    "edge": (2, 18, 6),  # its columns and rows psi and s, see `ARM_SHAFT` to `SHAFT_HUB`; of pins and hub: fill-in
+    "corner": (2, 2),  # its rows and columns psi and s; factorised in place
     "vectors": (2, 12),  # d(displacements of a station along n and m) / d(pin, arm)
     "by_n": (12,),  # scratch of contact_tangent: d(forces of that station along n and m) / d(pin, arm)
     "by_m": (12,),

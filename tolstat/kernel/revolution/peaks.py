@@ -45,7 +45,7 @@ def follow_value(i, peaks):
 
 @njit
 def follow(work, v, peaks):
-    """Include the loads in ``work``; `v`: velocities that they were evaluated at, (55,)."""
+    """Include the loads in ``work``; `v`: velocities that they were evaluated at, (56,)."""
     loads_to_follow(work, v, peaks.now)
     for i in range(N_LOADS):
         follow_value(i, peaks)

@@ -17,11 +17,19 @@ from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Motion, Optio
 from tolstat.kernel.integrators.mesh import CELL, cells_of
 from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_LOADS, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
+from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
 from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.revolution.closeup import extend
 from tolstat.kernel.revolution.settle import closure_error, summarise
-from tolstat.kernel.revolution.trail import Trail, closure_trend, combine, lag_closure, make_trails, note_closure
+from tolstat.kernel.revolution.trail import (
+    Trail,
+    closure_trend,
+    combine,
+    lag_closure,
+    make_trails,
+    note_closure,
+    still_to_come,
+)
 from tolstat.kernel.simd.jit import njit
 
 PERIODIC, SLOW, SUBHARMONIC = int(Motion.PERIODIC), int(Motion.SLOW), int(Motion.SUBHARMONIC)
@@ -271,16 +279,18 @@ def conclude_watch(options, trail, turns, out):
 @njit
 def radius_of(i, R):
     """Radius (m) that makes unknown `i` a displacement: 1 if it is one."""
-    return 1.0 if i < 6 * N_LUMPS and i % 6 < 3 else R
+    return 1.0 if (i < 6 * N_LUMPS and i % 6 < 3) or i == S else R
 
 
 @njit
-def set_beside(q, v, a, R, turns):
-    """Start the neighbouring motion at distance `APART`, with a difference in all unknowns; `R`: radius, m."""
+def set_beside(q, v, a, par, turns):
+    """Start the neighbouring motion at distance `APART`, with a difference in all unknowns that can move."""
     turns.growth = 0.0
-    share = APART / math.sqrt(N_DOF)
+    moving = N_DOF if par.slides > 0 else N_DOF - 1
+    share = APART / math.sqrt(moving)
     for i in range(N_DOF):
-        turns.other[0, i] = q[i] + (share if i % 2 == 0 else -share) / radius_of(i, R)
+        apart = (share if i % 2 == 0 else -share) / radius_of(i, par.R)
+        turns.other[0, i] = q[i] + (apart if i < moving else 0.0)
         turns.other[1, i], turns.other[2, i] = v[i], a[i]
 
 
@@ -327,7 +337,7 @@ def after_revolution(point, par, options, samples, past, out):
 
     Parameters
     ----------
-    point : tuple of ndarray, shape (55,)
+    point : tuple of ndarray, shape (56,)
         q, v, a of the joint; exchanged for those of the neighbour, and back.
     par, options
         Joint and settings.
@@ -361,15 +371,16 @@ def after_revolution(point, par, options, samples, past, out):
         return NOT_FINITE, False
     turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
-        out.closure = closure_error(0, samples.size, samples)
-        note_closure(turns.revolution, out.closure, trail.notes)
+        closure = closure_error(0, samples.size, samples)
+        note_closure(turns.revolution, closure, trail.notes)
+        out.closure = still_to_come(turns.revolution, par, trail.notes) * closure
         if repeats(last, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_PERIODIC), False
     elif turns.period == 1 and turns.halved < options.max_refinements and largest_change(turns.before, own) > FAR:
         halve_steps(1, turns, own)
     if turns.limit > BESIDE and turns.revolution >= turns.limit - BESIDE:
         if turns.revolution == turns.limit - BESIDE:
-            set_beside(q, v, a, par.R, turns)
+            set_beside(q, v, a, par, turns)
         else:
             swap(q, v, a, turns)
         return NOT_SETTLED, True

@@ -15,8 +15,8 @@ from tolstat.kernel.mechanics.loads import (
     other_loads,
     output_speed,
 )
-from tolstat.kernel.mechanics.scale import stiffness
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
+from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
+from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, OUTPUT_SHAFT
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
@@ -29,7 +29,8 @@ SAMPLE = np.dtype(
     [
         ("components", "f8", (8, 6)),  # of the bushing loads along and about e, t, z; N, N m
         ("loads", "f8", (N_LOADS,)),  # kind after kind
-        ("change", "f8", (2,)),  # largest change of |F| and |T| against the revolution before
+        ("change", "f8", (2,)),  # largest change of |F| or s as a force, and of |T|, against the revolution before
+        ("s", "f8"),  # displacement of the output shaft along its axis, m
         ("tau", "f8"),
         ("mode", "u1", (4,)),
         ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
@@ -95,7 +96,7 @@ def record(k, lane, in_full, par, work, v, samples):
         The joint.
     work : record of WORK
         The joint's last evaluation.
-    v : ndarray, shape (55,)
+    v : ndarray, shape (56,)
         Velocities at that evaluation, m/s and rad/s.
     samples : ndarray of SAMPLE, shape (n,)
         Written.
@@ -109,6 +110,9 @@ def record(k, lane, in_full, par, work, v, samples):
             change = larger(change, abs(load - sample.loads[i]))  # NaN in the first revolution
             sample.loads[i] = load
         sample.change[kind] = change
+    s = pick(work.pos[OUTPUT_SHAFT, 2], lane)
+    sample.change[0] = larger(sample.change[0], centring_stiffness(lane, par) * abs(s - sample.s))
+    sample.s = s
     if not in_full:
         return
     other_loads(lane, par, work, v, sample.loads)
@@ -131,9 +135,9 @@ def predict_increment(k, q, v, ahead, samples):
     ----------
     k : int
         Number of the grid point, counted from the start.
-    q, v : ndarray, shape (55,)
+    q, v : ndarray, shape (56,)
         Unknowns (m, rad) and velocities (per s).
-    ahead : ndarray, shape (55,)
+    ahead : ndarray, shape (56,)
         Written: predicted increment of q.
     samples : ndarray of SAMPLE, shape (n,)
         The last revolution; written.

@@ -39,7 +39,7 @@ from tolstat.kernel.revolution.settle import (
     step_error,
     summarise,
 )
-from tolstat.kernel.revolution.trail import closure_trend, note_closure
+from tolstat.kernel.revolution.trail import closure_trend, note_closure, still_to_come
 from tolstat.kernel.simd.jit import njit
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
@@ -63,14 +63,14 @@ assemble, eliminate, solve = tangent.assemble, linsolve.factorise, linsolve.solv
 @njit
 def factorise(t, q, v, a, cv, ca, par, options, work):
     """Assemble and factorise the tangent at the state of the last residual, see `integrate.build_integrator`."""
-    assemble(cv, ca, par, work)
+    assemble(cv, ca, cv, par, work)
     return eliminate(work)
 
 
 @njit
 def factorise_static(t, q, v, a, cv, ca, par, options, work):
     """Assemble and factorise the regularised tangent of an equilibrium."""
-    assemble(CV_REGULAR, CA_REGULAR, par, work)
+    assemble(CV_REGULAR, CA_REGULAR, 0.0, par, work)
     return eliminate(work)
 
 
@@ -125,7 +125,7 @@ def clear(par, state, samples, notes):
     state.a0[:] = 0.0
     reset(state)
     for s in range(samples.size):
-        samples[s].loads[:N_AVERAGED] = np.nan
+        samples[s].loads[:N_AVERAGED] = samples[s].s = np.nan
     notes.count = 0
 
 
@@ -214,13 +214,14 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
     out.revolutions = k / n
     if k == n + 2 * twelfth:
-        out.closure = closure_error(twelfth + 1, 2 * twelfth + 1, samples)
+        out.closure = still_to_come(out.revolutions, par, notes) * closure_error(twelfth + 1, 2 * twelfth + 1, samples)
         smooth = out.closure <= EARLY_CLOSURE * options.settle_tol and step_error(par, samples) <= EARLY_STEP_ERROR
         if smooth:
             return OK
     if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
-        out.closure = closure_error(0, n, samples)
-        note_closure(out.revolutions, out.closure, notes)
+        closure = closure_error(0, n, samples)
+        note_closure(out.revolutions, closure, notes)
+        out.closure = still_to_come(out.revolutions, par, notes) * closure
         if out.closure <= options.settle_tol:
             return OK
     return NEWTON_FAILED if iterations > MAX_ITERATIONS * n * options.max_revs else NOT_SETTLED

@@ -21,7 +21,7 @@ def write_starts(rows, options, work, state, starts):
         Numerical settings.
     work, state : records of WORK and State
         Scratch.
-    starts : ndarray, shape (n, 55)
+    starts : ndarray, shape (n, 56)
         Written, except for joints outside the model; m and rad, or m/s^2 and rad/s^2.
     """
     ramp = options.fidelity == DYNAMIC and options.start == RAMP

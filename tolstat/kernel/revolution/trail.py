@@ -11,6 +11,7 @@ import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, LIFE_EXPONENT
 from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.scale import axial_decay
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit
 
@@ -18,6 +19,11 @@ MOST_ANGLES = 360
 """Maximum number of input angles per revolution at which moduli are kept."""
 MOST_CHECKS = 192
 """Maximum number of closure errors kept; older ones are overwritten."""
+SLOW_DECAY = 0.05
+"""Share of a deviation along the output shaft left after a revolution, estimated, from which it is watched: the true
+one stays below a half, where it begins to matter, if the axial stiffness is four times less than estimated."""
+SLOWEST_DECAY = 0.99
+"""Largest share reckoned with: closure errors that no longer fall are rounding, or a change that does not decay."""
 
 
 NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
@@ -81,6 +87,24 @@ def closure_trend(since, notes):
     spread, product = xx - x * x / n, xy - x * y / n
     slope = product / spread
     return slope, math.sqrt(max(0.0, yy - y * y / n - slope * product) / n)
+
+
+@njit
+def still_to_come(revolutions, par, notes):
+    """Changes that a decaying motion still has ahead, in units of its last closure error; at least 1.
+
+    Where each revolution leaves the share rho of the change before, that is rho / (1 - rho). Only the motion of an
+    output shaft along its axis is slow enough to matter. Its rho follows from the closure errors of the last
+    revolution or, before these are known, from the joint's parameters.
+    """
+    rho = axial_decay(par)
+    if rho < SLOW_DECAY:
+        return 1.0
+    slope, _ = closure_trend(revolutions - 1.001, notes)
+    if notes.count > 1 and notes.check[0, 0] < revolutions - 0.99 and slope == slope:
+        rho = 10**slope
+    rho = min(rho, SLOWEST_DECAY)
+    return max(1.0, rho / (1 - rho))
 
 
 @njit

@@ -126,8 +126,8 @@ def test_a_setting_of_the_command_line_changes_one_value(setting: str, old: str,
 
 
 def test_a_setting_adds_the_section_that_is_missing() -> None:
-    made = with_settings(SETTABLE, ["solver.steps_per_rev=90", "solver.fidelity=quasistatic"])
-    assert made == f'{SETTABLE}\n[solver]\nsteps_per_rev = 90\nfidelity = "quasistatic"\n'
+    made = with_settings(SETTABLE, ["sampling.n=90", "sampling.method=random"])
+    assert made == f'{SETTABLE}\n[sampling]\nn = 90\nmethod = "random"\n'
 
 
 @pytest.mark.parametrize(
@@ -138,6 +138,7 @@ def test_a_setting_adds_the_section_that_is_missing() -> None:
         ("operation..alpha=1 deg", "is not a setting"),
         ("tolerances.pin1.offset_t=3", "is in section 'tolerances'"),
         ("joint.base.x=4", "joint.base is no single table"),
+        ("solver.steps_per_rev=90", "is in section 'solver'"),
     ],
 )
 def test_what_cannot_be_set_is_refused(setting: str, said: str) -> None:

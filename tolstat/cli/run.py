@@ -78,8 +78,8 @@ def run(
         typer.Option(
             "--set",
             metavar="KEY=VALUE",
-            help="Key in place of that of the study, joint.shaft.axial=free; with --retry solver.* is for the joints "
-            "simulated again, solver.steps_per_rev=360; repeatable.",
+            help="Key in place of that of the study, joint.shaft.axial=free; with --retry also of the solver for the "
+            "joints simulated again, solver.steps_per_rev=360; repeatable.",
         ),
     ] = None,
     rows: Annotated[
@@ -107,8 +107,8 @@ def run(
     Simulates the joints that are pending in the result file, which is created if missing. To resume after an
     interruption (Ctrl-C, kill, power failure), run the same command again.
 
-    With --set the study is run with another value of a key of its sections joint, operation, solver, sampling, output:
-    give --out, too, and the same --set again to resume.
+    With --set the study is run with another value of a key of its sections joint, operation, sampling or output: give
+    --out, too, and the same --set again to resume.
 
     Prints the share of joints above each limit (see tolstat report) and of those that keep all limits, why joints have
     no valid load, and the next command. Writes the result file, and beside it the curves as PNG, SVG and CSV.
@@ -119,9 +119,9 @@ def run(
     from tolstat.common.files import check_target
 
     limit, part, again = 0.0, None, None
-    faults = _cannot_be_combined(rows, until, retry)
-    retried = [own for own in settings or () if retry is not None and own.startswith("solver.")]
+    retried = [own for own in settings or () if own.startswith("solver.")]
     changes = [own for own in settings or () if own not in retried]
+    faults = _cannot_be_combined(rows, until, retry, retried)
     if scheduler is not None and executor is not Executor.DASK:
         faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     with gather(faults):
@@ -164,12 +164,15 @@ def _workers_ahead(executor: Executor, workers: int | None) -> Iterator[None]:
         yield
 
 
-def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None) -> list[Fault]:
+def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None, settings: list[str]) -> list[Fault]:
     faults = []
     if rows is not None and until is not None:
         faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
     if until is not None and retry is not None:
         faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
+    if settings and retry is None:
+        remedy = "add --retry newton_failed, or edit the study"
+        faults.append(Fault(f"--set {settings[0]!r}", "sets the solver, which --retry alone can", remedy))
     return faults
 
 

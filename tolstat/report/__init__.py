@@ -112,10 +112,8 @@ def build(
             folder = view.path.parent if folder is None else folder
             stem = folder / view.path.stem
             stands_on = fidelity.sentence(store.options, store.fidelity)
-            mounted = text.sentence(in_words(*recorded.mountings(store)))
-            mounted = mounted if width is None else textwrap.fill(mounted, width)
             if store.case_names:
-                return _headed(_noted(_cases(store, stem, width), stands_on), mounted)
+                return _noted(_cases(store, stem, width), stands_on)
             stem = stem.with_name(f"{stem.name}_{point}") if point else stem
             report = (
                 _sweep(view, stem, width)
@@ -125,14 +123,17 @@ def build(
             stopped = _stopped(store.stop) if store.stop.get("reached") else ""
             for note in (query.not_kept(view), stopped, stands_on):
                 report = _noted(report, note)
-            return _headed(report, mounted)
+            return report
     except OSError as error:
         found = f"cannot be written to: {error.strerror or error}"
         raise InputError([Fault(str(folder), found, "give another folder with --out")]) from error
 
 
-def _headed(report: Report, mounted: str) -> Report:
-    return report._replace(table=f"{mounted}\n\n{report.table}")
+def _headed(table: str, store: Reader, width: int | None, verdict: str = "") -> str:
+    """Table below the verdict, if there is one, and below mounting and contact law."""
+    lines = [verdict, in_words(*recorded.mountings(store))]
+    said = [text.sentence(line) for line in lines if line]
+    return "\n".join([*(said if width is None else (textwrap.fill(line, width) for line in said)), "", table])
 
 
 def _noted(report: Report, note: str) -> Report:
@@ -178,12 +179,10 @@ def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Repo
         shown, more = table.fitted(rendering.LIMITS, limits, width)
         if points := query.point_rows(view):
             shown += f"\n\n{rendering.AT_POINTS}\n{table.as_text(rendering.at_points(view), points, width)}"
-    if verdict is not None:
-        sentence = text.sentence(verdict.sentence)
-        shown = f"{sentence if width is None else textwrap.fill(sentence, width)}\n\n{shown}"
-        if verdict.answer and not view.weighted and view.known is None and view.count(*VALID):
-            kept = capabilities.together(capability.limit_rows(view))
-            shown += f"\n\nyield: {kept.value} {kept.words}"
+    shown = _headed(shown, view.store, width, verdict.sentence if verdict else "")
+    if verdict and verdict.answer and not view.weighted and view.known is None and view.count(*VALID):
+        kept = capabilities.together(capability.limit_rows(view))
+        shown += f"\n\nyield: {kept.value} {kept.words}"
     notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]
     return Report(shown, "\n".join(note for note in notes if note), files)
 
@@ -198,7 +197,8 @@ def _sweep(view: View, stem: Path, width: int | None) -> Report:
     shown, more = table.fitted(
         table.plain(short, [str(name) for name in short.columns if "." in str(name)][1:]), short, width
     )
-    return Report(shown, "\n".join(note for note in (more, view.head(), _accuracy(view)) if note), files)
+    notes = "\n".join(note for note in (more, view.head(), _accuracy(view)) if note)
+    return Report(_headed(shown, view.store, width), notes, files)
 
 
 def _accuracy(view: View) -> str:
@@ -219,7 +219,7 @@ def _cases(store: Reader, stem: Path, width: int | None) -> Report:
     )
     if full["note"].any():
         files.append(_text(cases.markdown(full), stem, "cases.md"))
-    return Report(shown, notes, files)
+    return Report(_headed(shown, store, width), notes, files)
 
 
 def _text(content: str, stem: Path, ending: str) -> Path:

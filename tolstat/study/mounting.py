@@ -100,5 +100,6 @@ def note(toleranced: Iterable[str], axial: Iterable[float | str], command: str) 
         return ""
     return (
         "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "
-        f"them: some loads are larger than with a spline. With an output shaft that is free along its axis: {command}"
+        "them: some loads are larger than with a spline.\n"
+        f"With an output shaft that is free along its axis: {command}"
     )

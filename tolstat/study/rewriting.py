@@ -17,8 +17,8 @@ from tomlkit.items import InlineTable, Table
 
 from tolstat.common.errors import Fault, InputError
 
-SETTABLE = ("joint", "operation", "solver", "sampling", "output")
-"""Sections whose keys `with_settings` sets."""
+SETTABLE = ("joint", "operation", "sampling", "output")
+"""Sections whose keys `with_settings` sets; a setting of the solver is one of ``run --retry``."""
 
 
 def with_settings(text: str, settings: Sequence[str]) -> str:
@@ -48,7 +48,7 @@ def with_settings(text: str, settings: Sequence[str]) -> str:
         if not (equals and value.strip() and path and all(path)):
             raise InputError([Fault(place, "is not a setting", "write --set joint.shaft.axial=free")])
         if section not in SETTABLE:
-            allowed = f"keys of {', '.join(SETTABLE)} can be set; edit the study for others"
+            allowed = f"set keys of {', '.join(SETTABLE)}; edit the study for others"
             raise InputError([Fault(place, f"is in section {section!r}", allowed)])
         text = _set(text, [section, *path], given(value), place)
     return text

@@ -101,5 +101,5 @@ def note(toleranced: Iterable[str], axial: Iterable[float | str], command: str) 
     return (
         "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "
         "them: some loads are larger than with a spline.\n"
-        f"With an output shaft that is free along its axis: {command}"
+        f"With a free output shaft: {command}"
     )

@@ -20,7 +20,7 @@ from tolstat.store.new_file import SESSION
 
 DOCS = Path(__file__).parent.parent / "docs"
 FORMAT, MODEL, STUDY = DOCS / "result_format.md", DOCS / "model.md", DOCS / "study.md"
-SCHEMA = DOCS / "schemas" / f"schema{tables.SCHEMA_VERSION}.md"
+SCHEMA = DOCS / "schemas" / "schema.md"
 PAGE = """# Columns of a result file of schema {version}
 
 Datasets of the groups `/errors` and `/results`; what they are about is in [the result file](../result_format.md).

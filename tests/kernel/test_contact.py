@@ -18,7 +18,7 @@ from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, V_NORMAL, make_w
 from tolstat.kernel.revolution import closeup
 from tolstat.solver import simulation
 
-STUDY = ROOT / "studies" / "iso2768_f.toml"
+STUDY = ROOT / "studies" / "rigid_shafts.toml"
 PINS = slice(6 * PIN, 6 * PIN + 24)
 DAMPING = ("c_cross", "c_fork", "c_d", "c_t")
 

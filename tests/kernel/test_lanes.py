@@ -19,7 +19,7 @@ from tolstat.kernel.simd.jit import njit_inner
 from tolstat.kernel.simd.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
 from tolstat.solver import simulation, stationary
 
-STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"
+STUDY = REFERENCE.parents[1] / "studies" / "rigid_shafts.toml"
 FAST = Options(steps_per_rev=45, max_revs=6, max_refinements=0)
 STATIC = FAST._replace(fidelity=int(Fidelity.QUASISTATIC))
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tolstat.common.fields import Field, Kind, dtype_of
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 7
+SCHEMA_VERSION = 8
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
 PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
@@ -254,6 +254,7 @@ def _error_fields() -> tuple[Field, ...]:
             "factor on Young's modulus: bushings, their damping, contact coefficients",
         ),
         *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in PINS),
+        Field("operation.axial_force", "N", "deviation of the axial force on the output shaft"),
     ]
     return tuple(fields)
 

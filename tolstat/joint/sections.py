@@ -158,10 +158,54 @@ class Hub(Strict):
     inertia: Annotated[Triple, follows("hub.inertia", "moments of inertia about x, y, z of the cross")] = FOLLOWS
 
 
+RIGID, FREE = "rigid", "free"
+"""Words of ``shaft.axial``."""
+
+
 class Shaft(Strict):
-    """Output shaft."""
+    """Output shaft, and what holds it along its axis.
+
+    A shaft that is not rigid along its axis needs the mass that moves and the damping of its motion.
+    """
 
     Js: Annotated[Inertia, Field(description="inertia of the output shaft about its axis")]
+    mass: Annotated[
+        Mass | None, Field(description="mass that moves along the axis; needed unless `axial` is rigid")
+    ] = None
+    axial_damping: Annotated[
+        Annotated[units.Damping, NOT_NEGATIVE] | None,
+        Field(description="damping of the motion along the axis, as by grease; needed unless `axial` is rigid"),
+    ] = None
+    axial: Annotated[
+        float | str,
+        units.Quantity("N/m", words=(RIGID, FREE)),
+        POSITIVE,
+        Field(
+            description="what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose "
+            "bearing; or the stiffness of the bearings of both shafts in series",
+            examples=[FREE],
+        ),
+    ] = RIGID
+
+    @field_validator("axial")
+    @classmethod
+    def _can_move(cls, value: float | str, info: ValidationInfo) -> float | str:
+        lacking = [key for key in ("mass", "axial_damping") if key in info.data and info.data[key] is None]
+        if value != RIGID and lacking:
+            found = f"a shaft that is not rigid along its axis needs {' and '.join(lacking)}"
+            given = {"mass": 'mass = "5 kg"', "axial_damping": 'axial_damping = "2e4 N*s/m"'}
+            raise refuse(found, f'give {", ".join(given[key] for key in lacking)} with your values, or axial = "rigid"')
+        return value
+
+    @property
+    def slides(self) -> bool:
+        """Whether the shaft may move along its axis."""
+        return self.axial != RIGID
+
+    @property
+    def k_a(self) -> float:
+        """Axial stiffness of the shafts' bearings, N/m; 0 where the shaft is free, and where it is rigid."""
+        return 0.0 if isinstance(self.axial, str) else self.axial
 
 
 class Cross(Strict):

@@ -78,7 +78,7 @@ def motion_table() -> str:
 
 def law_table() -> str:
     """Markdown table of the contact laws, a line for each kind of station."""
-    lines = ["| law | stations at s | k1, k2 of a station | weight |", "|---|---|---|---|"]
+    lines = ["| law | stations at s | coefficients of a station | weight |", "|---|---|---|---|"]
     for name, law in LAWS.items():
         for i, row in enumerate(law.rows):
             lines.append(" | ".join(["|" if i else f"| `{name}`", *row]) + " |")

@@ -119,7 +119,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     if joint.shaft.slides:
         params["F_a"] = point["axial_force"]
     factor = errors["material.E_factor"]
-    for name in ("k_cross", "k_fork", "station_k1", "station_k2"):
+    for name in ("k_cross", "k_fork", "station_k1", "station_k2", "station_k3"):
         params[name] *= factor[:, None]
     with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
         for name in ("c_cross", "c_fork"):
@@ -136,9 +136,9 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
 def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that do not depend on the errors, at factor 1 on E."""
     pin, arm = joint.pin, joint.arm
-    stations = joint.contact.springs()
+    stations = joint.contact.springs(joint.bearing)
     n_stations = len(stations.s)
-    padding = (0, MAX_STATIONS - n_stations)
+    columns = {f"station_{name}": getattr(stations, name) for name in ("s", "k1", "k2", "k3", "weight")}
     xi, shaft = joint.bushing.xi, joint.shaft
     return {
         "Js": shaft.Js,
@@ -163,7 +163,8 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "c_t": joint.contact.c_t,
         "delta_d": joint.contact.delta_d,
         "n_stations": n_stations,
-    } | {f"station_{name}": np.pad(values, padding) for name, values in stations._asdict().items()}
+        "needle_b": stations.b,
+    } | {name: np.pad(values, (0, MAX_STATIONS - n_stations)) for name, values in columns.items()}
 
 
 def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:

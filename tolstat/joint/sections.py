@@ -29,10 +29,17 @@ Stress = Annotated[units.Stress, POSITIVE]
 Mass = Annotated[units.Mass, POSITIVE]
 Inertia = Annotated[units.Inertia, POSITIVE]
 Density = Annotated[units.Density, POSITIVE]
+Force = Annotated[float, units.Quantity("N"), POSITIVE]
 Stiffness = Annotated[units.Stiffness, POSITIVE]
 RotaryStiffness = Annotated[units.RotaryStiffness, POSITIVE]
 Number = Annotated[units.Number, POSITIVE]
 Ratio = Annotated[units.Number, NOT_NEGATIVE]
+
+
+def _modulus(E: float) -> float:
+    if E < LEAST_E:
+        raise refuse("{E} is not Young's modulus of a metal", "check its unit; steel has 210 GPa", "E")
+    return E
 
 
 def _poisson(nu: float) -> float:
@@ -49,6 +56,8 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
     return inertia
 
 
+LEAST_E = 1e9
+"""Young's modulus (Pa) below that of any metal."""
 Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
 
 
@@ -83,7 +92,7 @@ def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
 class Material(Strict):
     """Material of all parts."""
 
-    E: Annotated[Stress, Field(description="Young's modulus")]
+    E: Annotated[Annotated[Stress, AfterValidator(_modulus)], Field(description="Young's modulus")]
     nu: Annotated[
         Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
     ]

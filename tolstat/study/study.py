@@ -16,7 +16,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
 from tolstat.common.strict import dotted
 from tolstat.common.tables import DESIGN, Variant
-from tolstat.joint import AFFECT_NOTHING, Joint, Operation
+from tolstat.joint import Joint, Operation, affecting_results
 from tolstat.joint.mounting import in_words
 from tolstat.study import listing, mounting
 from tolstat.study.axes import Axis
@@ -237,11 +237,11 @@ class Study(Case):
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.
 
-        Limits, bearings, comments and the file's name do not belong to it. Two studies of equal identity have the
-        same rows with the same results.
+        Limits, lives of bearings, comments and the file's name do not belong to it. Two studies of equal identity have
+        the same rows with the same results.
         """
         parts: dict[str, Any] = {
-            "joint": {k: v for k, v in self.joint.given("json").items() if k not in AFFECT_NOTHING},
+            "joint": affecting_results(self.joint.given("json")),
             "operation": self._operation_identity(),
             "solver": self.solver.model_dump(),
             "errors": self.errors,

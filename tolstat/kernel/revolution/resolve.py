@@ -28,7 +28,7 @@ from tolstat.kernel.revolution.trail import (
     lag_closure,
     make_trails,
     note_closure,
-    still_to_come,
+    with_slow_decay,
 )
 from tolstat.kernel.simd.jit import njit
 
@@ -373,7 +373,7 @@ def after_revolution(point, par, options, samples, past, out):
     if last > turns.since:
         closure = closure_error(0, samples.size, samples)
         note_closure(turns.revolution, closure, trail.notes)
-        out.closure = still_to_come(turns.revolution, par, trail.notes) * closure
+        out.closure = with_slow_decay(closure, turns.revolution, par, trail.notes)
         if repeats(last, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_PERIODIC), False
     elif turns.period == 1 and turns.halved < options.max_refinements and largest_change(turns.before, own) > FAR:

@@ -90,21 +90,30 @@ def closure_trend(since, notes):
 
 
 @njit
-def still_to_come(revolutions, par, notes):
-    """Changes that a decaying motion still has ahead, in units of its last closure error; at least 1.
+def with_slow_decay(closure, revolutions, par, notes):
+    """Closure error, or what a slow decay still has ahead if that is more, up to 1, the whole load.
 
-    Where each revolution leaves the share rho of the change before, that is rho / (1 - rho). Only the motion of an
-    output shaft along its axis is slow enough to matter. Its rho follows from the closure errors of the last
-    revolution or, before these are known, from the joint's parameters.
+    Where each revolution leaves the share rho of the change before, those ahead sum to rho / (1 - rho) of the last
+    one. Only the motion of an output shaft along its axis is slow enough to matter. Its rho follows from the closure
+    errors of the last revolution or, before these are known, from the joint's parameters.
+
+    Parameters
+    ----------
+    closure : float
+        Closure error, the last of those noted, if any is.
+    revolutions : float
+        Revolutions at its end.
+    par, notes
+        As in all kernels.
     """
     rho = axial_decay(par)
     if rho < SLOW_DECAY:
-        return 1.0
+        return closure
     slope, _ = closure_trend(revolutions - 1.001, notes)
     if notes.count > 1 and notes.check[0, 0] < revolutions - 0.99 and slope == slope:
         rho = 10**slope
     rho = min(rho, SLOWEST_DECAY)
-    return max(1.0, rho / (1 - rho))
+    return max(closure, min(1.0, closure * rho / (1 - rho)))
 
 
 @njit

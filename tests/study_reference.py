@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.loads import LOADS
 from tolstat.common.selected_results import OPTIONAL_FIELDS
-from tolstat.common.tables import ERROR_FIELDS, LOAD_KINDS
+from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation
 from tolstat.joint.contact import Station
 from tolstat.study.costs import CostEntry
@@ -173,7 +174,7 @@ def loads() -> str:
     """Table of the loads that can have a limit."""
     lines = ["| load | unit | meaning |", "|---|---|---|"]
     for of in LOAD_KINDS:
-        names = [name for name, load in LOADS.items() if load.kind == of.name]
+        names = [name for name, load in LOADS.items() if load.kind == of]
         text = f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "")
         lines.append(f"| {text} | {'' if of.unit == '1' else of.unit} | largest {of.meaning} |")
     return "\n".join(lines)

@@ -24,7 +24,7 @@ class Evidence(NamedTuple):
     gamma : ndarray, shape (m, 8, 2)
         Gamma of force and torque with sign, per cent.
     contact : ndarray, shape (m, 4, 3)
-        Largest contact forces of each pin, in the order of `tables.CONTACTS`, N.
+        Largest contact forces of each pin, in the order of `load_kinds.CONTACTS`, N.
     psi : ndarray, shape (m,)
         Largest error of the speed ratio.
     spectra : ndarray, shape (m, orders, 8, 2)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from studies.cirelli2021.evidence import Evidence
 from studies.cirelli2021.statements import answers
 from studies.cirelli2021.tables import OUTPUT_SIDE
-from tolstat.common.tables import BUSHINGS
+from tolstat.common.load_kinds import BUSHINGS
 
 Array = NDArray[np.float64]
 

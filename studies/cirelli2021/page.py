@@ -23,7 +23,7 @@ from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_main import revolutions
 from studies.cirelli2021.page_source import PaperStudy
 from tolstat.common.files import atomic_write
-from tolstat.common.tables import BUSHINGS
+from tolstat.common.load_kinds import BUSHINGS
 from tolstat.display import style, text
 
 DPI = 110

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_source import PaperStudy
-from tolstat.common.tables import CONTACTS, INNER, OUTER
+from tolstat.common.load_kinds import CONTACTS, INNER, OUTER
 from tolstat.display import style
 from tolstat.joint import ideal
 
@@ -79,7 +79,7 @@ def bushings(study: PaperStudy, which: tuple[int, int], alpha: float, numbers: s
     study : PaperStudy
         The study.
     which : tuple of int
-        Indices of the bushings, see `tables.BUSHINGS`.
+        Indices of the bushings, see `load_kinds.BUSHINGS`.
     alpha : float
         Misalignment, rad.
     numbers : str

@@ -41,7 +41,7 @@ class Main:
     couple : ndarray, shape (m, samples)
         Couple of cross bushings 1 and 2 about the cross's normal, N m.
     contact : ndarray, shape (m, samples, 4, 3)
-        Contact forces of pins 1 to 4, in the order of `tables.CONTACTS`, N.
+        Contact forces of pins 1 to 4, in the order of `load_kinds.CONTACTS`, N.
     tau : ndarray, shape (m, samples)
         Speed ratio.
     """

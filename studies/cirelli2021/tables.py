@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import BUSHINGS
+from tolstat.common.load_kinds import BUSHINGS
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]
@@ -38,7 +38,7 @@ class Printed(NamedTuple):
     alpha : ndarray, shape (2,)
         Misalignments, rad.
     gamma : ndarray, shape (4, 2, 8, 2)
-        Case, misalignment, bushing (order of `tables.BUSHINGS`), force and torque; per cent.
+        Case, misalignment, bushing (order of `load_kinds.BUSHINGS`), force and torque; per cent.
     tables : ndarray of int, shape (2, 2)
         Number of the paper's table: misalignment; cross and fork.
     """

@@ -11,7 +11,8 @@ from tests.support.loads import largest_loads
 from tolstat.benchmarks import integrators
 from tolstat.benchmarks.integrators import Integrator, both_ways
 from tolstat.benchmarks.runs import OtherJob, OwnJob, failures, largest_of
-from tolstat.common.tables import RESULT, SPAN, Options, Status
+from tolstat.common.load_kinds import SPAN
+from tolstat.common.tables import RESULT, Options, Status
 from tolstat.solver.reference import FirstOrder, first_order
 
 EVERY = both_ways(("Radau", "BDF", "LSODA", "CVODE", "Exudyn"))

@@ -30,9 +30,9 @@ def test_medians_and_failures_are_counted_by_hand():
     points, truth = table.build(RUNS)
     assert list(points["contender"]) == ["A", "A", "Radau, our Jacobian", "CVODE"]
     coarse = points.iloc[0]
-    assert coarse["loads"] == coarse["force"] == pytest.approx(2e-3)
+    assert coarse["loads"] == coarse["F"] == pytest.approx(2e-3)
     assert coarse["loads_worst"] == pytest.approx(3e-3)
-    assert coarse["torque"] == coarse["contact"] == coarse["psi"] == 0.0
+    assert coarse["T"] == coarse["contact"] == coarse["psi"] == 0.0
     assert coarse["ms"] == pytest.approx(2.0)
     assert coarse["halvings"] == 1.0
     other = points.iloc[2]

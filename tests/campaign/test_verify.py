@@ -18,8 +18,9 @@ from tolstat.analysis import accuracy
 from tolstat.campaign import checks, verify
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError, StoreError
+from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.solver_options import from_names
-from tolstat.common.tables import LOAD_KINDS, Method, Options, Simulation, Start, Status
+from tolstat.common.tables import Method, Options, Simulation, Start, Status
 from tolstat.questions.accuracy import query as tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.exceedance import query as exceedance
@@ -156,7 +157,7 @@ def test_errors_are_relative_to_the_largest_of_the_kind():
     found = accuracy.differences(base, other)
     assert found[0, 2] == pytest.approx(-0.02, rel=0.03)
     assert np.count_nonzero(found[0]) == 1
-    assert accuracy.by_kind(found)[1] == pytest.approx([0.2 if kind.name == "T" else 0 for kind in LOAD_KINDS])
+    assert accuracy.by_kind(found)[1] == pytest.approx([0.2 if kind.key == "T" else 0 for kind in LOAD_KINDS])
     assert np.isnan(found[2]).all()
     assert accuracy.spread(accuracy.by_kind(found)[:, 1]) == pytest.approx((2, 0.1, 0.2, 0.2))
     assert accuracy.spread(found[2])[0] == 0

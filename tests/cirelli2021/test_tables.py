@@ -17,7 +17,8 @@ from studies.cirelli2021 import spectra as paper_spectra
 from studies.cirelli2021 import statics as paper_statics
 from studies.cirelli2021 import tables as paper
 from tolstat.analysis.gamma import gamma as relative_errors
-from tolstat.common.tables import BUSHINGS, RESULT, Status
+from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.tables import RESULT, Status
 from tolstat.joint import ideal
 
 

@@ -21,7 +21,8 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.executors import WorkerDied
 from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
-from tolstat.common.tables import BUSHINGS, Simulation, Status
+from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.tables import Simulation, Status
 from tolstat.display import text
 from tolstat.questions import QUESTIONS
 from tolstat.store import Reader

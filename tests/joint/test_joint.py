@@ -13,9 +13,10 @@ from scipy.spatial.transform import Rotation
 from tolstat import joint as joints
 from tolstat.common import files
 from tolstat.common.errors import InputError
+from tolstat.common.load_kinds import PINS
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import validate
-from tolstat.common.tables import ERROR_FIELDS, HOLES, PARAM, PINS
+from tolstat.common.tables import ERROR_FIELDS, HOLES, PARAM
 from tolstat.joint import Joint, Operation, material
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
 from tolstat.kernel.mechanics.topology import ARM_OF_PIN

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolstat.common.tables import CONTACTS, KERNEL_RESULT, RESULTANT, SPAN, Fidelity, Method, Options
+from tolstat.common.load_kinds import CONTACTS, RESULTANT, SPAN
+from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
 from tolstat.kernel.revolution.settle import make_samples
 from tolstat.solver.simulation import simulate_rows

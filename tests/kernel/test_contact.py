@@ -10,7 +10,8 @@ from tests.conftest import with_law
 from tests.measure import stability
 from tests.support.environment import ROOT
 from tolstat import joint as joints
-from tolstat.common.tables import RESULT, RESULTANT, SPAN, Options, iterations_allowed
+from tolstat.common.load_kinds import RESULTANT, SPAN
+from tolstat.common.tables import RESULT, Options, iterations_allowed
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.mechanics import dynamics, rotation
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PIN, S

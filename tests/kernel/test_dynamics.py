@@ -8,7 +8,8 @@ import pytest
 from tests.conftest import sliding, with_law
 from tests.support import naive
 from tolstat.benchmarks.cost.dense import dense
-from tolstat.common.tables import RESULTANT, Mode, Options
+from tolstat.common.load_kinds import RESULTANT
+from tolstat.common.tables import Mode, Options
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.motion import ideal_motion

@@ -139,13 +139,11 @@ def test_peaks_between_steps_are_met() -> None:
     forget(True, peaks)
     curve = 3 + np.sin(0.3 * np.arange(25) + 0.2)
     for value in curve:
-        peaks.now[2] = value
-        follow_value(2, peaks)
+        follow_value(2, value, peaks)
     assert curve.max() < 4 - 1e-3
     assert peaks.top[2] == pytest.approx(4, abs=2e-4)
     assert (peaks.one[2], peaks.two[2]) == (curve[-1], curve[-2])
     forget(True, peaks)
     for value in (5.0, 4.0, 3.0):
-        peaks.now[2] = value
-        follow_value(2, peaks)
+        follow_value(2, value, peaks)
     assert peaks.top[2] == 5.0

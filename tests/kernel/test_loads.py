@@ -7,19 +7,13 @@ import pytest
 
 from tests.support import synthetic
 from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.loads import KINDS, LOADS, largest, of_kind, put_largest
-from tolstat.common.tables import (
-    KERNEL_RESULT,
-    LOAD_KINDS,
-    RESULT,
-    RESULT_FIELDS,
-    SPAN,
-    Options,
-    Status,
-    for_kernels,
-    without_results,
-)
-from tolstat.kernel.mechanics.loads import N_AVERAGED, N_LOADS
+from tolstat.common.load_kinds import CHANNELS, KIND, LOAD_KINDS, SPAN, measure_of
+from tolstat.common.loads import LOADS, largest, of_kind, put_largest
+from tolstat.common.tables import KERNEL_RESULT, RESULT, RESULT_FIELDS, Options, Status, for_kernels, without_results
+from tolstat.kernel.mechanics import dynamics, ideal_loads, loads
+from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_AVERAGED, N_INSTANT, N_LOADS, OF_MEASURE, OTHERS
+from tolstat.kernel.mechanics.work import make_work
+from tolstat.kernel.revolution.simulate import make_scratch
 from tolstat.solver.simulation import simulate_rows
 
 
@@ -32,11 +26,11 @@ def test_kernels_see_the_same_bytes() -> None:
     rows.average[:], rows.range[:], rows.lyapunov[:] = rows.largest[:, :N_AVERAGED], -1.0, 7.0
     np.testing.assert_array_equal(largest(table), rows.largest)
     for kind in LOAD_KINDS:
-        expected = rows.largest[:, SPAN[kind.name]].reshape(3, *kind.shape)
-        np.testing.assert_array_equal(table[f"{kind.name}_max"], expected)
+        expected = rows.largest[:, SPAN[kind.key]].reshape(3, *kind.shape)
+        np.testing.assert_array_equal(table[f"{kind.key}_max"], expected)
         if kind.averaged:
-            np.testing.assert_array_equal(table[f"{kind.name}_mean"], expected)
-            assert (table[f"{kind.name}_range"] == -1).all()
+            np.testing.assert_array_equal(table[f"{kind.key}_mean"], expected)
+            assert (table[f"{kind.key}_range"] == -1).all()
     assert (table["lyapunov"] == 7).all()
 
 
@@ -45,10 +39,67 @@ def test_kinds_with_mean_and_range_come_first() -> None:
     assert averaged == sorted(averaged, reverse=True)
 
 
+def test_kinds_that_need_a_whole_revolution_come_last() -> None:
+    orders = [bool(kind.orders) for kind in LOAD_KINDS]
+    assert orders == sorted(orders)
+
+
+def test_no_two_loads_share_a_name_a_field_or_a_column() -> None:
+    names = [name for kind in LOAD_KINDS for _, name in kind.loads()]
+    fields = [field.name for field in RESULT_FIELDS]
+    columns = [column.name for column in RESULT_COLUMNS]
+    for several in (names, fields, columns):
+        assert len(set(several)) == len(several)
+    assert len({kind.key for kind in LOAD_KINDS}) == len(LOAD_KINDS)
+    assert not set(names) & set(fields)
+    assert not set(names) & set(columns)
+    assert set(CHANNELS) & set(names) == {name for name in names if LOADS[name].kind.components}
+
+
+def test_a_name_is_place_and_symbol() -> None:
+    for name, load in LOADS.items():
+        assert name in {".".join(filter(None, (load.place.name, symbol))) for symbol in load.kind.symbols}
+        assert load.place.name in load.kind.places
+
+
+def test_loads_that_decide_are_compared_with_their_measure() -> None:
+    """Indices of the kernel against the registry: each deciding load once, beside the loads of its measure."""
+    of_load = np.repeat([kind.key for kind in LOAD_KINDS], [kind.size for kind in LOAD_KINDS])
+    assert sorted([*DECIDING, *OTHERS]) == list(range(N_INSTANT))
+    for (first, last), (begin, end) in zip(MEASURES, OF_MEASURE, strict=True):
+        (measure,) = set(of_load[first:last])
+        assert {measure_of(KIND[key]).key for key in of_load[DECIDING[begin:end]]} == {measure}
+        assert set(range(first, last)) <= set(DECIDING[begin:end])
+    assert {of_load[i] for i in DECIDING} == {kind.key for kind in LOAD_KINDS if kind.decides}
+
+
+def written(evaluate) -> dict[str, np.ndarray]:
+    """Fields of the work record that hold numbers after an evaluation, with which of their elements do."""
+    work = make_work()
+    evaluate(work)
+    return {name: np.isfinite(work[name]) for name in work.dtype.names}
+
+
+def test_ideal_loads_and_equations_of_motion_fill_the_same_fields(params) -> None:
+    """All that loads follow from, in the ideal joint as in the dynamic one."""
+    par, options = params(alpha=0.2)[0], Options()
+    state = make_scratch(options).state
+    state.q0[:] = state.v0[:] = 0.0
+    dynamic = written(lambda work: dynamics.forces(0.01, state.q0, state.v0, par, work))
+    ideal = written(lambda work: ideal_loads.ideal_loads(0.5, par, state, work))
+    for name in ("load", "contact", "mode", "force", "shaft", "turned", "pos", "vel"):
+        assert dynamic[name].all(), name
+        assert ideal[name].all(), name
+    work = make_work()
+    ideal_loads.ideal_loads(0.5, par, state, work)
+    loads.write_loads(0, 0.0, par, work)
+    assert np.isfinite(work.loads).all()
+
+
 def test_each_load_is_the_largest_of_its_columns() -> None:
     table = synthetic.results(20)
     columns = {column.name: column for column in RESULT_COLUMNS}
-    assert len(LOADS) == sum(of_kind(table, kind).shape[1] for kind in KINDS)
+    assert len(LOADS) == sum(of_kind(table, kind).shape[1] for kind in LOAD_KINDS)
     for name, load in LOADS.items():
         assert {columns[column].unit for column in load.columns} == {load.unit}
         expected = np.max([columns[column].of(table) for column in load.columns], axis=0)
@@ -70,8 +121,8 @@ def test_every_load_is_computed_at_every_fidelity(params, fidelity: int) -> None
     (row,) = made.results
     assert row["status"] == Status.OK
     assert (largest(made.results) >= 0).all()
-    loads, contact = made.histories["loads"][0], made.histories["contact"][0]
+    components, contact = made.histories["loads"][0], made.histories["contact"][0]
     for kind, first in (("F", 0), ("T", 3)):
-        moduli = np.linalg.norm(loads[..., first : first + 3], axis=2).max(axis=0)
+        moduli = np.linalg.norm(components[..., first : first + 3], axis=2).max(axis=0)
         np.testing.assert_allclose(row[f"{kind}_max"], moduli, rtol=2e-3)
     np.testing.assert_allclose(row["contact_max"], contact.max(axis=0), rtol=2e-3, atol=1e-3)

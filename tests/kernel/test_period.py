@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolstat.common.tables import KERNEL_RESULT, SPAN, Method, Motion, Options, Status
+from tolstat.common.load_kinds import SPAN
+from tolstat.common.tables import KERNEL_RESULT, Method, Motion, Options, Status
 from tolstat.kernel.revolution.trail import Trail, closure_trend, combine, lag_closure, make_trails, note_closure
 from tolstat.solver.simulation import simulate_rows
 
@@ -106,13 +107,13 @@ def test_closure_over_several_revolutions_finds_the_period():
     rng = np.random.default_rng(2)
     three = rng.uniform(1, 2, (3, 36, 16))
     for r in range(20):
-        trail.modulus[r % 10] = three[r % 3]
+        trail.loads[r % 10] = three[r % 3]
     closures = [lag_closure(19, lag, trail) for lag in range(1, 9)]
     assert [c == 0 for c in closures] == [False, False, True, False, False, True, False, False]
     kinds = [SPAN["F"], SPAN["T"]]
     change = [np.abs(three[1] - three[0])[:, kind].max() / three[1][:, kind].max() for kind in kinds]
     assert closures[0] == pytest.approx(max(change))
-    trail.modulus[19 % 10, 5, 11] = np.nan
+    trail.loads[19 % 10, 5, 11] = np.nan
     assert np.isnan(lag_closure(19, 3, trail))
 
 

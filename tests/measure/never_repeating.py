@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
 from tolstat.common import tables
-from tolstat.common.tables import RESULT, SPAN, Motion, Options, Status
+from tolstat.common.load_kinds import SPAN
+from tolstat.common.tables import RESULT, Motion, Options, Status
 from tolstat.solver import refinement
 from tolstat.solver.reference import first_order
 from tolstat.solver.simulation import explicit_steps, simulate_rows, simulate_together

@@ -17,7 +17,8 @@ from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
 from tolstat.benchmarks.integrators import Code, Integrator, solve
 from tolstat.benchmarks.runs import largest_of
-from tolstat.common.tables import SPAN, Method, Options
+from tolstat.common.load_kinds import SPAN
+from tolstat.common.tables import Method, Options
 from tolstat.solver.reference import FirstOrder, Largest, first_order
 from tolstat.solver.simulation import simulate_rows
 

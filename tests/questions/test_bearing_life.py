@@ -14,7 +14,8 @@ from tolstat import joint
 from tolstat.analysis.exceedance import clopper_pearson
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.tables import PINS, Mode, Status
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import Mode, Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table, Text
 from tolstat.joint import Operation

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.support import naive
 from tolstat.analysis import cycles, damage
 from tolstat.analysis.cycles import Cycles
-from tolstat.common.tables import CHANNELS
+from tolstat.common.load_kinds import CHANNELS
 from tolstat.solver import rainflow
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4]

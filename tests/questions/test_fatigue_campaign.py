@@ -17,7 +17,7 @@ from tests.support import synthetic
 from tests.support.environment import ROOT
 from tolstat.analysis import damage
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.tables import CHANNELS
+from tolstat.common.load_kinds import CHANNELS
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table, Text
 from tolstat.questions.fatigue import pylife, rendering

@@ -15,7 +15,8 @@ import tolstat
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
 from tolstat.common.errors import InputError
-from tolstat.common.tables import BUSHINGS, Status
+from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table
 from tolstat.questions.fatigue import parts, parts_rendering

@@ -10,7 +10,8 @@ from tests.support import synthetic
 from tests.support.views import OPERATION
 from tolstat import sampling, study
 from tolstat.common.errors import StoreError
-from tolstat.common.tables import ERROR, PINS, Simulation
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import ERROR, Simulation
 from tolstat.display.asked import Asked
 from tolstat.joint import HOLE_OF_PIN, load, perturb
 from tolstat.questions.causes import pairs_section

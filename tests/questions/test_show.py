@@ -17,8 +17,9 @@ from tests.support import naive, synthetic
 from tests.support.environment import ROOT
 from tolstat import joint as joints
 from tolstat.cli import app
+from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import HOLES, PINS
+from tolstat.common.tables import HOLES
 from tolstat.display import drawing
 from tolstat.display.asked import Asked
 from tolstat.display.joint_drawing import error_kinds, front, one_joint, side

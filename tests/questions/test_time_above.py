@@ -12,11 +12,12 @@ from tests.support import synthetic
 from tolstat import cli, sampling, study
 from tolstat.analysis import exceedance
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.tables import CHANNELS, Options, Simulation
+from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.tables import Options, Simulation
 from tolstat.questions.time_above import rendering
 from tolstat.questions.time_above.query import time_above
 from tolstat.solver.simulation import history_specs
-from tolstat.store import Reader, ResultStore, revolutions
+from tolstat.store import Reader, ResultStore
 
 SEEDS = 500
 SAMPLES = 720
@@ -89,9 +90,9 @@ def test_the_mean_time_is_covered_where_few_joints_exceed_a_level_and_students_i
 def test_channels_are_components_and_moduli():
     loads = np.random.default_rng(1).normal(size=(2, 5, 8, 6))
     for name in CHANNELS:
-        assert revolutions.channel(loads, name).shape == (2, 5)
-    np.testing.assert_array_equal(revolutions.channel(loads, "fork2.T_t"), loads[:, :, 5, 4])
-    np.testing.assert_allclose(revolutions.channel(loads, "cross3.T") ** 2, (loads[:, :, 2, 3:] ** 2).sum(axis=-1))
+        assert CHANNELS[name].of(loads).shape == (2, 5)
+    np.testing.assert_array_equal(CHANNELS["fork2.T_t"].of(loads), loads[:, :, 5, 4])
+    np.testing.assert_allclose(CHANNELS["cross3.T"].of(loads) ** 2, (loads[:, :, 2, 3:] ** 2).sum(axis=-1))
 
 
 @pytest.mark.slow

@@ -168,10 +168,10 @@ def test_joints_are_simulated_again_once_in_any_number_of_processes(path, tmp_pa
 
 
 def drawn(store, slots, most_angles=60):
-    """Stands for `revolutions.read`: moduli without a simulation."""
-    moduli = 600.0 + np.random.default_rng(5).normal(size=(2, len(slots), most_angles, 8))
+    """Stands for `revolutions.read`: loads without a simulation."""
+    loads = 600.0 + np.random.default_rng(5).normal(size=(len(slots), most_angles, 8, 6))
     angles = 2.0 * np.pi * np.arange(most_angles) / most_angles
-    return revolutions.Revolutions(angles, *moduli, "simulated again", 0.0)
+    return revolutions.Revolutions(angles, loads, "simulated again", 0.0)
 
 
 def test_colours_of_the_pictures_follow_the_scheme(html):

@@ -14,7 +14,8 @@ from tests.support.environment import ROOT
 from tests.support.views import swept, view
 from tolstat import joint, report
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.tables import BUSHINGS, Status
+from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.tables import Status
 from tolstat.display import style
 from tolstat.display.table import as_text
 from tolstat.joint.derived import DERIVED

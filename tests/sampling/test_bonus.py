@@ -13,7 +13,8 @@ from scipy.special import ndtr
 from tests.support.synthetic import HEAD
 from tolstat import joint, sampling, study
 from tolstat.common.errors import InputError
-from tolstat.common.tables import HOLES, PINS
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import HOLES
 from tolstat.study import scaling
 from tolstat.study.bonus import Bonus
 from tolstat.study.change import changed

@@ -12,7 +12,8 @@ from scipy import stats
 from tests.support.synthetic import HEAD
 from tolstat import sampling, study
 from tolstat.common.errors import InputError
-from tolstat.common.tables import HOLES, PINS
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import HOLES
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, perturb
 from tolstat.study import Study, axes
 from tolstat.study.tolerances import meaning

@@ -13,7 +13,8 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
 from tolstat.campaign.remedy import remedy
 from tolstat.common.errors import InputError
-from tolstat.common.tables import FAILED, LOAD_KINDS, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
+from tolstat.common.load_kinds import LOAD_KINDS
+from tolstat.common.tables import FAILED, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
 from tolstat.report import build, cases
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader, ResultStore, verification

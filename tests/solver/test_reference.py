@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import REFERENCE
 from tolstat import joint, study
-from tolstat.common.loads import KINDS
+from tolstat.common.load_kinds import SPAN
 from tolstat.common.tables import Options, Status
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.solver.reference import first_order, reference_rows
@@ -47,7 +47,7 @@ def test_limit_of_the_solver():
     par = case("ang_cross_z_15")
     fine = simulate_rows(par, OPTIONS._replace(steps_per_rev=2880, settle_tol=1e-6)).results[0]
     row = reference_rows(par, OPTIONS)[0]
-    for kind in KINDS:
+    for kind in SPAN:
         size = fine[f"{kind}_max"].max()
         within = (2e-5 if kind == "psi" else 2e-6) * size
         np.testing.assert_allclose(row[f"{kind}_max"], fine[f"{kind}_max"], rtol=0, atol=within, err_msg=kind)
@@ -100,4 +100,4 @@ def test_what_cannot_be_solved_says_so_and_is_nan(params):
     assert impossible["status"] == Status.OUTSIDE_MODEL
     for row in (given_up, impossible):
         assert not row["settled"]
-        assert all(np.isnan(row[f"{kind}_max"]).all() for kind in KINDS)
+        assert all(np.isnan(row[f"{kind}_max"]).all() for kind in SPAN)

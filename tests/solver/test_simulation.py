@@ -12,18 +12,8 @@ import pytest
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
 from tolstat import joint, study
 from tolstat.campaign import trace
-from tolstat.common.tables import (
-    RESULT,
-    RESULTANT,
-    SIMULATED,
-    Fidelity,
-    Method,
-    Mode,
-    Options,
-    Start,
-    Status,
-    iterations_allowed,
-)
+from tolstat.common.load_kinds import RESULTANT
+from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Method, Mode, Options, Start, Status, iterations_allowed
 from tolstat.joint import ideal
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.work import FORCE, make_work

@@ -12,7 +12,7 @@ from tests.support import synthetic
 from tolstat import cli
 from tolstat.common.columns import ERROR_COLUMNS
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.loads import BUSHING_LOADS
+from tolstat.common.loads import SHOWN_LOADS
 from tolstat.questions.capability import query as capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import summary
@@ -38,7 +38,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
         pd.testing.assert_frame_equal(
             told, table.replace([float("inf"), -float("inf")], float("nan")), check_exact=False
         )
-    assert len(found["quantiles"]) == 4 * len(BUSHING_LOADS)
+    assert len(found["quantiles"]) == 4 * len(SHOWN_LOADS)
     assert found["causes"]["cross1.F"]["table"][0]["error"] == "pin1.offset_t"
 
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tolstat.common.tables import ERROR, LOAD_KINDS, RESULT, Status
+from tolstat.common.load_kinds import JOINT, LOAD_KINDS
+from tolstat.common.tables import ERROR, RESULT, Status
 from tolstat.solver import stationary
 
 BASE = {
@@ -35,12 +36,13 @@ def results(n, seed=8, failed=0, unsettled=0):
     scatter = rng.gamma(3.0, 0.03, (n, 8)) * np.array([1, 1, 0.15, 0.15, 0.15, 0.15, 1, 1])
     scatter[0] = 0.0
     for kind in LOAD_KINDS:
-        own = scatter[:, : len(kind.places or (1,))].reshape(n, *kind.shape[:1], *(1 for _ in kind.parts[:1]))
-        own = own * RISE.get(kind.name, 1.0)
-        table[f"{kind.name}_max"] = np.array(BASE.get(kind.name, 100.0)) * (1.0 + own)
+        places = kind.shape[:1] if kind.places != JOINT else ()
+        own = scatter[:, : len(kind.places)].reshape(n, *places, *(1 for _ in kind.shape[len(places) :]))
+        own = own * RISE.get(kind.key, 1.0)
+        table[f"{kind.key}_max"] = np.array(BASE.get(kind.key, 100.0)) * (1.0 + own)
         if kind.averaged:
-            table[f"{kind.name}_mean"] = 0.9 * table[f"{kind.name}_max"]
-            table[f"{kind.name}_range"] = 0.2 * table[f"{kind.name}_max"]
+            table[f"{kind.key}_mean"] = 0.9 * table[f"{kind.key}_max"]
+            table[f"{kind.key}_range"] = 0.2 * table[f"{kind.key}_max"]
     table["mode_share"][:, :, 1] = 1.0
     table["equivalent_load"] = 600.0 * (1.0 + scatter[:, :4])
     table["revolutions"], table["steps"], table["closure"] = 2.0, 360, 2e-5

@@ -1,8 +1,9 @@
 """How large is the numerical error of a campaign? Compare its joints with the same joints under other settings.
 
-Errors are relative to the largest load of the kind in the joint: a force to the largest ``|F|`` of its eight bushings,
-a torque to the largest ``|T|``, a contact force to the largest one of the four pins, Psi to itself. Loads that a
-campaign does not store are NaN in all of its joints and are left out of these maxima.
+Errors are relative to the largest load of the kind in the joint, or of the kind that measures it (`Kind.measure`): a
+force to the largest ``|F|`` of its eight bushings, a torque to the largest ``|T|``, a contact force to the largest one
+of the four pins, Psi to itself. Loads that a campaign does not store are NaN in all of its joints and are left out of
+these maxima; without any load of its measure, a load is relative to the largest of its own kind.
 """
 
 from __future__ import annotations
@@ -13,14 +14,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import KINDS, LOADS, Results, of_kind
+from tolstat.common.load_kinds import LOAD_KINDS, SPAN, Kind, measure_of
+from tolstat.common.loads import LOADS, Results, of_kind
 from tolstat.common.tables import SIMULATED, Status
 
 FloatArray = NDArray[np.float64]
 
-OBSERVABLES = tuple(load.name for kind in KINDS for load in LOADS.values() if load.kind == kind)
+OBSERVABLES = tuple(name for kind in LOAD_KINDS for _, name in kind.loads())
 """Largest loads of a joint whose error is evaluated: all that can have a limit, kind by kind."""
-KIND_OF = np.array([KINDS.index(LOADS[name].kind) for name in OBSERVABLES])
+_KEYS = tuple(SPAN)
+KIND_OF = np.array([_KEYS.index(LOADS[name].kind.key) for name in OBSERVABLES])
+"""Number of the kind of each, in the order of the registry."""
+_MEASURE = np.array([_KEYS.index(measure_of(kind).key) for kind in LOAD_KINDS])
 
 REFERENCE, FIDELITY = "reference", "fidelity"
 HALF_STEP_SHARE = 4 / 3
@@ -51,17 +56,27 @@ class Spread(NamedTuple):
 
 def loads(results: NDArray[np.void]) -> FloatArray:
     """Collect the largest loads of joints, (m,) table RESULT, as (m, loads): SI, in the order of `OBSERVABLES`."""
-    return np.concatenate([of_kind(results, kind) for kind in KINDS], axis=1)
+    return np.concatenate([of_kind(results, kind) for kind in LOAD_KINDS], axis=1)
 
 
 def sizes(results: NDArray[np.void]) -> FloatArray:
-    """Reference value of each observable in each joint: the largest load of its kind, (m, loads), SI."""
-    return np.asarray(_largest(loads(results))[:, KIND_OF])
+    """Reference value of each observable in each joint: the largest load of its measure, (m, loads), SI."""
+    largest = _largest(loads(results))
+    known = np.asarray(~np.isnan(largest).all(axis=0))
+    measure = np.where(known[_MEASURE], _MEASURE, np.arange(len(_KEYS)))
+    return np.asarray(largest[:, measure[KIND_OF]])
 
 
 def size(results: Results, observable: str) -> FloatArray:
     """Reference value of one observable in each joint, (m,), SI: a column of `sizes`."""
-    values = of_kind(results, LOADS[observable].kind)
+    kind = LOADS[observable].kind
+    found = _size(results, measure_of(kind))
+    return found if kind == measure_of(kind) or not np.isnan(found).all() else _size(results, kind)
+
+
+def _size(results: Results, kind: Kind) -> FloatArray:
+    """Largest load of a kind in each joint, (m,), of those that are stored."""
+    values = of_kind(results, kind)
     held = ~np.isnan(values).all(axis=0)
     return values[:, held].max(axis=1) if held.any() else np.full(len(values), np.nan)
 
@@ -69,8 +84,8 @@ def size(results: Results, observable: str) -> FloatArray:
 def _largest(values: FloatArray) -> FloatArray:
     """Largest value of each kind, (m, loads) -> (m, kinds); NaN propagates unless a load is NaN in all joints."""
     known = ~np.isnan(values).all(axis=0)
-    largest = np.full((len(values), len(KINDS)), np.nan)
-    for kind in range(len(KINDS)):
+    largest = np.full((len(values), len(_KEYS)), np.nan)
+    for kind in range(len(_KEYS)):
         of_kind = values[:, known & (kind == KIND_OF)]
         if of_kind.shape[1]:
             largest[:, kind] = of_kind.max(axis=1)
@@ -78,7 +93,7 @@ def _largest(values: FloatArray) -> FloatArray:
 
 
 def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
-    """Difference of `base` and `other`, relative to the largest load of the kind in `other`.
+    """Difference of `base` and `other`, relative to the largest load of the measure in `other`.
 
     Parameters
     ----------
@@ -202,7 +217,7 @@ def corrected(
 def usual(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> dict[str, float]:
     """Numerical error that the share `USUAL` of the joints stays below, by kind of load; NaN if unknown."""
     values = by_kind(numerical(base, checks))
-    return {kind: spread(values[:, k]).usual for k, kind in enumerate(KINDS)}
+    return {kind: spread(values[:, k]).usual for k, kind in enumerate(_KEYS)}
 
 
 def by_kind(errors: FloatArray) -> FloatArray:

@@ -9,27 +9,27 @@ import pandas as pd
 
 from tolstat.benchmarks.runs import TRUTH, Run
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.tables import SPAN
+from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
 from tolstat.solver.reference import Largest
 
-COLUMNS = {kind: {"F": "force", "T": "torque"}.get(kind, kind) for kind in SPAN}
-"""Name of the error of each kind of loads."""
-KINDS = ("loads", *COLUMNS.values())
+KINDS = ("loads", *SPAN)
+"""Columns with errors: the worst load that decides, and of each kind by its key."""
 
 
 def errors(found: Largest, true: Largest) -> dict[str, float]:
-    """Errors of largest loads, each relative to the largest of its kind in the joint.
+    """Errors of largest loads, each relative to the largest of its measure in the joint.
 
     Returns
     -------
     dict
-        The worst of each kind, named as in `COLUMNS`; ``loads``: the larger of ``force`` and ``torque``.
+        The worst of each kind, by its key; ``loads``: the worst of those that decide.
     """
     single = {}
-    for kind, span in SPAN.items():
-        size = max(float(np.max(true[span])), 1e-300)
-        single[COLUMNS[kind]] = float(np.max(np.abs(found[span] - true[span]))) / size
-    return {"loads": max(single["force"], single["torque"]), **single}
+    for kind in LOAD_KINDS:
+        span = SPAN[kind.key]
+        size = max(float(np.max(true[SPAN[measure_of(kind).key]])), 1e-300)
+        single[kind.key] = float(np.max(np.abs(found[span] - true[span]))) / size
+    return {"loads": max(single[kind.key] for kind in LOAD_KINDS if kind.decides), **single}
 
 
 def build(runs: Sequence[Run]) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
+from tolstat.common.load_kinds import BUSHINGS, COMPONENTS, CONTACTS, PINS, SHAFT_COMPONENTS, SHAFTS
 from tolstat.common.shown import shown
-from tolstat.common.tables import BUSHINGS, CONTACTS, PINS, Motion, Options, Simulation, Status
+from tolstat.common.tables import Motion, Options, Simulation, Status
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tolstat.study import Case
-
-LOADS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 
 
 @shown
@@ -90,7 +89,8 @@ class CaseResult(NamedTuple):
         """Trace of the last revolution, one row per input angle.
 
         Columns: ``theta`` (deg), ``tau``, ``Psi``, then ``cross1.F_e`` … ``fork4.T_z`` (N and N m, on the lump, in
-        the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N) and
+        the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N),
+        ``input.f_x`` … ``output.m_z`` (force and moment about O on the shafts, N and N m, in axes that do not turn) and
         ``pin1.mode`` …
         """
         import pandas as pd
@@ -106,11 +106,14 @@ class CaseResult(NamedTuple):
             "Psi": (tau - speed_ratio(theta, self.alpha)) / tau,
         }
         for b, bushing in enumerate(BUSHINGS):
-            for k, load in enumerate(LOADS):
+            for k, load in enumerate(COMPONENTS):
                 columns[f"{bushing}.{load}"] = histories["loads"][:, b, k]
         for p, pin in enumerate(PINS):
             for i, of in enumerate(CONTACTS):
                 columns[f"{pin}.contact_{of}"] = histories["contact"][:, p, i]
+        for s, shaft in enumerate(SHAFTS):
+            for k, load in enumerate(SHAFT_COMPONENTS):
+                columns[f"{shaft}.{load}"] = histories["shafts"][:, s, k]
         for p, pin in enumerate(PINS):
             columns[f"{pin}.mode"] = histories["mode"][:, p]
         return pd.DataFrame(columns)

@@ -1,7 +1,7 @@
-"""The loads of a joint that can have a limit: name, where its values are, unit, kind.
+"""The loads of a joint that can have a limit: name, where its values are, place, kind.
 
-They follow from the registry `tables.LOAD_KINDS`: each place of a kind has one load. Limits, reports, checks of the
-numerical error, selection of results and export read them.
+They follow from the registry `load_kinds.LOAD_KINDS`: each place of a kind has one load, or one for each order. Limits,
+reports, checks of the numerical error, selection of results and export read them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import LOAD_KINDS, SPAN
+from tolstat.common.load_kinds import LOAD_KINDS, PLACES, SPAN, Kind, Place
 
 FloatArray = NDArray[np.float64]
 Results = NDArray[np.void] | Mapping[str, NDArray[Any]]
@@ -29,10 +29,10 @@ class Load(NamedTuple):
     ----------
     name : str
         As studies and reports name it, ``cross1.F``.
-    kind : str
-        Name in `tables.LOAD_KINDS`: loads of one kind are compared with the largest of them.
-    unit : str
-        SI unit.
+    kind : Kind
+        What it is, and what its errors are relative to.
+    place : Place
+        Where it acts.
     element : int
         Position among the loads of the kind, the columns of `of_kind`.
     columns : tuple of str
@@ -40,10 +40,15 @@ class Load(NamedTuple):
     """
 
     name: str
-    kind: str
-    unit: str
+    kind: Kind
+    place: Place
     element: int
     columns: tuple[str, ...]
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
+        return self.kind.unit
 
     def of(self, results: Results) -> FloatArray:
         """Values of the joints, (n,), SI."""
@@ -51,8 +56,8 @@ class Load(NamedTuple):
 
     def ends(self, results: Results) -> tuple[FloatArray, FloatArray]:
         """Interval of the load in each joint, (n,) each, SI: the load itself unless the joint is stationary."""
-        values = self.of(results)
-        return values * results[f"{self.kind}_lower"], values * results[f"{self.kind}_upper"]
+        values, key = self.of(results), self.kind.key
+        return values * results[f"{key}_lower"], values * results[f"{key}_upper"]
 
 
 def split(name: str) -> tuple[str, str]:
@@ -110,38 +115,42 @@ class Limit(NamedTuple):
         return np.asarray(np.maximum.reduce(parts))
 
 
-def of_kind(results: Results, kind: str) -> FloatArray:
+def of_kind(results: Results, kind: Kind) -> FloatArray:
     """All loads of a kind, (n, m), SI: of a pin's contact forces the largest."""
-    values: FloatArray = results[f"{kind}_max"]
-    if values.ndim == 1:
-        return values[:, None]
-    return values.max(axis=2) if values.ndim == 3 else values
+    values: FloatArray = results[f"{kind.key}_max"]
+    if kind.parts:
+        values = values.max(axis=-1)
+    return values.reshape(len(values), len(kind.loads()))
 
 
 def largest(results: NDArray[np.void]) -> FloatArray:
-    """Largest values of all kinds, (n, values), SI, in the order of `tables.SPAN`."""
-    return np.concatenate([results[f"{kind}_max"].reshape(len(results), -1) for kind in KINDS], axis=1)
+    """Largest values of all kinds, (n, values), SI, in the order of `load_kinds.SPAN`."""
+    return np.concatenate([results[f"{key}_max"].reshape(len(results), -1) for key in SPAN], axis=1)
 
 
 def put_largest(values: FloatArray | float, results: NDArray[np.void]) -> None:
     """Write largest values, ordered as `largest` returns them, or one value for all, to a table RESULT."""
     values = np.broadcast_to(values, (len(results), max(span.stop for span in SPAN.values())))
-    for kind, span in SPAN.items():
-        field = results[f"{kind}_max"]
+    for key, span in SPAN.items():
+        field = results[f"{key}_max"]
         field[...] = values[:, span].reshape(field.shape)
 
 
 def _entries() -> list[Load]:
+    """Loads by place, in the order in which the registry of kinds first names the places."""
     found = []
-    for places in dict.fromkeys(kind.places for kind in LOAD_KINDS):
-        kinds = [kind for kind in LOAD_KINDS if kind.places == places]
-        for i, place in enumerate(places or ("",)):
-            for kind in kinds:
-                columns = kind.columns("max")
-                step = len(columns) // len(places or ("",))
-                name = f"{place}.{kind.name}" if place else kind.name
-                found.append(Load(name, kind.name, kind.unit, i, columns[i * step : (i + 1) * step]))
-    return found
+    for kind in LOAD_KINDS:
+        columns, parts = kind.columns("max"), len(kind.parts or ("",))
+        for i, (place, name) in enumerate(kind.loads()):
+            found.append(Load(name, kind, PLACES[place], i, columns[i * parts : (i + 1) * parts]))
+    first = [load.place.name for load in found]
+    groups = [kind.places for kind in LOAD_KINDS]
+    return sorted(found, key=lambda load: (groups.index(load.kind.places), first.index(load.place.name)))
+
+
+def names_of(group: str, kind: Kind) -> tuple[str, ...]:
+    """Names of the loads of a kind at the places of a group, ``"cross"``."""
+    return tuple(name for name, load in LOADS.items() if load.kind == kind and load.place.group == group)
 
 
 def unit_text(unit: str) -> str:
@@ -157,15 +166,17 @@ def limits_in_words(limits: Mapping[str, float]) -> str:
     return "; ".join(f"{', '.join(names)}: {limit}" for limit, names in loads.items()) or "none"
 
 
-KINDS = tuple(kind.name for kind in LOAD_KINDS)
-"""Kinds of loads, in the order of reports."""
 LOADS = {load.name: load for load in _entries()}
 """Every load that can have a limit, by name."""
 UNIT_OF_LOAD = {load.name: load.unit for load in LOADS.values()}
 """SI unit of each load."""
-BUSHING_LOADS = tuple(load.name for load in LOADS.values() if load.kind in ("F", "T"))
-"""Force and torque of each bushing: what every report shows if the study keeps it."""
+SHOWN_LOADS = tuple(load.name for load in LOADS.values() if load.kind.shown)
+"""Loads that every report shows if the study keeps them: force and torque of each bushing."""
+PANELS = tuple((group, kind) for group in ("cross", "fork") for kind in LOAD_KINDS if kind.shown)
+"""Groups of bushings and kinds of loads; figures of a whole campaign have a panel for each."""
+QUANTITY = {"N": "force", "N*m": "torque"}
+"""What loads of a unit are called."""
 ALL_LIMITS, ANY_LIMIT = "all limits", "any limit"
 """Name of all limits of a study together, and how a rule names a joint above at least one of them."""
-LOAD_FIELDS = ("status", *(f"{kind}_{of}" for kind in KINDS for of in ("max", "lower", "upper")))
+LOAD_FIELDS = ("status", *(f"{key}_{of}" for key in SPAN for of in ("max", "lower", "upper")))
 """Fields of the results that loads and their intervals are read from, and the status."""

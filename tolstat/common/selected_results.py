@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.columns import RESULT_COLUMNS, Column
+from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import LOAD_KINDS
 
 KEY = "output.results"
 """Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""

@@ -8,29 +8,19 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from itertools import accumulate, chain
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.fields import Field, Kind, dtype_of
+from tolstat.common.fields import Field, dtype_of
+from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
 from tolstat.common.parameters import PARAM_FIELDS
 
 SCHEMA_VERSION = 8
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
-BUSHINGS = tuple(f"cross{i}" for i in (1, 2, 3, 4)) + tuple(f"fork{i}" for i in (1, 2, 3, 4))
-PINS = tuple(f"pin{i}" for i in (1, 2, 3, 4))
 HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
-CHANNELS = {
-    f"{bushing}.{load}": "N" if load[0] == "F" else "N*m"
-    for bushing in BUSHINGS
-    for load in ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z", "F", "T")
-}
-"""Unit of every load whose cycles are counted: components of a bushing's force and torque, and their moduli."""
-CONTACTS = ("outer", "inner", "resultant")
-"""Contact forces of a pin: normal force of its outermost and of its innermost station, and the resultant of all."""
-OUTER, INNER, RESULTANT = range(3)
 STEPS_PER_ITERATION = 5
 """Number of explicit steps that take the time of a Newton iteration."""
 LIFE_EXPONENT = 10 / 3
@@ -262,25 +252,6 @@ def _error_fields() -> tuple[Field, ...]:
 ERROR_FIELDS = _error_fields()
 """Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
 
-OVER = "over the revolutions that count"
-LOAD_KINDS = (
-    Kind("F", "bushing force", "N", f"modulus of the bushing force {OVER}", BUSHINGS, averaged=True),
-    Kind("T", "bushing torque", "N*m", f"modulus of the bushing torque {OVER}", BUSHINGS, averaged=True),
-    Kind(
-        "contact",
-        "contact force",
-        "N",
-        "contact force of the pin: of its outermost station, of its innermost one, resultant of all stations",
-        PINS,
-        CONTACTS,
-    ),
-    Kind("psi", "|Psi|", "1", "|Psi|, relative error of the speed ratio, eq. (13)", interpolated=False),
-)
-"""Registry of the loads: all that can have a limit, kind by kind. `kernel.mechanics.loads` computes them."""
-_ENDS = [*accumulate((kind.size for kind in LOAD_KINDS), initial=0)]
-SPAN = {kind.name: slice(_ENDS[i], _ENDS[i + 1]) for i, kind in enumerate(LOAD_KINDS)}
-"""Elements of each kind in arrays with the values of all loads, kind after kind."""
-
 RESULT_FIELDS = (
     Field("status", "1", "see Status", "u1"),
     Field("settled", "1", "1 when the closure error is below solver.settle_tol", "u1"),
@@ -306,7 +277,7 @@ RESULT_FIELDS = (
     Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),
     Field("factorisations", "1", "times that the tangent was factorised", "i4"),
     # the order of the columns enters the checksums of rows
-    *(field for kind in LOAD_KINDS if kind.places for field in kind.statistics().values()),
+    *(field for kind in LOAD_KINDS if kind.places != JOINT for field in kind.statistics().values()),
     Field(
         "mode_share",
         "1",
@@ -322,7 +293,7 @@ RESULT_FIELDS = (
         shape=(len(PINS),),
         columns=tuple(f"{pin}.equivalent_load" for pin in PINS),
     ),
-    *(field for kind in LOAD_KINDS if not kind.places for field in kind.statistics().values()),
+    *(field for kind in LOAD_KINDS if kind.places == JOINT for field in kind.statistics().values()),
     *(field for kind in LOAD_KINDS for field in kind.ends()),
     Field(
         "clearance",

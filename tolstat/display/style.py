@@ -17,6 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tolstat.common.files import atomic_write
+from tolstat.common.load_kinds import Kind
+from tolstat.common.loads import PANELS, QUANTITY
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
 """Colours of bushings 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
@@ -58,7 +60,6 @@ _SETTINGS: Any = {
     "svg.hashsalt": "tolstat",
     "text.parse_math": False,  # the name of a study may contain a dollar sign
 }
-_PANELS = (("cross", "F"), ("cross", "T"), ("fork", "F"), ("fork", "T"))
 
 
 @contextmanager
@@ -68,7 +69,7 @@ def settings() -> Iterator[None]:
         yield
 
 
-def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, str, Axes]]]:
+def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axes]]]:
     """Make a page of four panels: force and torque of the cross bushings above those of the fork bushings.
 
     Parameters
@@ -80,8 +81,8 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, str, Axes
     -------
     figure : Figure
         The page; the strip at its foot is reserved for `legend`.
-    panels : list of (group, letter, Axes)
-        ``("cross", "F", axes)`` and so on.
+    panels : list of (group, kind, Axes)
+        One for each of `loads.PANELS`.
     """
     figure = Figure(figsize=(11.0, 8.5))
     axes = figure.subplots(2, 2)
@@ -89,9 +90,9 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, str, Axes
     figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")
     figure.text(0.02, 0.932, subtitle, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
     page = []
-    for (group, letter), ax in zip(_PANELS, axes.flat, strict=True):
-        ax.set_title(f"{group.capitalize()} bushings, {'force' if letter == 'F' else 'torque'}", pad=21)
-        page.append((group, letter, ax))
+    for (group, kind), ax in zip(PANELS, axes.flat, strict=True):
+        ax.set_title(f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}", pad=21)
+        page.append((group, kind, ax))
     return figure, page
 
 

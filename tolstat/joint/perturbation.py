@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from tolstat.common import units
+from tolstat.common.load_kinds import PINS
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import ERROR, HOLES, PARAM, PINS
+from tolstat.common.tables import ERROR, HOLES, PARAM
 from tolstat.joint import material
 from tolstat.joint.contact import Contact
 from tolstat.joint.model import Joint

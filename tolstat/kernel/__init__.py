@@ -42,7 +42,7 @@ alone : Scratch
 past : Past
     What error-controlled and explicit steps keep from one revolution to the next.
 trail : Trail
-    Moduli of the bushing loads and statistics of the last revolutions.
+    Loads that decide and statistics of the last revolutions.
 turns : record of TURNS
     Number of the revolution, and what has been found so far.
 out : ndarray, or record of KERNEL_RESULT

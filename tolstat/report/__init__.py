@@ -204,7 +204,7 @@ def _sweep(view: View, stem: Path, width: int | None) -> Report:
 def _accuracy(view: View) -> str:
     from tolstat.questions.accuracy import rendering
 
-    return rendering.note(view.verification) if view.verification else ""
+    return rendering.note(view.verification, view.limits) if view.verification else ""
 
 
 def _cases(store: Reader, stem: Path, width: int | None) -> Report:

@@ -12,7 +12,8 @@ from tolstat.analysis import accuracy
 from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.campaign.remedy import remedy
 from tolstat.common import selected_results
-from tolstat.common.tables import BUSHINGS, Motion, Status
+from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.tables import Motion, Status
 from tolstat.solver import refinement
 from tolstat.store import recorded, verification
 from tolstat.study.design import IDEAL

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
+from tolstat.common.loads import load_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
@@ -136,7 +137,7 @@ def _basis(view: View) -> list[Card]:
     note = counts.shortfall + (f", {pending} still pending" if pending else "")
     whole = view.count(*VALID) == counts.total
     cards = [Card(str(counts.done), "joints simulated", note, "" if whole else "open")]
-    kinds = {name.rpartition(".")[2] for name in view.leading}
+    kinds = {load_of(name).kind.key for name in view.leading}
     usual = {k: error for k, error in view.numerical_error.items() if k in kinds and not np.isnan(error)}
     if usual and view.verification:
         kind = max(usual, key=lambda name: usual[name])

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import BUSHING_LOADS, LOADS, of_kind
+from tolstat.common.load_kinds import measure_of
+from tolstat.common.loads import LOADS, SHOWN_LOADS, of_kind
 from tolstat.common.tables import FINEST_STEPS, Fidelity, Options, Simulation, Status
 
 Array = NDArray[np.float64]
@@ -83,7 +84,7 @@ def choose(
 
     A rung is good enough when the error of every load asked for, times `MARGIN`, is within the budget for every joint
     of the pilot that settles in the reference, and when every joint ends with the same status as in the reference.
-    Errors are relative to the joint's largest load of the kind.
+    Errors are relative to the joint's largest load of the measure.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ def choose(
     -------
     Choice
     """
-    names = tuple(loads) or BUSHING_LOADS
+    names = tuple(loads) or SHOWN_LOADS
     truth = simulate(params, _at(options, REFERENCE)).results
     table = []
     for rung in RUNGS:
@@ -154,9 +155,9 @@ def sentence(options: Mapping[str, Any], record: Mapping[str, Any]) -> str:
 
 
 def values(results: NDArray[np.void], name: str) -> tuple[Array, Array]:
-    """Return a load of each joint and, as scale of its error, the joint's largest load of the kind; (n,) each, SI."""
+    """Return a load of each joint and, as scale of its error, the largest of its measure; (n,) each, SI."""
     load = LOADS[name]
-    return load.of(results), of_kind(results, load.kind).max(axis=1)
+    return load.of(results), of_kind(results, measure_of(load.kind)).max(axis=1)
 
 
 def _at(options: Options, rung: Rung) -> Options:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.common.tables import CHANNELS, HistorySpec
+from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.tables import HistorySpec
 
 KEPT = 16
 """Maximum number of cycles kept per channel: joints made to ISO 2768-f have 1.7 a channel in the mean, 11 at most."""
@@ -87,7 +88,7 @@ def count(loads: NDArray[Any]) -> dict[str, NDArray[Any]]:
     -------
     dict
         By name of `SPECS`: ``cycles`` (64, KEPT, 2), N and N m, and ``cycle_count`` (64,); the channels are
-        those of `tables.CHANNELS`. NaN and 0 when a load is not finite.
+        those of `load_kinds.CHANNELS`. NaN and 0 when a load is not finite.
     """
     from tolstat.kernel.revolution import rainflow
 

@@ -12,11 +12,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
 from tolstat.common.loads import put_largest
 from tolstat.common.tables import (
     RESULT,
     SIMULATED,
-    SPAN,
     Fidelity,
     Options,
     Start,
@@ -41,7 +41,7 @@ MAX_REVS = 6
 """Number of revolutions after which a joint whose largest loads still change is not periodic."""
 
 Largest = FloatArray
-"""Largest values of all loads of a joint, (values,), SI, in the order of `tables.SPAN`."""
+"""Largest values of all loads of a joint, (values,), SI, in the order of `load_kinds.SPAN`."""
 
 
 class FirstOrder(NamedTuple):
@@ -62,7 +62,8 @@ class FirstOrder(NamedTuple):
     scale : ndarray, shape (112,)
         Size of each component below which its error is absolute: ``atol = rtol * scale``.
     largest : callable
-        Times (m,) and states (m, 112) -> Largest.
+        Times (m,) and states (m, 112) of a revolution -> Largest. A third argument, (m,) booleans, says which times are
+        equally spaced, without it all: from these the amplitudes of orders are computed.
     settled : ndarray of RESULT, shape (1,)
         Result of the solver for the joint. If its status is one without results, there is no initial state.
     """
@@ -73,7 +74,7 @@ class FirstOrder(NamedTuple):
     y0: FloatArray
     period: float
     scale: FloatArray
-    largest: Callable[[FloatArray, FloatArray], Largest]
+    largest: Callable[..., Largest]
     settled: NDArray[np.void]
 
 
@@ -95,10 +96,13 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         Its functions share work arrays, and so are not thread-safe.
     """
     from tolstat.kernel.integrators import first_order as kernel
-    from tolstat.kernel.mechanics.loads import N_LOADS
+    from tolstat.kernel.mechanics.loads import N_INSTANT
     from tolstat.kernel.mechanics.topology import N_DOF
     from tolstat.kernel.mechanics.work import WORK
+    from tolstat.kernel.revolution.orders import write_orders
+    from tolstat.kernel.revolution.settle import make_samples
     from tolstat.kernel.revolution.simulate import make_scratch, simulate_joint
+    from tolstat.kernel.revolution.trajectory import sample
     from tolstat.kernel.simd.jit import compiled_entry
 
     par = params.view(np.recarray)[0]
@@ -130,11 +134,13 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         fast_jacobian(t, np.ascontiguousarray(y, np.float64), params, options, works, scratch, out)
         return out
 
-    def largest(times: FloatArray, states: FloatArray) -> Largest:
-        values = np.empty((len(times), N_LOADS))
-        kernel.sample(times, np.ascontiguousarray(states), par, work, values)
-        found: Largest = values.max(axis=0)
-        return found
+    def largest(times: FloatArray, states: FloatArray, equal: NDArray[np.bool_] | None = None) -> Largest:
+        samples = make_samples(1, len(times))[0]
+        sample(times, np.ascontiguousarray(states), par, work, samples)
+        found = for_kernels(np.zeros(1, RESULT))[0]
+        write_orders(samples if equal is None else samples[equal], found)
+        found.largest[:N_INSTANT] = samples.loads.max(axis=0)
+        return np.array(found.largest)
 
     scale = np.repeat([LENGTH, VELOCITY], N_DOF)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
@@ -236,8 +242,8 @@ def _periodic(
 
 def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | None) -> Iterator[tuple[Largest, int]]:
     """Yield the largest loads of each revolution and the steps so far; end early when the integrator gives up."""
-    times, states = np.empty(0), np.empty((0, len(system.y0)))
-    new_times, new_states = [], []
+    times, states, equal = np.empty(0), np.empty((0, len(system.y0))), np.empty(0, bool)
+    new_times, new_states, new_equal = [], [], []
     spacing, done = system.period / (angles or SAMPLES_PER_REV), 0
     boundary = system.t0 + (1 + 1e-9) * system.period
     for step in range(1, max_steps + 1):
@@ -249,21 +255,24 @@ def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | 
         done = reached
         new_times.append(grid)
         new_states.append(solver.dense_output()(grid).T)
+        new_equal.append(np.ones(len(grid), bool))
         if angles is None:
             new_times.append(np.array([solver.t]))
             new_states.append(solver.y[None].copy())
+            new_equal.append(np.zeros(1, bool))
         if solver.t >= boundary:
             times, states = np.concatenate([times, *new_times]), np.concatenate([states, *new_states])
-            new_times, new_states = [], []
+            equal = np.concatenate([equal, *new_equal])
+            new_times, new_states, new_equal = [], [], []
             inside = times <= boundary
-            yield system.largest(times[inside], states[inside]), step
-            times, states = times[~inside], states[~inside]
+            yield system.largest(times[inside], states[inside], equal[inside]), step
+            times, states, equal = times[~inside], states[~inside], equal[~inside]
             boundary += system.period
         if solver.status == "finished":
             return
 
 
 def _change(before: Largest, last: Largest) -> float:
-    """Largest change of any bushing's largest load, relative to the largest of its kind."""
-    pairs = [(before[SPAN[kind]], last[SPAN[kind]]) for kind in ("F", "T")]
-    return max(float(np.abs(b - a).max() / max(b.max(), 1e-300)) for a, b in pairs)
+    """Largest change of any largest load that decides, relative to the largest of its measure."""
+    spans = [(SPAN[kind.key], SPAN[measure_of(kind).key]) for kind in LOAD_KINDS if kind.decides]
+    return max(float(np.abs(last[own] - before[own]).max() / max(last[of].max(), 1e-300)) for own, of in spans)

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import progress_memory
+from tolstat.common.load_kinds import CONTACTS, SPAN
 from tolstat.common.tables import (
-    CONTACTS,
     KERNEL_RESULT,
     RESULT,
     SIMULATED,
-    SPAN,
     Fidelity,
     HistorySpec,
     Method,
@@ -71,10 +70,15 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
     loads = "force e, t, z (N), torque e, t, z (N m) of bushings cross 1-4, fork 1-4 on the lump, in base marker axes"
     if histories == "full":
         contact = "contact force of pins 1-4: of the outermost station, of the innermost one, resultant of all stations"
+        shafts = (
+            "force x, y, z (N) and moment x, y, z (N m) about O that the joint exerts on input and output shaft, in "
+        )
+        shafts += "axes that do not turn: z along the shaft, y along the fork's pins at theta = 90 deg"
         modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
             "loads": HistorySpec((n, 8, 6), "f4", "N, N*m", loads, ("theta", "bushing", "component")),
             "contact": HistorySpec((n, 4, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
+            "shafts": HistorySpec((n, 2, 6), "f4", "N, N*m", shafts, ("theta", "shaft", "shaft_component")),
             "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
             "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
         }

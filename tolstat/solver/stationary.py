@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import KINDS
+from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
 from tolstat.common.tables import VALID, Motion, Status
 
 DISCARDED_SHARE = 1 / 3
@@ -74,7 +74,7 @@ def classify(results: Table, blocks: Table, duration: int) -> None:
         if len(watched) < MIN_REVOLUTIONS or not is_stationary(watched):
             continue
         results["status"][i] = Status.STATIONARY
-        for kind in KINDS:
+        for kind in SPAN:
             own = results[f"{kind}_max"]
             median, lower, upper = largest(watched[f"{kind}_max"].reshape(len(watched), -1), duration)
             own[i] = median.reshape(own[i].shape)
@@ -91,7 +91,7 @@ def fill_intervals(results: Table) -> None:
         Joints; ends of stationary ones that never repeat are left as they are.
     """
     never = (results["status"] == Status.STATIONARY) & (results["motion"] != Motion.SUBHARMONIC)
-    for kind in KINDS:
+    for kind in SPAN:
         for end in ("lower", "upper"):
             own = results[f"{kind}_{end}"]
             own[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
@@ -105,13 +105,22 @@ def is_stationary(watched: Table) -> bool:
     watched : ndarray of RESULT, shape (revolutions,)
         Statistics of successive revolutions.
     """
-    return all(_alike(watched[field].max(axis=1)) for field in ("F_max", "T_max"))
+    return all(
+        _alike(_largest(watched, kind.key), float(_largest(watched, measure_of(kind).key).max()))
+        for kind in LOAD_KINDS
+        if kind.decides
+    )
 
 
-def _alike(series: FloatArray) -> bool:
+def _largest(watched: Table, key: str) -> FloatArray:
+    """Largest load of a kind in each revolution, (revolutions,)."""
+    return np.asarray(watched[f"{key}_max"].max(axis=1))
+
+
+def _alike(series: FloatArray, size: float) -> bool:
     half = len(series) // 2
     first, second = series[:half], series[-half:]
-    small = NEGLIGIBLE * float(series.max())
+    small = NEGLIGIBLE * size
     spreads = np.array([first.std(ddof=1), second.std(ddof=1)])
     error = float(np.sqrt((spreads**2).sum() / half))
     level = abs(float(first.mean() - second.mean())) <= max(MAX_STANDARD_ERRORS * error, small)

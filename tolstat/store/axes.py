@@ -8,15 +8,18 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import BUSHINGS, CHANNELS, CONTACTS, PINS, HistorySpec
+from tolstat.common.load_kinds import BUSHINGS, CHANNELS, COMPONENTS, CONTACTS, FOLLOWED, PINS, SHAFT_COMPONENTS, SHAFTS
+from tolstat.common.tables import HistorySpec
 from tolstat.store.result_file import put_attributes
 
 NAMES: dict[str, tuple[tuple[str, ...], str]] = {
     "bushing": (BUSHINGS, "bushing"),
-    "component": (("F_e", "F_t", "F_z", "T_e", "T_t", "T_z"), "force F (N) and torque T (N m) along e, t and z"),
+    "component": (COMPONENTS, "force F (N) and torque T (N m) along e, t and z"),
     "pin": (PINS, "pin"),
     "contact_force": (CONTACTS, "contact force of the outermost station, of the innermost one, resultant of all"),
-    "load": (("F", "T"), "force and torque"),
+    "shaft": (SHAFTS, "shaft"),
+    "shaft_component": (SHAFT_COMPONENTS, "force f (N) and moment m (N m) about O, in axes that do not turn"),
+    "load": (tuple(kind.key for kind in FOLLOWED), "force and torque"),
     "channel": (tuple(CHANNELS), "load whose cycles are counted: component or modulus"),
     "of_cycle": (("range", "mean"), "range and mean of a cycle"),
 }

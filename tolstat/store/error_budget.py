@@ -35,14 +35,14 @@ def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | Non
     if np.isnan(error):
         return None
     narrowed, name = view.narrowed(load.name)
-    by = error * _largest(narrowed, LOADS[name].kind) / load.scale
+    by = error * _largest(narrowed, LOADS[name].kind.key) / load.scale
     return load.shifted(-by), load.shifted(by)
 
 
 @once
 def _largest(view: View, kind: str) -> FloatArray:
-    """Largest load of a kind in each joint, (n,), see `accuracy.size`."""
-    return frozen(size(view.results, next(name for name in OBSERVABLES if LOADS[name].kind == kind)))
+    """Largest load that errors of a kind are relative to in each joint, (n,), see `accuracy.size`."""
+    return frozen(size(view.results, next(name for name in OBSERVABLES if LOADS[name].kind.key == kind)))
 
 
 def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
@@ -70,7 +70,7 @@ def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
     found = found[np.isfinite(found)]
     if found.size < LEAST_NEAR:
         return None
-    sizes = np.nan_to_num(_largest(view, LOADS[name].kind) / load.scale)
+    sizes = np.nan_to_num(_largest(view, LOADS[name].kind.key) / load.scale)
     low, high = corrected(np.zeros(load.values.size), sizes, found)
     return load.shifted(low), load.shifted(high)
 
@@ -108,14 +108,14 @@ def command(path: Path, limit: str = ANY_LIMIT) -> str:
 
 
 def relative(view: View, name: str) -> float:
-    """Numerical error of a load, relative to the largest load of its kind in the joint; NaN if unknown.
+    """Numerical error of a load, relative to the largest load of its measure in the joint; NaN if unknown.
 
     Of all limits that of the load whose error is the largest.
     """
     if name == ALL_LIMITS:
         return float(np.max([relative(view, own) for own in view.limits]))
     narrowed, plain = view.narrowed(name)
-    return narrowed.numerical_error.get(LOADS[plain].kind, np.nan)
+    return narrowed.numerical_error.get(LOADS[plain].kind.key, np.nan)
 
 
 def total_interval(

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tolstat.common.aside import Aside
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.load_kinds import BUSHINGS, COMPONENTS, FOLLOWED
 from tolstat.common.shown import shown
-from tolstat.common.tables import BUSHINGS, Options
+from tolstat.common.tables import Options
 from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import restore, simulate_rows
@@ -27,7 +28,8 @@ ANGLES = 60
 """Default number of input angles per revolution to read, if the histories have as many samples."""
 JOINTS_PER_BLOCK = 256
 """Maximum number of joints whose loads are read at a time: 9 MB at 180 samples per revolution."""
-_COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
+LARGEST = [f"{kind.key}_max" for kind in FOLLOWED]
+"""Fields of the results that joints simulated again are compared in."""
 
 FloatArray = NDArray[np.float64]
 Again = tuple[NDArray[np.float32], FloatArray]
@@ -36,14 +38,14 @@ Again = tuple[NDArray[np.float32], FloatArray]
 
 @shown
 class Revolutions(NamedTuple):
-    """Moduli of the bushing loads of some joints over the last revolution.
+    """Bushing loads of some joints over the last revolution.
 
     Attributes
     ----------
     angles : ndarray, shape (k,)
         Input angles, rad.
-    F, T : ndarray, shape (m, k, 8)
-        Moduli of force (N) and torque (N m), in the order of `tables.BUSHINGS`; NaN for joints without results.
+    loads : ndarray, shape (m, k, 8, 6)
+        Components of force (N) and torque (N m) as `load_kinds.Channel.of` takes them; NaN for joints without results.
     origin : str
         Source of the loads: ``"stored"``, ``"harmonics"`` or ``"simulated again"``.
     apart : float
@@ -52,8 +54,7 @@ class Revolutions(NamedTuple):
     """
 
     angles: FloatArray
-    F: FloatArray
-    T: FloatArray
+    loads: NDArray[Any]
     origin: str
     apart: float
 
@@ -100,14 +101,12 @@ def read(store: Reader, slots: NDArray[np.intp], max_angles: int = ANGLES) -> Re
     steps = int(store.options["steps_per_rev"])
     every = max(1, steps // max_angles)
     angles = 2.0 * np.pi * np.arange(0, steps, every) / steps
-    moduli = np.empty((2, len(slots), angles.size, 8))
+    loads = np.empty((len(slots), angles.size, len(BUSHINGS), len(COMPONENTS)))
     apart = 0.0
     for part, found, difference in of_components(store, slots):
         apart = max(apart, difference)
-        kept = found[:, ::every].astype(float)
-        for k in (0, 1):
-            moduli[k, part] = np.linalg.norm(kept[..., 3 * k : 3 * k + 3], axis=-1)
-    return Revolutions(angles, moduli[0], moduli[1], origin, apart)
+        loads[part] = found[:, ::every]
+    return Revolutions(angles, loads, origin, apart)
 
 
 def of_components(store: Reader, slots: NDArray[np.intp]) -> Iterator[tuple[slice, NDArray[Any], float]]:
@@ -152,28 +151,6 @@ def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:
         raise StoreError(str(Fault(str(store.path), "holds no load histories", remedy)))
     real, imag = (store.histories(f"coefficients_{part}", slots) for part in ("real", "imag"))
     return np.moveaxis(restore(real, imag, int(store.options["steps_per_rev"])), 0, 1)
-
-
-def channel(loads: NDArray[Any], name: str) -> FloatArray:
-    """One load of joints over a revolution.
-
-    Parameters
-    ----------
-    loads : ndarray, shape (m, samples, 8, 6)
-        As `loads` returns them.
-    name : str
-        One of `tables.CHANNELS`.
-
-    Returns
-    -------
-    ndarray, shape (m, samples)
-        A component, or the modulus of force or torque; N or N m.
-    """
-    bushing, _, load = name.partition(".")
-    own = loads[:, :, BUSHINGS.index(bushing)].astype(float)
-    if load in _COMPONENTS:
-        return np.asarray(own[..., _COMPONENTS.index(load)])
-    return np.asarray(np.linalg.norm(own[..., :3] if load == "F" else own[..., 3:], axis=-1))
 
 
 class Ahead(NamedTuple):
@@ -238,7 +215,7 @@ def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
     """Read from the file what it takes to simulate joints again, and do so."""
     params = perturb(joint_of(store, int(slots[0])), store.operation, pick(store.errors, slots))
     attempts = pick(store.attempt, slots)
-    stored = pick(store.results, slots)[["F_max", "T_max"]].copy()
+    stored = pick(store.results, slots)[LARGEST].copy()
     settings = [(here, options_of(store, int(slots[here[0]]))) for here in _alike(attempts)]
     return _simulate(params, settings, stored, int(store.options["steps_per_rev"]))
 
@@ -255,7 +232,7 @@ def _simulate(
         found = simulate_rows(params[here], options, "full")
         samples = found.histories["loads"]
         loads[here] = samples[:, :: max(1, samples.shape[1] // steps)]
-        for name in ("F_max", "T_max"):
+        for name in LARGEST:
             with np.errstate(invalid="ignore", divide="ignore"):
                 off = np.abs(found.results[name] / stored[name][here] - 1.0)
             largest = off.max(axis=1, initial=0.0, where=np.isfinite(off))

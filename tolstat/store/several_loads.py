@@ -62,9 +62,9 @@ def largest_of(name: str, parts: Sequence[SampleLoad], of_ratios: bool = False) 
 def leading(view: View) -> tuple[str, ...]:
     """Leading load of each kind (force, torque, ...).
 
-    Candidates are the loads with limits or, without limits, all bushing loads kept. The leading load is the one whose
-    limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the limit (without limits
-    by the 99 % quantile).
+    Candidates are the loads with limits or, without limits, those of `loads.SHOWN_LOADS` kept. The leading load is the
+    one whose limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the limit
+    (without limits by the 99 % quantile).
     """
     found: dict[str, tuple[tuple[float, float], str]] = {}
     for load in view.loads(list(view.limits) or view.bushing_loads):
@@ -72,6 +72,6 @@ def leading(view: View) -> tuple[str, ...]:
             limit = 1.0 if load.limit is None else load.limit
             share = 0.0 if load.limit is None else load.above(limit).estimate
             rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
-            kind = of_name(load.name).kind
+            kind = of_name(load.name).kind.key
             found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
     return tuple(name for _, name in found.values())

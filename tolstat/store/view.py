@@ -16,7 +16,7 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
 from tolstat.common.draw_records import check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS, BUSHING_LOADS, LOADS, limits_in_words, split
+from tolstat.common.loads import ALL_LIMITS, LOADS, SHOWN_LOADS, limits_in_words, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
@@ -242,8 +242,8 @@ class View:
 
     @cached_property
     def bushing_loads(self) -> tuple[str, ...]:
-        """Loads of `loads.BUSHING_LOADS` that the study keeps."""
-        return tuple(name for name in BUSHING_LOADS if name in self.kept_loads)
+        """Loads of `loads.SHOWN_LOADS` that the study keeps."""
+        return tuple(name for name in SHOWN_LOADS if name in self.kept_loads)
 
     @property
     def shown_loads(self) -> tuple[str, ...]:

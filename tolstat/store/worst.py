@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.sorted_loads import Intervals
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import KINDS, LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
+from tolstat.common.load_kinds import SPAN
+from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
 from tolstat.store.sample_load import frozen
 from tolstat.store.verification import Verification
@@ -52,7 +53,7 @@ def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
     """
     status = [part["status"] for part in parts]
     found: dict[str, NDArray[Any]] = {"status": np.choose(deciding(status), status)}
-    for kind in KINDS:
+    for kind in SPAN:
         found[f"{kind}_max"] = np.maximum.reduce([part[f"{kind}_max"] for part in parts])
         for end in ("lower", "upper"):
             found[f"{kind}_{end}"] = np.where(found["status"] == Status.STATIONARY, np.nan, 1.0)
@@ -83,7 +84,7 @@ def load_of(parts: Sequence[Results], load: Load) -> tuple[FloatArray, NDArray[n
     values = np.maximum.reduce(each) if several else each[0]
     decided = np.choose(deciding(status), status) if several else status[0]
     joints = np.flatnonzero(np.logical_or.reduce([own == Status.STATIONARY for own in status]))
-    names = [f"{load.kind}_{of}" for of in ("max", "lower", "upper")]
+    names = [f"{load.kind.key}_{of}" for of in ("max", "lower", "upper")]
     ends = (load.ends({name: part[name][joints] for name in names}) for part in parts)
     lower, upper = (np.maximum.reduce(own) for own in zip(*ends, strict=True))
     intervals = Intervals.of(values[joints], (lower, upper)).among(joints)

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import HOLES, PINS
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import HOLES
 from tolstat.study.bonus import Bonus
 
 Array = NDArray[np.float64]

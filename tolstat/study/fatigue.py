@@ -11,8 +11,8 @@ from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.load_kinds import UNIT_OF_CHANNEL
 from tolstat.common.strict import Strict, read_section, refuse
-from tolstat.common.tables import CHANNELS
 from tolstat.study import stress_point
 from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve
 from tolstat.study.stress_point import Exponent, Positive, StressPoint
@@ -128,9 +128,9 @@ def read(table: object, place: str) -> Fatigue:
     points: tuple[StressPoint, ...] = ()
     for entry in entries(_inner(table, "line"), "fatigue", "line"):
         with gather(faults):
-            names = resolve(entry, CHANNELS, place)
+            names = resolve(entry, UNIT_OF_CHANNEL, place)
             claims.claim(entry, names)
-            lines |= dict.fromkeys(names, _line(entry, CHANNELS[names[0]], place))
+            lines |= dict.fromkeys(names, _line(entry, UNIT_OF_CHANNEL[names[0]], place))
     with gather(faults):
         points = stress_point.read(_inner(table, "point"), place)
     if faults:

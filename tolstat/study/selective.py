@@ -17,8 +17,8 @@ from pydantic import AfterValidator, Field
 
 from tolstat.common import units
 from tolstat.common.errors import Fault
+from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import PINS
 from tolstat.study.tolerances.accepted import scores_among
 from tolstat.study.tolerances.distributions import Array, Distribution, score
 

@@ -18,8 +18,9 @@ from pydantic import Field, model_validator
 from tolstat.analysis import sorting
 from tolstat.common import strict
 from tolstat.common.errors import Fault, gather
+from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import HOLES, PINS
+from tolstat.common.tables import HOLES
 from tolstat.joint import HOLE_OF_PIN, Joint
 from tolstat.study import selection
 from tolstat.study.selection import UNITS, Entry

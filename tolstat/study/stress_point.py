@@ -10,8 +10,8 @@ from pydantic import AfterValidator, Field, model_validator
 from tolstat.analysis.strength import Line
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.strict import Strict, did_you_mean, refuse
-from tolstat.common.tables import BUSHINGS
 from tolstat.study.selection import select
 
 Positive = Annotated[units.Number, AfterValidator(units.positive)]
@@ -110,7 +110,7 @@ class StressPoint(NamedTuple):
     name : str
         Name in the study; with the bushing where the study names several.
     bushing : str
-        One of `tables.BUSHINGS`.
+        One of `load_kinds.BUSHINGS`.
     per_load : tuple of float
         Stress per load component along e, t, z: three forces, 1/m^2, and three torques, 1/m^3.
     line : Line

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from tolstat.benchmarks import machine
-from tolstat.benchmarks.points import build, cost, leaders
+from tolstat.benchmarks.points import KINDS, build, cost, leaders
 from tolstat.benchmarks.precision.setup import Setup
 from tolstat.benchmarks.runs import Run
 from tolstat.common.files import atomic_write
@@ -146,7 +146,7 @@ def page(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str, image: str) -
         "`setting`: steps a revolution or rtol. `failed`, `over_time`: number of joints. `ms`: median over the joints. "
         "`loads`, `contact`, `psi`: error of the median joint; `loads_worst`: that of the worst. `halvings`, `rates`: "
         "mean number of halved steps and of calls of the right-hand side.",
-        _markdown(points.drop(columns=["ours", "joints", "force", "torque"])),
+        _markdown(points.drop(columns=["ours", "joints", *(kind for kind in KINDS if kind not in LABELS)])),
     ]
     return "\n\n".join(parts) + "\n"
 

@@ -28,7 +28,7 @@ NOTES = (
 
 
 def joint(d: Dimensions, marked: Collection[str] = ()) -> tuple[Panel, Panel, Panel]:
-    """Front view, side view and detail of a joint; bushings and pins in `marked` stand out."""
+    """Front view, side view and detail of a joint; bushings, pins and shafts in `marked` stand out."""
     mates = ", ".join(f"pin {k + 1} in the hole of arm {arm + 1}" for k, arm in enumerate(d.arm_of_pin))
     bold = f" Marked: {', '.join(sorted(marked))}." if marked else ""
     lengths = f"R {ink.millimetres(d.R)}, r_b {ink.millimetres(d.r_b)}"

@@ -21,7 +21,7 @@ def draw(ax: Axes, d: Dimensions, marked: Container[str] = ()) -> None:
     Parameters are those of `front.draw`.
     """
     sizes = _sizes(d)
-    _input_fork(ax, d, sizes)
+    _input_fork(ax, d, sizes, marked)
     _cross(ax, d, marked)
     along = SIDE.of(d.triads[7, 2])
     _output_fork(ax, d, sizes, along, marked)
@@ -52,7 +52,7 @@ def _sizes(d: Dimensions) -> _Sizes:
     return _Sizes(0.26 * d.R, yoke, yoke + 0.2 * d.R, yoke + 0.95 * d.R)
 
 
-def _input_fork(ax: Axes, d: Dimensions, sizes: _Sizes) -> None:
+def _input_fork(ax: Axes, d: Dimensions, sizes: _Sizes, marked: Container[str]) -> None:
     """Input fork in section through its two arms; the walls of its holes are hatched."""
     eye, hole = -d.eye, -0.5 * d.hole
     inner, outer = d.R - 0.5 * d.arm[1], d.R + 0.5 * d.arm[1]
@@ -61,7 +61,8 @@ def _input_fork(ax: Axes, d: Dimensions, sizes: _Sizes) -> None:
     upper = [(-sizes.end, sizes.shaft), (back, sizes.shaft), (back, outer), (eye, outer), (eye, high), (hole, high)]
     upper += [(hole, low), (eye, low), (eye, inner), (-sizes.yoke, inner)]
     whole = np.array(upper + [(z, -x) for z, x in reversed(upper)])
-    ink.part(ax, whole, ink.INPUT, "side.input_fork", zorder=1)
+    edge = ink.OUTLINED if "input" in marked else {}
+    ink.part(ax, whole, ink.INPUT, "side.input_fork", zorder=1, **edge)
     for k in (0, 1):
         e = SIDE.of(d.triads[4 + k, 0])
         for i, sign in enumerate((-1.0, 1.0), 1):
@@ -86,7 +87,8 @@ def _output_fork(ax: Axes, d: Dimensions, sizes: _Sizes, along: Array, marked: C
     beam, centre = min(d.arm[0], 2.0 * d.eye), SIDE.of(d.centres[7])
     shaft, yoke, bridge, end = sizes
     for begin, stop, width in ((0.0, yoke, beam), (bridge, end, 2.0 * shaft), (yoke, bridge, max(beam, 2.4 * shaft))):
-        ink.part(ax, bar(centre + begin * along, centre + stop * along, width), ink.OUTPUT, zorder=3)
+        edge = ink.OUTLINED if "output" in marked and stop == end else {}
+        ink.part(ax, bar(centre + begin * along, centre + stop * along, width), ink.OUTPUT, zorder=3, **edge)
     ink.part(ax, circle(centre, d.eye), ink.OUTPUT, "side.arm4", zorder=3.1)
     ink.part(ax, circle(centre, 0.5 * d.hole), "white", "side.hole4", zorder=3.2, linewidth=ink.THIN)
     edge = ink.OUTLINED if "pin1" in marked else {"linewidth": ink.THIN}
@@ -136,10 +138,12 @@ def _names(ax: Axes, d: Dimensions, marked: Container[str], yoke: float, shaft: 
     _called(ax, edge, places[0], "arm 4, arm 3 behind", {}, d.R)
     _called(ax, marker, places[1], "fork4, fork3 behind", _look(marked, "fork3", "fork4"), d.R)
     ink.bushing(ax, marker, "fork4", 0.045 * d.R, "fork4" in marked or "fork3" in marked)
+    small: dict[str, Any] = {"fontsize": ink.SMALL}
     middle, turned = yoke + 0.5 * d.R, float(np.degrees(np.arctan2(along[1], along[0])))
-    ink.label(ax, np.array([-middle, -0.5 * shaft]), "input shaft", fontsize=ink.SMALL)
+    ink.label(ax, np.array([-middle, -0.5 * shaft]), "input shaft", **(small | _look(marked, "input")))
     below = middle * along - 0.5 * shaft * across
-    ink.label(ax, below, "output shaft", fontsize=ink.SMALL, rotation=turned, rotation_mode="anchor")
+    look = small | _look(marked, "output")
+    ink.label(ax, below, "output shaft", rotation=turned, rotation_mode="anchor", **look)
 
 
 def _look(marked: Container[str], *names: str) -> dict[str, Any]:

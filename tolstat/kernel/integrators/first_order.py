@@ -1,7 +1,6 @@
-"""The joint as a first-order system, y = (q, q'), for third-party integrators: rate, Jacobian, loads."""
+"""The joint as a first-order system, y = (q, q'), for third-party integrators: rate, Jacobian."""
 
-from tolstat.kernel.mechanics.dynamics import acceleration, forces
-from tolstat.kernel.mechanics.loads import all_loads
+from tolstat.kernel.mechanics.dynamics import acceleration
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.simd.jit import njit
@@ -55,21 +54,3 @@ def rate_of_row(t, y, params, options, works, out):
 def jacobian_of_row(t, y, params, options, works, column, out):
     """`jacobian` at `y`, scratch `column`, with `params` and `works` of shape (1,), as in `rate_of_row`."""
     jacobian(t, y, params[0], options, works[0], column, out)
-
-
-@njit
-def sample(times, states, par, work, value):
-    """Evaluate all loads along a solution.
-
-    Parameters
-    ----------
-    times, states : ndarray, shapes (m,) and (m, 112)
-        The solution, s; m and rad, per s.
-    par, work : records of PARAM and WORK
-        The joint; scratch.
-    value : ndarray, shape (m, N_LOADS)
-        Written: as by `loads.all_loads`, SI.
-    """
-    for k in range(times.size):
-        forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
-        all_loads(0, par, work, states[k, N_DOF:], value[k])

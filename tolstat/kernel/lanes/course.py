@@ -15,16 +15,15 @@ from tolstat.kernel.mechanics.topology import N_DOF, PSI
 from tolstat.kernel.revolution.adaptive import adapt_mesh, begin_mesh
 from tolstat.kernel.revolution.closeup import count_in
 from tolstat.kernel.revolution.equilibrium import CV_STATIC, FIRST, GROWTH, LARGEST, MAX_STEPS, SHRINK, SMALLEST
-from tolstat.kernel.revolution.quasistatic import angle_time, end_closure
+from tolstat.kernel.revolution.quasistatic import angle_time
 from tolstat.kernel.revolution.resolve import (
     after_revolution,
     clear_extremes,
     follows_error,
     merge_extremes,
 )
-from tolstat.kernel.revolution.settle import grid_step, predict_increment, record
+from tolstat.kernel.revolution.settle import closure_error, grid_step, predict_increment, record
 from tolstat.kernel.revolution.simulate import (
-    CHECKS_PER_REV,
     NEWTON_FAILED,
     NOT_SETTLED,
     OK,
@@ -138,7 +137,7 @@ def advance(lane, options, control, motion):
 def step(lane, par, lanes, options, control, motion, samples, notes, out):
     """Record the grid point that a lane has reached and set up the next step; return the status."""
     k = control.k[lane]
-    record(k, lane, k > options.steps_per_rev // CHECKS_PER_REV, lanes[0], lanes[1], lanes[2].v, samples)
+    record(k, lane, lanes[0], lanes[1], lanes[2].v, samples)
     motion.memory[AHEAD, lane] = predict_increment(
         k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples
     )
@@ -156,7 +155,7 @@ def step(lane, par, lanes, options, control, motion, samples, notes, out):
 def finish_closeup_part(lane, par, lanes, options, control, motion, fine, out):
     """Record a part of a closer look and set up the next one; return `OK` after the last part of the step."""
     j, part = control.looked[lane], control.grid[lane]
-    record(j, lane, True, lanes[0], lanes[1], lanes[2].v, fine)
+    record(j, lane, lanes[0], lanes[1], lanes[2].v, fine)
     count_in(j, fine, out)
     control.looked[lane] += 1
     control.part[lane] += 1
@@ -174,12 +173,12 @@ def finish_angle(lane, par, lanes, options, control, motion, samples, out):
     k, n = control.k[lane], options.steps_per_rev
     control.steps[lane] += 1
     control.passed[lane] = 1.0
-    record(k, lane, True, lanes[0], lanes[1], lanes[2].v, samples)
+    record(k, lane, lanes[0], lanes[1], lanes[2].v, samples)
     samples[k % n].tau = motion.q[PSI, lane]
     if k == n:
         k = 0
         control.done[lane] += 1
-        out.closure, out.revolutions = end_closure(samples), float(control.done[lane])
+        out.closure, out.revolutions = closure_error(0, 1, samples), float(control.done[lane])
         if out.closure <= options.settle_tol:
             return OK
         tired = control.iterations[lane] > MAX_ITERATIONS * n * options.max_revs
@@ -308,7 +307,7 @@ def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
         if not control.error[lane] <= 1:
             status = reject_cell(lane, options, control, motion, past)
             return status, status == NOT_SETTLED
-        record(control.part[lane], lane, True, lanes[0], lanes[1], lanes[2].v, fine)
+        record(control.part[lane], lane, lanes[0], lanes[1], lanes[2].v, fine)
         count_in(control.part[lane], fine, past.extremes[0])
     control.steps[lane] += 1
     control.done[lane] += whole >> control.level[lane]
@@ -335,7 +334,7 @@ def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
         cells = past.mesh.size // samples.size
         if c % cells == 0:
             k = c // cells
-            record(k, lane, True, lanes[0], lanes[1], lanes[2].v, samples)
+            record(k, lane, lanes[0], lanes[1], lanes[2].v, samples)
             predict_increment(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
     if c % past.mesh.size == 0:
         point = motion.q0[:, lane], motion.v0[:, lane], motion.a0[:, lane]

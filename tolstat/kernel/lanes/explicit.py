@@ -127,7 +127,7 @@ def arrive(lane, par, lanes, left, options, alone, batch, samples, past, out):
                 return NEWTON_FAILED, False
             start_revolution(lane, par, options, batch)
             return NOT_SETTLED, True
-        record(k, lane, True, lanes[0], lanes[1], motion.v[:, lane], samples)
+        record(k, lane, lanes[0], lanes[1], motion.v[:, lane], samples)
     if k < n:
         return NOT_SETTLED, True
     control.steps[lane] += steps
@@ -204,7 +204,7 @@ def explicit(rows, words, steps, left, options, alone, batch, samples, blocks, r
         tally[0] += 1
         arrived = bits_of(control.until <= 0)
         for lane in range(WIDTH):
-            trail = Trail(pasts.modulus[lane], pasts.revolution[lane], pasts.notes[lane])
+            trail = Trail(pasts.loads[lane], pasts.revolution[lane], pasts.notes[lane])
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1:
                 joint = at.joint[lane]

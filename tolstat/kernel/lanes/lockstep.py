@@ -205,7 +205,7 @@ def load_joint(lane, joint, rows, words, starts, left, options, alone, batch, sa
         start_motion(lane, par, options, control, motion)
         if control.phase[lane] == PART:
             all_past = batch.pasts
-            trail = Trail(all_past.modulus[lane], all_past.revolution[lane], all_past.notes[lane])
+            trail = Trail(all_past.loads[lane], all_past.revolution[lane], all_past.notes[lane])
             past = Past(trail, all_past.turns[lane], all_past.extremes[lane], all_past.begun[lane], all_past.mesh[lane])
             start_cells(lane, par, options, control, motion, past)
     else:
@@ -309,7 +309,7 @@ def lockstep(rows, words, starts, left, options, patience, alone, batch, samples
                 queued = fill(lane, queued, rows, words, starts, left, options, alone, batch, samples, results)
                 continue
             here, goes_on = samples_of(lane, batch, samples), True
-            trail = Trail(pasts.modulus[lane], pasts.revolution[lane], pasts.notes[lane])
+            trail = Trail(pasts.loads[lane], pasts.revolution[lane], pasts.notes[lane])
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1 == 0:
                 if phase == PART:

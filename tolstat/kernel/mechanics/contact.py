@@ -7,7 +7,7 @@ m = h x n; f acts on the pin along -n, the film's drag along -m.
 
 import math
 
-from tolstat.common.tables import INNER, OUTER, RESULTANT
+from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode as ContactMode
 from tolstat.kernel.mechanics.bushing import accumulate
 from tolstat.kernel.mechanics.spring import elastic, has_needles

@@ -14,13 +14,15 @@ the couple T / cos(gamma) on the cross along its normal, and the secondary coupl
 
 import math
 
-from tolstat.common.tables import INNER, OUTER, RESULTANT, Mode
+from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
+from tolstat.common.tables import Mode
 from tolstat.kernel.mechanics.bushing import accumulate, markers
 from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion
 from tolstat.kernel.mechanics.topology import (
     ARM,
     ARM_OF_PIN,
+    BUSHING_BASE,
     BUSHING_LUMP,
     FRAME,
     FRAME_F,
@@ -78,7 +80,7 @@ def ideal_loads(theta, par, state, work):
     state : State
         Its ``q0`` and ``v0`` are set to zero.
     work : record of WORK
-        ``load``, ``contact`` and ``mode`` are written; other fields are scratch.
+        ``load``, ``contact``, ``mode`` and, of the shafts, ``force`` are written; other fields are scratch.
     """
     state.q0[:] = 0.0
     state.v0[:] = 0.0
@@ -128,11 +130,16 @@ def touch(pin, radius, force, par, work):
 
 @njit
 def carry(i, par, work):
-    """Write the load of bushing `i`: the resultant that its lump still needs, about the marker, in the triad."""
-    lump = BUSHING_LUMP[i]
-    lever, _ = markers(i, par)
+    """Write the load of bushing `i`: the resultant that its lump still needs, about the marker, in the triad.
+
+    Its opposite acts on the base.
+    """
+    lump, base = BUSHING_LUMP[i], BUSHING_BASE[i]
+    lever, on_base = markers(i, par)
     f = row(work.force, lump)
     torque = sub((work.force[lump, 3], work.force[lump, 4], work.force[lump, 5]), cross(lever, f))
+    off = scale(-1.0, f)
+    accumulate(work.force, base, off, add(cross(on_base, off), scale(-1.0, torque)))
     f, torque = to_triad(lump, f), to_triad(lump, torque)
     for k in range(3):
         work.load[i, k], work.load[i, 3 + k] = f[k], torque[k]

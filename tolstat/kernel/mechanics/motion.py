@@ -26,7 +26,7 @@ def ideal_motion(theta, alpha, omega, work):
     omega : float
         Input speed, rad/s.
     work : record of WORK
-        Its ``frame_w``, ``frame_dw``, ``relative``, ``relative_w`` and ``shaft`` are written.
+        Its ``frame_w``, ``frame_dw``, ``relative``, ``relative_w``, ``shaft`` and ``turned`` are written.
     """
     sa, ca = sine_cosine(alpha)
     st, ct = sine_cosine(theta)
@@ -67,3 +67,5 @@ def ideal_motion(theta, alpha, omega, work):
     rel_w[FRAME_I, 0], rel_w[FRAME_I, 1], rel_w[FRAME_I, 2] = db, 0.0, 0.0
     rel_w[FRAME_F, 0], rel_w[FRAME_F, 1], rel_w[FRAME_F, 2] = 0.0, -dg, 0.0
     work.shaft[0], work.shaft[1] = dto, ddto
+    work.turned[0, 0], work.turned[0, 1] = ct, st
+    work.turned[1, 0], work.turned[1, 1] = ca * ct / cg, st / cg

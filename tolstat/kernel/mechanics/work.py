@@ -8,6 +8,7 @@ took five times as long.) All 6 x 6 blocks lie in one array: a kernel is compile
 import numpy as np
 
 from tolstat.common.parameters import MAX_STATIONS
+from tolstat.kernel.mechanics.loads import N_INSTANT
 from tolstat.kernel.mechanics.topology import N_BODIES, N_DOF, N_LUMPS
 
 # columns of work.station
@@ -28,6 +29,7 @@ FIELDS = {
     "relative": (3, 3, 3),  # components in C to components in I, -, F
     "relative_w": (3, 3),  # angular velocity of C relative to I, -, F
     "shaft": (2,),  # ideal speed and acceleration of the output shaft
+    "turned": (2, 2),  # cosine and sine of the angle theta of the input, and theta_o of the output shaft
     "pos": (N_BODIES, 3),  # X + u
     "vel": (N_BODIES, 3),  # u'
     "rot": (N_BODIES, 3, 3),  # exp(phi x)
@@ -36,6 +38,7 @@ FIELDS = {
     "load": (8, 6),  # bushing loads on the lump, in the base marker's (e, t, z)
     "contact": (4, 3),  # normal force at the outer and inner end station of each pin, resultant of all its stations
     "mode": (4,),  # contact mode of each pin
+    "loads": (N_INSTANT,),  # as `loads.write_loads` writes them
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
     "block": (N_LUMPS + 16, 6, 6),  # matrices of the tangent, see `HUB_PIN` to `ARM_PIN`; factorised in place
     "edge": (2, 18, 6),  # its columns and rows psi and s, see `ARM_SHAFT` to `SHAFT_HUB`; of pins and hub: fill-in

@@ -103,7 +103,7 @@ def build_resolve(newton, begin):
                 worst = max(worst, error)
                 if not error <= 1:
                     return max(2.0, worst)
-                record(j, 0, True, par, work, state.v, fine)
+                record(j, 0, par, work, state.v, fine)
                 count_in(j, fine, extremes)
             accept(h, state, options)
             done += share
@@ -156,7 +156,7 @@ def build_resolve(newton, begin):
                 out.failed_step = k
                 return NEWTON_FAILED
             if c % cells == 0 and past.turns.beside == 0:
-                record(k, 0, True, par, work, state.v0, ring.samples)
+                record(k, 0, par, work, state.v0, ring.samples)
                 predict_increment(k, state.q0, state.v0, state.ahead, ring.samples)
             if c % past.mesh.size == 0:
                 point, halved = (state.q0, state.v0, state.a0), past.turns.halved

@@ -2,7 +2,8 @@
 
 import math
 
-from tolstat.common.tables import CONTACTS, LIFE_EXPONENT, RESULTANT
+from tolstat.common.load_kinds import CONTACTS, RESULTANT
+from tolstat.common.tables import LIFE_EXPONENT
 from tolstat.kernel.mechanics.loads import CONTACT_FORCES
 from tolstat.kernel.mechanics.trigonometry import sine_cosine
 from tolstat.kernel.simd.jit import njit

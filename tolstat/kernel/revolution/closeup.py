@@ -10,13 +10,21 @@ import math
 
 from tolstat.kernel.integrators.integrate import BDF2
 from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD, UNLIMITED
-from tolstat.kernel.mechanics.loads import FORCES, INTERPOLATED, N_AVERAGED, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.loads import (
+    DECIDING,
+    INTERPOLATED,
+    N_AVERAGED,
+    N_INSTANT,
+    N_MEASURES,
+    OF_MEASURE,
+    size_of,
+)
 from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.revolution.settle import peak, record
 from tolstat.kernel.simd.jit import njit, njit_inner
 
 NEAR = 0.005
-"""Distance of a load from its largest value, in units of the largest of its kind, that ringing may bridge."""
+"""Distance of a load from its largest value, in units of its measure, that ringing may bridge."""
 KINK = 5e-4
 """Third difference of a load's samples, in the units of `NEAR`, up to which ringing is too weak to bridge that
 distance."""
@@ -35,13 +43,12 @@ def switches(s, samples):
 
 @njit
 def on_a_peak(s, samples, out):
-    """Whether any bushing load has a kink between samples `s - 1` and `s` and is near its largest value there."""
+    """Whether a load that decides has a kink between samples `s - 1` and `s` and is near its largest value there."""
     n = samples.size
-    for first in (FORCES, TORQUES):
-        size = 0.0
-        for i in range(first, first + 8):
-            size = max(size, out.largest[i])
-        for i in range(first, first + 8):
+    for measure in range(N_MEASURES):
+        size = size_of(measure, out.largest)
+        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+            i = DECIDING[j]
             m0, m1 = samples[s - 2].loads[i], samples[s - 1].loads[i]
             m2, m3, m4 = samples[s].loads[i], samples[(s + 1) % n].loads[i], samples[(s + 2) % n].loads[i]
             kink = max(abs(m3 - m0 - 3 * (m2 - m1)), abs(m4 - m1 - 3 * (m3 - m2)))
@@ -68,7 +75,7 @@ def height(before, here, ahead):
 def count_in(j, fine, out):
     """Update the extremes in `out` with sample `j` of the finer integration and the peak at sample `j - 1`, if any."""
     here, before, first = fine[j % 3], fine[(j - 1) % 3], fine[(j - 2) % 3]
-    for i in range(N_LOADS):
+    for i in range(N_INSTANT):
         load = here.loads[i]
         if j > 1 and INTERPOLATED[i]:
             load = max(load, height(first.loads[i], before.loads[i], load))
@@ -135,7 +142,7 @@ def build_closeup(advance, acceleration):
                 if not advance((n + k - 1) * h + i * part, part, par, options, work, state):
                     left = 0
                     break
-                record(j, 0, True, par, work, state.v0, fine)
+                record(j, 0, par, work, state.v0, fine)
                 count_in(j, fine, out)
                 j += 1
 

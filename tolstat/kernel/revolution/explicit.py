@@ -101,5 +101,5 @@ def walk(par, options, work, motion, control, peaks):
         control.t = origin + control.count * h
         predict(h, motion)
         acceleration(control.t, motion.q, motion.v, par, options, work, motion.a)
-        follow(work, motion.v, peaks)
+        follow(par, work, motion.v, peaks)
         correct(h, motion)

@@ -7,17 +7,24 @@ import math
 
 import numpy as np
 
-from tolstat.common.tables import CONTACTS, INNER, OUTER
-from tolstat.kernel.mechanics.loads import CONTACT_FORCES, INTERPOLATED, N_AVERAGED, N_LOADS, loads_to_follow
+from tolstat.common.load_kinds import CONTACTS, INNER, OUTER
+from tolstat.kernel.mechanics.loads import (
+    CONTACT_FORCES,
+    INTERPOLATED,
+    MODULUS,
+    N_AVERAGED,
+    N_INSTANT,
+    write_loads,
+)
+from tolstat.kernel.mechanics.topology import PSI
 from tolstat.kernel.simd.jit import njit
-from tolstat.kernel.simd.lane import any_of, pick, retain, where
+from tolstat.kernel.simd.lane import ALL, any_of, pick, retain, where
 
 PEAKS = np.dtype(
     [
-        ("now", "f8", N_LOADS),  # as `loads_to_follow` writes them: squares of the moduli of bushing loads, other loads
-        ("one", "f8", N_LOADS),  # of the last step
-        ("two", "f8", N_LOADS),  # of the step before
-        ("top", "f8", N_LOADS),  # largest so far
+        ("one", "f8", N_INSTANT),  # loads as `write_loads` writes them, at the last step
+        ("two", "f8", N_INSTANT),  # at the step before
+        ("top", "f8", N_INSTANT),  # largest so far
         ("low", "f8", N_AVERAGED),  # smallest so far
     ]
 )
@@ -27,9 +34,9 @@ NEAR = 0.9
 
 
 @njit
-def follow_value(i, peaks):
-    """Include load `i` and, where it is interpolated, its peak at the step before, if there is one."""
-    load, one, two, top = peaks.now[i], peaks.one[i], peaks.two[i], peaks.top[i]
+def follow_value(i, load, peaks):
+    """Include the value of load `i` and, where it is interpolated, its peak at the step before, if there is one."""
+    one, two, top = peaks.one[i], peaks.two[i], peaks.top[i]
     if INTERPOLATED[i]:
         at_peak = (one >= two) & (one >= load) & (one > NEAR * top)
         if any_of(at_peak):
@@ -44,17 +51,17 @@ def follow_value(i, peaks):
 
 
 @njit
-def follow(work, v, peaks):
+def follow(par, work, v, peaks):
     """Include the loads in ``work``; `v`: velocities that they were evaluated at, (56,)."""
-    loads_to_follow(work, v, peaks.now)
-    for i in range(N_LOADS):
-        follow_value(i, peaks)
+    write_loads(ALL, v[PSI] / (work.shaft[0] + v[PSI]), par, work)
+    for i in range(N_INSTANT):
+        follow_value(i, work.loads[i], peaks)
 
 
 @njit
 def forget(mask, peaks):
     """Reset in the lanes of the mask; NaN stands for steps before the first one, so that it is no peak."""
-    for i in range(N_LOADS):
+    for i in range(N_INSTANT):
         peaks.top[i] = retain(mask, 0.0, peaks.top[i])
         peaks.one[i], peaks.two[i] = retain(mask, np.nan, peaks.one[i]), retain(mask, np.nan, peaks.two[i])
         if i < N_AVERAGED:
@@ -74,8 +81,9 @@ def largest_at_an_end(lane, peaks):
 @njit
 def write_peaks(lane, peaks, out):
     """Write largest and smallest loads of a lane to `out`, a row of KERNEL_RESULT."""
-    for i in range(N_LOADS):
-        out.largest[i] = pick(peaks.top[i], lane)
+    for i in range(N_INSTANT):
+        top = pick(peaks.top[i], lane)
+        out.largest[i] = math.sqrt(top) if MODULUS[i] else top
         if i < N_AVERAGED:
-            out.largest[i] = math.sqrt(out.largest[i])
-            out.range[i] = out.largest[i] - math.sqrt(pick(peaks.low[i], lane))
+            low = pick(peaks.low[i], lane)
+            out.range[i] = out.largest[i] - (math.sqrt(low) if MODULUS[i] else low)

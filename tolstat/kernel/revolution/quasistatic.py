@@ -11,10 +11,9 @@ where pseudo-transient continuation leads from there.
 import math
 
 from tolstat.kernel.integrators.state import AHEAD, HALVINGS, STEPS
-from tolstat.kernel.mechanics.loads import FORCES, SPEED_ERROR, TORQUES
+from tolstat.kernel.mechanics.loads import SPEED_ERROR
 from tolstat.kernel.mechanics.motion import speed_ratio
 from tolstat.kernel.mechanics.topology import PSI
-from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.kernel.simd.lane import where
 
@@ -75,22 +74,8 @@ def keep(solved, state):
 
 
 @njit
-def end_closure(samples):
-    """Change of the load moduli at theta = 0 over the revolution, relative to the largest of their kind."""
-    worst = 0.0
-    for kind in (0, 1):
-        largest = 0.0
-        for s in range(samples.size):
-            for b in range(8):
-                largest = max(largest, samples[s].loads[(FORCES, TORQUES)[kind] + b])
-        change = samples[0].change[kind]
-        worst = larger(worst, change / largest if largest > 0 else change)
-    return worst
-
-
-@njit
 def speed_ratios(par, samples):
-    """Write ``tau`` and its error |Psi|, eq. (13), of the samples.
+    """Write ``tau`` and its error Psi, eq. (13), of the samples.
 
     Before, ``tau`` holds the output shaft's angular deviation. Its derivative with respect to the input angle is taken
     by periodic central differences.
@@ -103,7 +88,8 @@ def speed_ratios(par, samples):
         slope = (ahead - before) * by_sample
         before = here
         samples[s].tau = speed_ratio(2 * math.pi * s / n, par.alpha) + slope
-        samples[s].loads[SPEED_ERROR] = abs(slope / samples[s].tau)
+        samples[s].psi = slope / samples[s].tau
+        samples[s].loads[SPEED_ERROR] = abs(samples[s].psi)
 
 
 def build_quasistatic(hold, relax, record):
@@ -113,7 +99,7 @@ def build_quasistatic(hold, relax, record):
     ----------
     hold, relax : jitted functions
         As `equilibrium.build_equilibrium` returns them.
-    record : jitted function (k, lane, in_full, par, work, v, samples) -> None
+    record : jitted function (k, lane, par, work, v, samples) -> None
         Records an angle, see `settle.record`.
 
     Returns
@@ -139,7 +125,7 @@ def build_quasistatic(hold, relax, record):
                         return False
             keep(True, state)
             state.counters[STEPS] += 1
-            record(k, 0, True, par, work, state.v0, ring.samples)
+            record(k, 0, par, work, state.v0, ring.samples)
             ring.samples[k % n].tau = state.q0[PSI]
         return True
 

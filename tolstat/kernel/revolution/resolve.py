@@ -15,10 +15,19 @@ import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Motion, Options, Status
 from tolstat.kernel.integrators.mesh import CELL, cells_of
-from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.loads import (
+    DECIDING,
+    FORCES,
+    N_AVERAGED,
+    N_DECIDING,
+    N_INSTANT,
+    N_MEASURES,
+    OF_MEASURE,
+    TORQUES,
+    size_of,
+)
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
-from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.revolution.closeup import extend
 from tolstat.kernel.revolution.settle import closure_error, summarise
 from tolstat.kernel.revolution.trail import (
@@ -79,7 +88,7 @@ TURNS = np.dtype(
         ("steps", "i8"),  # explicit steps of a revolution before they were halved
         ("bearable", "f8"),  # contact force of an end station up to which the steps in use are stable, N
         ("growth", "f8"),  # sum of the logarithms of its growth
-        ("before", "f8", N_AVERAGED),  # largest bushing loads with the steps before
+        ("before", "f8", N_DECIDING),  # largest of the loads that decide with the steps before
         ("other", "f8", (3, N_DOF)),  # q, v, a of the neighbour; of the joint while `beside` is 1
     ]
 )
@@ -101,7 +110,7 @@ class Pasts(NamedTuple):
     Kernels return no records: each caller makes the `Past` of one joint itself.
     """
 
-    modulus: np.ndarray
+    loads: np.ndarray
     revolution: np.recarray
     notes: np.recarray
     turns: np.recarray
@@ -123,7 +132,7 @@ def make_pasts(joints: int, options: Options) -> Pasts:
 def make_past(options: Options) -> Past:
     """Allocate for one joint."""
     all_of_it = make_pasts(1, options)
-    trail = Trail(all_of_it.modulus[0], all_of_it.revolution[0], all_of_it.notes[0])
+    trail = Trail(all_of_it.loads[0], all_of_it.revolution[0], all_of_it.notes[0])
     return Past(trail, all_of_it.turns[0], all_of_it.extremes[0], all_of_it.begun[0], all_of_it.mesh[0])
 
 
@@ -159,7 +168,7 @@ def begin_turns(par, options, past):
 @njit
 def clear_extremes(extremes):
     """Reset largest and smallest loads."""
-    for i in range(N_LOADS):
+    for i in range(N_INSTANT):
         extremes.largest[i] = 0.0
     for i in range(N_AVERAGED):
         extremes.range[i] = -np.inf
@@ -172,13 +181,20 @@ def merge_extremes(one, out):
         low = one.largest[i] - one.range[i]
         top, span = extend(one.largest[i], out.largest[i], out.range[i])
         out.largest[i], out.range[i] = top, max(span, top - low)
-    for i in range(N_AVERAGED, N_LOADS):
+    for i in range(N_AVERAGED, N_INSTANT):
         out.largest[i] = max(out.largest[i], one.largest[i])
 
 
 @njit
+def keep_deciding(loads, kept):
+    """Copy the loads that decide to `kept`, (N_DECIDING,)."""
+    for j in range(N_DECIDING):
+        kept[j] = loads[DECIDING[j]]
+
+
+@njit
 def keep_revolution(par, samples, extremes, trail, r):
-    """Store moduli and statistics of revolution `r` (from 0) of the joint; reset `extremes`; return the statistics.
+    """Store loads and statistics of revolution `r` (from 0) of the joint; reset `extremes`; return the statistics.
 
     Largest and smallest loads are those of all parts: parabolas through samples of the grid would overshoot spikes.
     """
@@ -187,20 +203,20 @@ def keep_revolution(par, samples, extremes, trail, r):
     clear_extremes(own)
     merge_extremes(extremes, own)
     clear_extremes(extremes)
-    stride = -(-samples.size // trail.modulus.shape[1])
+    stride = -(-samples.size // trail.loads.shape[1])
     for s in range(0, samples.size, stride):
-        copy(samples[s].loads[:N_AVERAGED], trail.modulus[r % trail.revolution.size, s // stride])
+        keep_deciding(samples[s].loads, trail.loads[r % trail.revolution.size, s // stride])
     return own
 
 
 @njit
 def largest_change(before, out):
-    """Largest change of any largest bushing load against `before`, relative to the largest of the kind."""
+    """Largest change of a largest load that decides against `before`, (N_DECIDING,), relative to its measure."""
     worst = 0.0
-    for first in (FORCES, TORQUES):
-        change = size = 0.0
-        for i in range(first, first + 8):
-            change, size = max(change, abs(out.largest[i] - before[i])), max(size, out.largest[i])
+    for measure in range(N_MEASURES):
+        change, size = 0.0, size_of(measure, out.largest)
+        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+            change = max(change, abs(out.largest[DECIDING[j]] - before[j]))
         worst = max(worst, change / size if size > 0 else 0.0)
     return worst
 
@@ -225,7 +241,7 @@ def find_period(last, closure, tolerance, turns, trail):
 @njit
 def halve_steps(period, turns, out):
     """Halve the steps from the next revolution on; keep `period` and the largest loads in `out` for comparison."""
-    copy(out.largest[:N_AVERAGED], turns.before)
+    keep_deciding(out.largest, turns.before)
     turns.halved += 1
     turns.since, turns.period = turns.revolution, period
     turns.limit = max(turns.limit, turns.revolution + SETTLING)

@@ -6,20 +6,27 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.kernel.mechanics.loads import (
-    FORCES,
+    DECIDING,
     INTERPOLATED,
     N_AVERAGED,
-    N_LOADS,
-    TORQUES,
-    modulus,
-    other_loads,
+    N_INSTANT,
+    N_MEASURES,
+    OF_FORCES,
+    OF_MEASURE,
+    OF_TORQUES,
+    OTHERS,
+    load_at,
     output_speed,
+    shaft_load,
+    size_of,
+    write_loads,
 )
 from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, OUTPUT_SHAFT
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
+from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.revolution.trail import make_notes
 from tolstat.kernel.simd.borrow import fetch
 from tolstat.kernel.simd.jit import njit
@@ -28,10 +35,12 @@ from tolstat.kernel.simd.lane import pick
 SAMPLE = np.dtype(
     [
         ("components", "f8", (8, 6)),  # of the bushing loads along and about e, t, z; N, N m
-        ("loads", "f8", (N_LOADS,)),  # kind after kind
-        ("change", "f8", (2,)),  # largest change of |F| or s as a force, and of |T|, against the revolution before
+        ("loads", "f8", (N_INSTANT,)),  # kind after kind
+        ("change", "f8", (N_MEASURES,)),  # largest change of a load that decides, or of s as a force, in a revolution
         ("s", "f8"),  # displacement of the output shaft along its axis, m
+        ("shafts", "f8", (2, 6)),  # force and moment about O on input and output shaft, in axes that do not turn
         ("tau", "f8"),
+        ("psi", "f8"),  # its error, eq. (13)
         ("mode", "u1", (4,)),
         ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
         ("q", "f8", (N_DOF,)),  # m, rad
@@ -81,8 +90,8 @@ def pressed(pin, lane, par, work):
 
 
 @njit
-def record(k, lane, in_full, par, work, v, samples):
-    """Record the loads of a grid point, and the change of the bushing loads since the revolution before.
+def record(k, lane, par, work, v, samples):
+    """Record a grid point, and the change of the loads that decide since the revolution before.
 
     Parameters
     ----------
@@ -90,12 +99,10 @@ def record(k, lane, in_full, par, work, v, samples):
         Number of the grid point, counted from the start; it overwrites sample k modulo n.
     lane : int
         Lane of the joint; has no effect where there is one joint only.
-    in_full : bool
-        Whether to record the whole sample; otherwise only load moduli and their changes.
     par : record of PARAM
         The joint.
     work : record of WORK
-        The joint's last evaluation.
+        The joint's last evaluation; its ``loads`` are written.
     v : ndarray, shape (56,)
         Velocities at that evaluation, m/s and rad/s.
     samples : ndarray of SAMPLE, shape (n,)
@@ -103,26 +110,40 @@ def record(k, lane, in_full, par, work, v, samples):
     """
     sample = samples[k % samples.size]
     fetch(samples[(k + 2) % samples.size])
-    for kind in (0, 1):
+    sample.tau, sample.psi = output_speed(lane, par, work, v)
+    write_loads(lane, sample.psi, par, work)
+    for measure in range(N_MEASURES):
         change = 0.0
-        for b in range(8):
-            i, load = (FORCES, TORQUES)[kind] + b, modulus(3 * kind, b, lane, work)
+        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+            i = DECIDING[j]
+            load = load_at(i, lane, work)
             change = larger(change, abs(load - sample.loads[i]))  # NaN in the first revolution
             sample.loads[i] = load
-        sample.change[kind] = change
+        sample.change[measure] = change
     s = pick(work.pos[OUTPUT_SHAFT, 2], lane)
-    sample.change[0] = larger(sample.change[0], centring_stiffness(lane, par) * abs(s - sample.s))
+    shift = centring_stiffness(lane, par) * abs(s - sample.s)
+    sample.change[OF_FORCES] = larger(sample.change[OF_FORCES], shift)
     sample.s = s
-    if not in_full:
-        return
-    other_loads(lane, par, work, v, sample.loads)
+    for i in OTHERS:
+        sample.loads[i] = load_at(i, lane, work)
     for b in range(8):
         for i in range(6):
             sample.components[b, i] = pick(work.load[b, i], lane)
+    for shaft in range(2):
+        write_shaft(shaft, lane, par, work, sample.shafts[shaft])
     for pin in range(4):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin] = pressed(pin, lane, par, work)
-    sample.tau, _ = output_speed(lane, par, work, v)
+
+
+@njit
+def write_shaft(shaft, lane, par, work, out):
+    """Write force and moment on a shaft to `out`, (6,), in G for the input shaft, in Ry(alpha) for the output shaft."""
+    cosine, sine = pick(work.turned[shaft, 0], lane), pick(work.turned[shaft, 1], lane)
+    first = 0
+    for x, y, z in shaft_load(shaft, lane, par, work):
+        out[first], out[first + 1], out[first + 2] = cosine * x - sine * y, sine * x + cosine * y, z
+        first += 3
 
 
 @njit
@@ -162,18 +183,17 @@ def predict_increment(k, q, v, ahead, samples):
 
 @njit
 def closure_error(first, last, samples):
-    """Largest change of any bushing load's modulus since the revolution before, relative to the largest of its kind.
+    """Largest change of any load that decides since the revolution before, relative to its measure.
 
     Changes count at samples `first` to `last` - 1.
     """
     worst = 0.0
-    for kind in (0, 1):
+    for measure in range(N_MEASURES):
         change = largest = 0.0
         for s in range(first, last):
-            change = larger(change, samples[s].change[kind])
+            change = larger(change, samples[s].change[measure])
         for s in range(samples.size):
-            for b in range(8):
-                largest = max(largest, samples[s].loads[(FORCES, TORQUES)[kind] + b])
+            largest = max(largest, size_of(measure, samples[s].loads))
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
     return worst
@@ -214,9 +234,8 @@ def step_error(par, samples):
     """
     force = torque = 0.0
     for s in range(samples.size):
-        for b in range(8):
-            force = max(force, samples[s].loads[FORCES + b])
-            torque = max(torque, samples[s].loads[TORQUES + b])
+        force = max(force, size_of(OF_FORCES, samples[s].loads))
+        torque = max(torque, size_of(OF_TORQUES, samples[s].loads))
     total = 0.0
     for s in range(samples.size):
         q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q
@@ -237,7 +256,7 @@ def step_error(par, samples):
 def summarise(par, samples, out):
     """Write the statistics of the recorded revolution of the joint `par` to a row of KERNEL_RESULT."""
     n = samples.size
-    for i in range(N_LOADS):
+    for i in range(N_INSTANT):
         if i < N_AVERAGED:
             top, low = extremes(samples.loads[:, i])
             total = 0.0
@@ -257,3 +276,4 @@ def summarise(par, samples, out):
                 count += samples[s].mode[pin] == mode
             out.mode_share[pin, mode] = count / n
     write_equivalent_loads(par.alpha, samples, out)
+    write_orders(samples, out)

@@ -20,14 +20,14 @@ from tolstat.kernel.integrators.state import (
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.guess import rigid_guess
 from tolstat.kernel.mechanics.ideal_loads import ideal_loads
-from tolstat.kernel.mechanics.loads import N_AVERAGED, N_LOADS
+from tolstat.kernel.mechanics.loads import DECIDING, N_AVERAGED, N_LOADS
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution.adaptive import build_resolve
 from tolstat.kernel.revolution.closeup import build_closeup
 from tolstat.kernel.revolution.equilibrium import CA_REGULAR, CV_REGULAR, build_equilibrium, near
-from tolstat.kernel.revolution.quasistatic import angle_time, build_quasistatic, end_closure, speed_ratios
+from tolstat.kernel.revolution.quasistatic import angle_time, build_quasistatic, speed_ratios
 from tolstat.kernel.revolution.resolve import Past, follows_error, make_past
 from tolstat.kernel.revolution.settle import (
     Ring,
@@ -127,7 +127,9 @@ def clear(par, state, samples, notes):
     state.a0[:] = 0.0
     reset(state)
     for s in range(samples.size):
-        samples[s].loads[:N_AVERAGED] = samples[s].s = np.nan
+        for i in DECIDING:
+            samples[s].loads[i] = np.nan
+        samples[s].s = np.nan
     notes.count = 0
 
 
@@ -156,7 +158,7 @@ def run_ideal(par, work, state, ring, out):
     n = ring.samples.size
     for k in range(n):
         ideal_loads(math.copysign(2 * math.pi * k / n, par.omega), par, state, work)
-        record(k, 0, True, par, work, state.v0, ring.samples)
+        record(k, 0, par, work, state.v0, ring.samples)
     out.closure, out.revolutions = 0.0, 1.0
     state.counters[STEPS] = n
     return OK
@@ -170,7 +172,7 @@ def run_quasistatic(par, options, work, state, ring, out):
     for revolutions in range(options.max_revs):
         if not revolution(revolutions == 0, par, options, work, state, ring):
             return NEWTON_FAILED
-        out.closure, out.revolutions = end_closure(ring.samples), revolutions + 1.0
+        out.closure, out.revolutions = closure_error(0, 1, ring.samples), revolutions + 1.0
         if out.closure <= options.settle_tol:
             break
         if state.counters[ITERATIONS] > MAX_ITERATIONS * n * options.max_revs:
@@ -239,7 +241,7 @@ def run_dynamic(par, options, work, state, ring, out):
         if not advance((k - 1) * h, h, par, options, work, state):
             out.failed_step = k
             return NEWTON_FAILED
-        record(k, 0, k > n // CHECKS_PER_REV or options.max_revs == 1, par, work, state.v0, ring.samples)
+        record(k, 0, par, work, state.v0, ring.samples)
         state.memory[AHEAD] = predict_increment(k, state.q0, state.v0, state.ahead, ring.samples)
         status = check_settled(k, state.counters[ITERATIONS], par, options, ring.samples, ring.notes, out)
         if status == NEWTON_FAILED:

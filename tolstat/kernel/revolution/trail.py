@@ -1,7 +1,7 @@
-"""History of a joint over many revolutions: closure errors, load moduli and statistics of each revolution.
+"""History of a joint over many revolutions: closure errors, loads and statistics of each revolution.
 
 With uniform steps only closure errors are stored, one number per check. With error-controlled steps (`resolve`) whole
-revolutions are stored: moduli of their loads, for closure errors over several revolutions, and the statistics of each.
+revolutions are stored: loads that decide, for closure errors over several revolutions, and the statistics of each.
 """
 
 import math
@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, LIFE_EXPONENT
-from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_LOADS, TORQUES
+from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_AVERAGED, N_DECIDING, N_LOADS, N_MEASURES, OF_MEASURE
 from tolstat.kernel.mechanics.scale import axial_decay
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit
 
 MOST_ANGLES = 360
-"""Maximum number of input angles per revolution at which moduli are kept."""
+"""Maximum number of input angles per revolution at which loads are kept."""
 MOST_CHECKS = 192
 """Maximum number of closure errors kept; older ones are overwritten."""
 SLOW_DECAY = 0.05
@@ -33,7 +33,7 @@ NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
 class Trail(NamedTuple):
     """Work arrays; revolution r lies at index r modulo the number kept."""
 
-    modulus: np.ndarray  # (kept, angles, N_AVERAGED) moduli of the bushing loads
+    loads: np.ndarray  # (kept, angles, N_DECIDING) loads that decide
     revolution: np.ndarray  # (kept,) record of KERNEL_RESULT: statistics of each revolution
     notes: np.record  # NOTES
 
@@ -41,8 +41,8 @@ class Trail(NamedTuple):
 def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
     """Allocate the arrays of several trails, for `kept` revolutions."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
-    modulus = np.full((joints, kept, angles, N_AVERAGED), np.nan)
-    return modulus, np.zeros((joints, kept), KERNEL_RESULT).view(np.recarray), make_notes(joints)
+    loads = np.full((joints, kept, angles, N_DECIDING), np.nan)
+    return loads, np.zeros((joints, kept), KERNEL_RESULT).view(np.recarray), make_notes(joints)
 
 
 def make_notes(joints: int) -> np.recarray:
@@ -119,15 +119,16 @@ def with_slow_decay(closure, revolutions, par, notes):
 @njit
 def lag_closure(last, lag, trail):
     """Closure error of revolution `last` (from 0) against the one `lag` earlier, defined as in `closure_error`."""
-    kept, angles = trail.modulus.shape[0], trail.modulus.shape[1]
-    now, before = trail.modulus[last % kept], trail.modulus[(last - lag) % kept]
+    kept, angles = trail.loads.shape[0], trail.loads.shape[1]
+    now, before = trail.loads[last % kept], trail.loads[(last - lag) % kept]
     worst = 0.0
-    for first in (FORCES, TORQUES):
+    for measure in range(N_MEASURES):
         change = largest = 0.0
         for s in range(angles):
-            for i in range(first, first + 8):
-                change = larger(change, abs(now[s, i] - before[s, i]))
-                largest = max(largest, now[s, i])
+            for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+                change = larger(change, abs(now[s, j] - before[s, j]))
+                if MEASURES[measure, 0] <= DECIDING[j] < MEASURES[measure, 1]:
+                    largest = max(largest, now[s, j])
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
     return worst

@@ -1,10 +1,12 @@
-"""Simulation of one joint over a given number of steps, with every state recorded."""
+"""Trajectories of one joint: over a given number of steps, with every state recorded; loads along a given one."""
 
 import math
 
 from tolstat.kernel.integrators import integrate
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
+from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.revolution.settle import record
 from tolstat.kernel.revolution.simulate import (
     NEWTON_FAILED,
     OK,
@@ -53,3 +55,21 @@ def follow(par, options, work, state, points):
         for i in range(state.q0.size):
             points[k, 0, i], points[k, 1, i], points[k, 2, i] = state.q0[i], state.v0[i], state.a0[i]
     return OK
+
+
+@njit
+def sample(times, states, par, work, samples):
+    """Record the loads along a solution.
+
+    Parameters
+    ----------
+    times, states : ndarray, shapes (m,) and (m, 112)
+        The solution, s; m and rad, per s.
+    par, work : records of PARAM and WORK
+        The joint; scratch.
+    samples : ndarray of SAMPLE, shape (m,)
+        Written.
+    """
+    for k in range(times.size):
+        dynamics.forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
+        record(k, 0, par, work, states[k, N_DOF:], samples)

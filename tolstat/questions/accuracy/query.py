@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
 from tolstat.analysis.accuracy import KIND_OF, OBSERVABLES
-from tolstat.common.loads import KINDS, UNIT_OF_LOAD
+from tolstat.common.load_kinds import LOAD_KINDS
+from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.tables import Status
 from tolstat.store.verification import Verification
 from tolstat.store.view import View
@@ -27,13 +28,13 @@ def _results(verification: Verification) -> dict[str, np.ndarray[tuple[int], np.
 
 
 def _held(verification: Verification) -> NDArray[np.bool_]:
-    """Which of `OBSERVABLES` the campaign keeps, (21,); all if no joint has a value."""
+    """Which of `OBSERVABLES` the campaign keeps, (loads,); all if no joint has a value."""
     held = ~np.isnan(accuracy.loads(verification.base)).all(axis=0)
     return np.asarray(held | ~held.any())
 
 
 def errors(verification: Verification) -> dict[str, accuracy.FloatArray]:
-    """Errors relative to the largest load of the kind, (m, 21), by check; last `TOTAL`, from `accuracy.numerical`."""
+    """Errors, (m, loads), by check, as of `accuracy.differences`; last `TOTAL`, from `accuracy.numerical`."""
     results = _results(verification)
     found = {name: accuracy.differences(verification.base, other) for name, other in results.items()}
     return found | {TOTAL: accuracy.numerical(verification.base, results)}
@@ -58,7 +59,7 @@ def distribution_rows(verification: Verification) -> list[dict[str, Any]]:
     rows = []
     found, held = errors(verification), _held(verification)
     for k in np.unique(KIND_OF[held]):
-        kind = KINDS[k]
+        kind = LOAD_KINDS[k].key
         for name, values in found.items():
             n, *spread = accuracy.spread(accuracy.by_kind(values)[:, k])
             rows.append(dict(zip(COLUMNS, (kind, name, n, *spread), strict=True)))
@@ -84,7 +85,7 @@ def joints(verification: Verification) -> pd.DataFrame:
     -------
     DataFrame
         ``row``, ``check``, ``status`` (of the check), ``load``, ``unit``, ``campaign`` and ``value`` (SI), ``error``:
-        the campaign's value minus the check's, relative to the largest load of the kind.
+        the campaign's value minus the check's, relative to the largest load of the measure.
     """
     import pandas as pd
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from tolstat.analysis.accuracy import FIDELITY, REFERENCE
+from tolstat.common.load_kinds import KIND
+from tolstat.common.loads import load_of
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.table import Column
@@ -46,10 +50,11 @@ def basis(verification: Verification) -> str:
     return f"estimated on {m} {noun} from half the step, tighter Newton and longer settling"
 
 
-def note(verification: Verification) -> str:
-    """Sentence on the numerical error of the largest loads."""
+def note(verification: Verification, limits: Iterable[str] = ()) -> str:
+    """Sentence on the numerical error of the largest loads: of kinds that every report shows, and those of `limits`."""
+    kinds = {load_of(name).kind.key for name in limits}
     total = [row for row in distribution_rows(verification) if row["error"] == TOTAL]
-    shown = [row for row in total if row["load"] in ("F", "T")] or total
+    shown = [row for row in total if row["load"] in kinds or KIND[row["load"]].shown] or total
     words = [
         f"{row['load']} {_small(row['median'])}, at worst {_small(row['worst'])}"
         for row in shown

@@ -14,7 +14,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
     """Numerical error of the loads, measured or estimated on some joints; needs a verification."""
     if view.verification is None:
         return []
-    blocks: list[Block] = [Text(text.sentence(rendering.note(view.verification)))]
+    blocks: list[Block] = [Text(text.sentence(rendering.note(view.verification, view.limits)))]
     title = "Relative to the largest load of its kind in the joint"
     blocks.append(as_block(title, rendering.ERRORS, query.distribution(view.verification)))
     return [Section("accuracy", "Numerical error", blocks)]

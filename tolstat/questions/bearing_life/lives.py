@@ -13,8 +13,9 @@ from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
 from tolstat.analysis.sorted_loads import EXACT
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.load_kinds import PINS
 from tolstat.common.shown import shown
-from tolstat.common.tables import LIFE_EXPONENT, PINS, VALID
+from tolstat.common.tables import LIFE_EXPONENT, VALID
 from tolstat.joint import Bearing, operating
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.store import worst

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from tolstat.analysis.sorted_loads import EXACT
-from tolstat.common.tables import LIFE_EXPONENT, PINS, Mode
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import LIFE_EXPONENT, Mode
 from tolstat.display import text
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, keeps_loads, lives_of

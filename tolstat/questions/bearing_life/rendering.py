@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tolstat.analysis.exceedance import unresolved_matter
 from tolstat.analysis.rating_life import A1
-from tolstat.common.tables import PINS
+from tolstat.common.load_kinds import PINS
 from tolstat.display import style, text
 from tolstat.display.table import Column, Row, has, has_unresolved
 from tolstat.questions.bearing_life.lives import JOINT, Lives

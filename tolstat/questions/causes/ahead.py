@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, StoreError, TolstatError
-from tolstat.common.loads import BUSHING_LOADS
+from tolstat.common.load_kinds import CHANNELS
 from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.questions.causes.tail import worst_samples
@@ -28,7 +28,7 @@ def begin(view: View, asked: Asked) -> None:
     if not asked.replay or len(view.points) > 1 or view.method == "sweep" or revolutions.held(view.store):
         return
     with suppress(TolstatError):  # the sections say what is wrong
-        slots = [view.slots(drawn(view, load)) for load in view.leading if load in BUSHING_LOADS]
+        slots = [view.slots(drawn(view, load)) for load in view.leading if load in CHANNELS]
         if slots:
             with suppress(TolstatError):
                 nominal, samples = evaluated(view, asked.replay)

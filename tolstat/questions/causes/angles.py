@@ -12,10 +12,10 @@ from tolstat import sampling
 from tolstat.analysis import sensitivity
 from tolstat.analysis.sensitivity import FirstOrder
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
+from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import BUSHINGS
 from tolstat.questions.causes.ahead import JOINTS, evaluated
 from tolstat.questions.causes.query import scattering
 from tolstat.store import revolutions
@@ -116,8 +116,8 @@ def against_angle(
         `MIN_JOINTS` have settled.
     """
     for name in loads:
-        if name not in BUSHING_LOADS:
-            raise InputError([Fault(name, "is not a load over the shaft angle", did_you_mean(name, BUSHING_LOADS))])
+        if name not in CHANNELS:
+            raise InputError([Fault(name, "is not a load over the shaft angle", did_you_mean(name, list(CHANNELS)))])
     nominal, samples = evaluated(view, joints)
     found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]))
     errors = view.errors(samples, sampling.columns(view.study))
@@ -125,18 +125,16 @@ def against_angle(
     return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
 
 
-def modulus(found: Revolutions, load: str) -> FloatArray:
-    """Modulus of one bushing load over the revolution, (m, k), N or N m."""
-    bushing, _, letter = load.partition(".")
-    moduli = found.F if letter == "F" else found.T
-    return moduli[:, :, BUSHINGS.index(bushing)]
+def load_of(found: Revolutions, load: str) -> FloatArray:
+    """One load over the revolution, (m, k), SI."""
+    return CHANNELS[load].of(found.loads)
 
 
 def _of_load(
     errors: dict[str, FloatArray], found: Revolutions, nominal: int, name: str, iid: bool, log: bool
 ) -> AgainstAngle:
     """Indices of one load; the first `nominal` (0 or 1) joints of `found` are the nominal joint."""
-    values = modulus(found, name)
+    values = load_of(found, name)
     y = values[nominal:]
     names = list(errors)
     first, overall = sensitivity.over_revolution(

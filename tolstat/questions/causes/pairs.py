@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.ranks import ranks
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.load_kinds import PINS
 from tolstat.common.shown import shown
-from tolstat.common.tables import PINS
 from tolstat.joint import HOLE_OF_PIN, perturb
 from tolstat.store import worst
 from tolstat.store.view import View

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.artist import Artist
@@ -12,6 +14,8 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
+from tolstat.common.load_kinds import Kind
+from tolstat.common.loads import PANELS, names_of
 from tolstat.display import drawing, style, text
 from tolstat.questions.exceedance.query import curve
 from tolstat.questions.exceedance.rendering import note
@@ -40,23 +44,23 @@ def figure(view: View, confidence: float = 0.95) -> Figure:
     with style.settings():
         title = f"{view.name}: share of joints whose largest load exceeds x"
         page, panels = style.panels(title, f"{view.head()}\n{note(view)}")
-        for group, letter, ax in panels:
-            panel(ax, view, group, letter, confidence)
+        for group, kind, ax in panels:
+            panel(ax, view, group, kind, confidence)
         _legend(page, view)
     return page
 
 
-def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.95) -> None:
-    """Draw the curves of four bushings: ``cross`` or ``fork``, ``F`` or ``T``."""
-    names = [f"{group}{i}.{letter}" for i in (1, 2, 3, 4)]
+def panel(ax: Axes, view: View, group: str, kind: Kind, confidence: float = 0.95) -> None:
+    """Draw the curves of the loads of one kind at four bushings: ``cross`` or ``fork``."""
+    names = names_of(group, kind)
     tables = [
         curve(view.load(name), confidence, DRAWN_LEVELS)
         if name in view.bushing_loads
         else np.empty(0, exceedance.CURVE)
         for name in names
     ]
-    unit = "N" if letter == "F" else "N*m"
-    if letter == "F":
+    unit = kind.unit
+    if kind == PANELS[0][1]:
         ax.set_ylabel("share of joints above x")
     levels = np.concatenate([table["level"] for table in tables])
     if not levels.size:
@@ -65,11 +69,11 @@ def panel(ax: Axes, view: View, group: str, letter: str, confidence: float = 0.9
         ax.text(0.5, 0.5, found, ha="center", transform=ax.transAxes)
         ax.set(xticks=[], yticks=[])
         return
-    marked = _limit_levels(view, group, letter)
+    marked = _limit_levels(view, names)
     low, high = axis_range(levels, list(marked))
     ax.set_xlim(low, high)
     shown = drawing.loads_axis(ax.xaxis, max(marked, default=high), unit)
-    ax.set_xlabel(f"x: largest |{letter}| over the revolution [{shown}]")
+    ax.set_xlabel(f"x: largest |{kind.symbol}| over the revolution [{shown}]")
     floor = 0.5 * min(least(view, table) for table in tables if table.size)
     style.share_axis(ax, floor)
     for i, table in enumerate(tables):
@@ -122,11 +126,10 @@ def steps(ax: Axes, table: NDArray[np.void], i: int, low: float, floor: float) -
     ax.step(x, shown("estimate"), where="post", color=colour, ls=style.DASHES[i], zorder=3)
 
 
-def _limit_levels(view: View, group: str, letter: str) -> dict[float, list[int]]:
+def _limit_levels(view: View, names: Sequence[str]) -> dict[float, list[int]]:
     """Limits of a panel: level -> numbers of the bushings that have it."""
     found: dict[float, list[int]] = {}
-    for i in (1, 2, 3, 4):
-        name = f"{group}{i}.{letter}"
+    for i, name in enumerate(names, 1):
         if name in view.limits:
             found.setdefault(view.limits[name], []).append(i)
     return dict(sorted(found.items()))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
-from tolstat.common.loads import ALL_LIMITS, BUSHING_LOADS, load_of, unit_text
+from tolstat.common.loads import ALL_LIMITS, SHOWN_LOADS, load_of, unit_text
 from tolstat.display import text
 from tolstat.store import error_budget
 from tolstat.store.once import once
@@ -270,5 +270,5 @@ def summary(view: View, confidence: float) -> dict[str, Any]:
 
 def not_kept(view: View) -> str:
     """Sentence that names the bushing loads that the study does not keep; empty if it keeps all."""
-    names = [name for name in BUSHING_LOADS if name not in view.bushing_loads]
+    names = [name for name in SHOWN_LOADS if name not in view.bushing_loads]
     return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""

@@ -9,6 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from tolstat.analysis.exceedance import simultaneous
+from tolstat.common.load_kinds import Kind
+from tolstat.common.loads import LOADS, PANELS, QUANTITY, load_of, names_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
@@ -21,7 +23,6 @@ from tolstat.store.view import View
 
 THIN_LEVELS = 80
 """Maximum number of points of a curve without a band."""
-GROUPS = [(group, letter) for group in ("cross", "fork") for letter in "FT"]
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
@@ -77,7 +78,7 @@ def _leading_panel(view: View, name: str) -> Panel:
     """Curve of a leading load with its band; on switches the other bushings, and a band for the whole curve."""
     load, plain = view.load(name), view.narrowed(name)[1]
     others = [other for other in view.bushing_loads if other != plain and plain in view.bushing_loads]
-    others = [other for other in others if other.rpartition(".")[2] == plain.rpartition(".")[2]]
+    others = [other for other in others if LOADS[other].kind == LOADS[plain].kind]
     others = [f"{other}{name.removeprefix(plain)}" for other in others]
     switches = [("others", "other bushings, without bands (cross solid, fork dashed)")] if others else []
     if view.iid and not view.weighted:
@@ -114,7 +115,7 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
             drawn = ax.step(x, end.clip(1e-3 * floor, 1.0), where="post", color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))
             drawing.switched(drawn[0], "curve-band")
     for other, own in thin.items():
-        dash = "-" if other.startswith("cross") else (0.0, (4.0, 1.5))
+        dash = "-" if load_of(other).place.group == "cross" else (0.0, (4.0, 1.5))
         along, shares = np.append(low, own["level"][1:]), own["estimate"].clip(1e-3 * floor, 1.0)
         drawn = ax.step(along, shares, where="post", color=style.FAINT, lw=0.7, ls=dash)
         drawing.switched(drawn[0], "others")
@@ -142,15 +143,15 @@ def _of_sweep(view: View) -> Section:
     room = drawing.legend_room(sweep.key(view)[1])
     panels = [
         Panel(
-            f"sweep-{group}-{letter}",
-            f"{group.capitalize()} bushings, {'force' if letter == 'F' else 'torque'}",
-            f"Largest {'forces' if letter == 'F' else 'torques'} of the {group} bushings against the swept value",
-            partial(_sweep, view=view, group=group, letter=letter),
+            f"sweep-{group}-{kind.symbol}",
+            f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}",
+            f"Largest {QUANTITY[kind.unit]}s of the {group} bushings against the swept value",
+            partial(_sweep, view=view, group=group, kind=kind),
             (4.9, 3.3 + room),
             top=room,
         )
-        for group, letter in GROUPS
-        if any(f"{group}{i}.{letter}" in view.bushing_loads for i in (1, 2, 3, 4))
+        for group, kind in PANELS
+        if any(name in view.bushing_loads for name in names_of(group, kind))
     ]
     table = sweep.worst(view)
     rows = [[f"{x:.5g}" if isinstance(x, float) else str(x) for x in row] for row in table.itertuples(index=False)]
@@ -159,6 +160,6 @@ def _of_sweep(view: View) -> Section:
     return Section("sweep", "Loads against the swept value", blocks)
 
 
-def _sweep(ax: Axes, view: View, group: str, letter: str) -> None:
-    sweep.panel(ax, view, group, letter)
+def _sweep(ax: Axes, view: View, group: str, kind: Kind) -> None:
+    sweep.panel(ax, view, group, kind)
     drawing.legend_above(ax, *sweep.key(view))

@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.load_kinds import Kind
+from tolstat.common.loads import PANELS, UNIT_OF_LOAD, names_of, unit_text
 from tolstat.common.tables import FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.display import style, text
 from tolstat.questions.exceedance.swept_axes import Axis, swept_axes
@@ -50,12 +51,10 @@ def worst(view: View) -> pd.DataFrame:
     full = table(view)
     loads = [c for c in full.columns if str(c).partition(" ")[0] in UNIT_OF_LOAD] if view.bushing_loads else []
     short = full[[c for c in full.columns if c not in loads]].copy()
-    for group in ("cross", "fork"):
-        for unit in ("N", "N*m"):
-            letter = "F" if unit == "N" else "T"
-            columns = [c for c in loads if str(c).startswith(group) and str(c).endswith(f".{letter} [{unit}]")]
-            if columns:
-                short[f"{group}.{letter} [{unit}]"] = full[columns].max(axis=1)
+    for group, kind in PANELS:
+        columns = [column for name in names_of(group, kind) if (column := f"{name} [{kind.unit}]") in loads]
+        if columns:
+            short[f"{group}.{kind.symbol} [{kind.unit}]"] = full[columns].max(axis=1)
     return short
 
 
@@ -79,20 +78,20 @@ def figure(view: View) -> Figure:
     with style.settings():
         title = f"{view.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
         page, panels = style.panels(title, f"{view.head()}\n{_note(axes)}")
-        for group, letter, ax in panels:
-            panel(ax, view, group, letter)
+        for group, kind, ax in panels:
+            panel(ax, view, group, kind)
         style.legend(page, *key(view))
     return page
 
 
-def panel(ax: Axes, view: View, group: str, letter: str) -> None:
-    """Draw the loads of four bushings: ``cross`` or ``fork``, ``F`` or ``T``."""
+def panel(ax: Axes, view: View, group: str, kind: Kind) -> None:
+    """Draw the loads of one kind at four bushings: ``cross`` or ``fork``."""
     axes = swept_axes(view)
     first = axes[0] if axes else Axis("joint", "", np.arange(1, view.n + 1, dtype=np.float64))
     ax.set_xlabel(_head(first))
     ax.xaxis.set_major_locator(MaxNLocator(6))
-    ax.set_ylabel(f"largest |{letter}| [{'N' if letter == 'F' else 'N m'}]")
-    _lines(ax, view, [first, *axes[1:]], group, letter)
+    ax.set_ylabel(f"largest |{kind.symbol}| [{unit_text(kind.unit)}]")
+    _lines(ax, view, [first, *axes[1:]], group, kind)
 
 
 def _head(axis: Axis) -> str:
@@ -107,8 +106,9 @@ def _note(axes: list[Axis]) -> str:
     return said + (f"; one line for each {others}" if others else "")
 
 
-def _lines(ax: Axes, view: View, axes: list[Axis], group: str, letter: str) -> None:
-    names = [name for i in (1, 2, 3, 4) if (name := f"{group}{i}.{letter}") in view.bushing_loads]
+def _lines(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> None:
+    number = {name: i for i, name in enumerate(names_of(group, kind))}
+    names = [name for name in number if name in view.bushing_loads]
     if not names:
         ax.text(0.5, 0.5, "not kept by the study", ha="center", transform=ax.transAxes)
         ax.set(xticks=[], yticks=[])
@@ -116,7 +116,7 @@ def _lines(ax: Axes, view: View, axes: list[Axis], group: str, letter: str) -> N
     loads = [load.values for load in view.loads(names)]
     if len(axes) == 1:
         for name, values in zip(names, loads, strict=True):
-            i = int(name.partition(".")[0][-1]) - 1
+            i = number[name]
             every = np.ones(values.size, dtype=bool)
             _line(ax, view, axes[0].values, values, every, style.COLOURS[i], style.DASHES[i])
     else:
@@ -130,7 +130,7 @@ def _lines(ax: Axes, view: View, axes: list[Axis], group: str, letter: str) -> N
     for limit in sorted(limits):
         if limit < top + 0.5 * (top - bottom):
             ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)))
-            style.note(ax, f"limit {text.value(limit, 'N' if letter == 'F' else 'N*m')}", limit)
+            style.note(ax, f"limit {text.value(limit, kind.unit)}", limit)
 
 
 def _line(

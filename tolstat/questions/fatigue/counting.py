@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.cycles import Cycles
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.load_kinds import CHANNELS
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import CHANNELS, SIMULATED
+from tolstat.common.tables import SIMULATED
 from tolstat.solver import rainflow
 from tolstat.store.revolutions import blocks, loads
 from tolstat.study.selection import select
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def channels(patterns: Sequence[str]) -> tuple[str, ...]:
-    """Names of the channels that any of the patterns selects, in the order of `tables.CHANNELS`.
+    """Names of the channels that any of the patterns selects, in the order of `load_kinds.CHANNELS`.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tolstat.common.tables import CHANNELS
+from tolstat.common.load_kinds import CHANNELS
 from tolstat.questions.fatigue.counting import cycles_of
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def pylife_series(
     view : View
         A campaign that keeps cycles or load histories.
     channels : sequence of str, optional
-        Channels to keep, keys of `tables.CHANNELS`.
+        Channels to keep, keys of `load_kinds.CHANNELS`.
     bins : int
         Number of classes of the range (from 0 to the largest) and of the mean (between its extremes); one set of
         classes for all forces, one for all torques.
@@ -63,7 +63,7 @@ def pylife_series(
     cycles = cycles_of(view.store, np.arange(first, view.store.n), channels)
     joint, channel, place = np.nonzero(cycles.ranges > 0)  # leaves out NaN
     values = {"range": cycles.ranges[joint, channel, place], "mean": cycles.means[joint, channel, place]}
-    torque = np.array([CHANNELS[name] != "N" for name in cycles.channels], bool)[channel]
+    torque = np.array([CHANNELS[name].unit != "N" for name in cycles.channels], bool)[channel]
     rows = np.array(view.store.rows[first:])[joint]
     frame = pd.DataFrame({"joint": rows, "channel": channel, "cycles": cycles.weights[place] * revolutions})
     for name in INTERVALS:
@@ -84,7 +84,7 @@ def table(collectives: pd.Series[float]) -> pd.DataFrame:
 
     index = collectives.index
     flat = {name: index.get_level_values(name) for name in ("joint", "channel")}
-    frame = pd.DataFrame(flat | {"unit": [CHANNELS[name] for name in flat["channel"]]})
+    frame = pd.DataFrame(flat | {"unit": [CHANNELS[name].unit for name in flat["channel"]]})
     for name in INTERVALS:
         level = index.get_level_values(name).array
         frame[f"{name}_left"], frame[f"{name}_right"] = level.left, level.right

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from tolstat.analysis import cycles, damage, exceedance, prediction, quantile, sorted_loads
 from tolstat.analysis.cycles import Cycles, FloatArray
 from tolstat.analysis.prediction import DELIVERY
+from tolstat.common.load_kinds import CHANNELS, PLACES, Channel, Kind
+from tolstat.common.loads import PANELS
 from tolstat.common.shown import shown
-from tolstat.common.tables import CHANNELS, Status
+from tolstat.common.tables import Status
 from tolstat.questions.fatigue import duty
 from tolstat.questions.fatigue.counting import cycles_of
 from tolstat.store.view import View
@@ -81,7 +83,7 @@ def load_cycles(
         Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
         campaign follow from their shares of the time and their speeds, see `worst.shares_of_revolutions`.
     names : sequence of str, optional
-        Channels to keep, keys of `tables.CHANNELS`; by default all 64: some 8 kB per joint.
+        Channels to keep, keys of `load_kinds.CHANNELS`; by default all 64: some 8 kB per joint.
     samples : int, optional
         Number of samples, from the first; by default all.
 
@@ -144,7 +146,7 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
         nominal = damage.equivalent_load(loading.nominal, m, settings.revolutions, settings.reference_cycles)
         lacking = damage.truncation_bound(loading.cycles, m)
         for c, channel in enumerate(loading.cycles.channels):
-            head = {"channel": channel, "unit": CHANNELS[channel], "m": m, "nominal": _only(nominal[:, c])}
+            head = {"channel": channel, "unit": CHANNELS[channel].unit, "m": m, "nominal": _only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))
             sample = sorted_loads.sort_out(values[:, c], loading.status)
             for share in shares:
@@ -227,7 +229,11 @@ def spectra(
         samples = [sorted_loads.sort_out(own, loading.status) for own in values.T]
         for share in shares:
             for number, sample, own in zip(numbers, samples, nominal.T, strict=True):
-                head = {"channel": channel, "unit": CHANNELS[channel], "cycles": number * loading.settings.revolutions}
+                head = {
+                    "channel": channel,
+                    "unit": CHANNELS[channel].unit,
+                    "cycles": number * loading.settings.revolutions,
+                }
                 found = quantile.of_sample(sample, share, confidence, loading.iid)
                 rows.append({**head, "nominal": _only(own), **found._asdict(), "confidence": confidence})
     return pd.DataFrame(rows)
@@ -242,10 +248,10 @@ def most_loaded(table: pd.DataFrame) -> list[str]:
     exponents = sorted(table["m"].unique())
     part = _highest(table)
     part = part[part["m"] == exponents[len(exponents) // 2]].dropna(subset="estimate")
-    components = part[part["channel"].str.contains("_")]
+    components = part[[not CHANNELS[name].is_modulus for name in part["channel"]]]
     part = components if len(components) else part
-    kinds = part["channel"].str.split("_").str[0]
-    return [str(name) for name in part.loc[part.groupby(kinds, sort=False)["estimate"].idxmax(), "channel"]]
+    loads = pd.Series([(CHANNELS[name].place, CHANNELS[name].kind.key) for name in part["channel"]], part.index)
+    return [str(name) for name in part.loc[part.groupby(loads, sort=False)["estimate"].idxmax(), "channel"]]
 
 
 def leading(table: pd.DataFrame) -> list[str]:
@@ -256,11 +262,15 @@ def leading(table: pd.DataFrame) -> list[str]:
     part = _highest(table)
     candidates = part[part["channel"].isin(most_loaded(table))].sort_values("estimate")
     found = []
-    for group in ("cross", "fork"):
-        for letter in "FT":
-            here = candidates[candidates["channel"].str.match(rf"{group}\d\.{letter}")]
-            found += [str(here["channel"].iloc[-1])] if len(here) else []
+    for group, kind in PANELS:
+        here = candidates[[is_in(CHANNELS[name], group, kind) for name in candidates["channel"]]]
+        found += [str(here["channel"].iloc[-1])] if len(here) else []
     return found
+
+
+def is_in(channel: Channel, group: str, kind: Kind) -> bool:
+    """Whether a channel is of a kind of loads, at a place of a group, ``"cross"``."""
+    return PLACES[channel.place].group == group and channel.kind == kind
 
 
 def _highest(table: pd.DataFrame) -> pd.DataFrame:

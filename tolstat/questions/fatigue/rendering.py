@@ -13,11 +13,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from tolstat.analysis.cycles import FloatArray
+from tolstat.common.load_kinds import CHANNELS
 from tolstat.common.loads import unit_text
-from tolstat.common.tables import CHANNELS
 from tolstat.display import style, text
 from tolstat.display.table import Column, Row
-from tolstat.questions.fatigue.query import ANY, SHARES, Loading, equivalent_loads, leading, spectra
+from tolstat.questions.fatigue.query import ANY, SHARES, Loading, equivalent_loads, is_in, leading, spectra
 
 MIN_RANGE = 1e-3
 """Smallest range drawn, relative to the largest."""
@@ -41,7 +41,7 @@ def _interval(row: Row) -> str:
 def _line(row: Row) -> str:
     if row["channel"] == ANY:
         return "-"
-    return f"{text.value(row['S0'], CHANNELS[row['channel']])} at {row['N0']:g} cycles, m = {row['m']:g}"
+    return f"{text.value(row['S0'], CHANNELS[row['channel']].unit)} at {row['N0']:g} cycles, m = {row['m']:g}"
 
 
 LOADS = (
@@ -121,8 +121,8 @@ def figure(loading: Loading, confidence: float = 0.95) -> Figure:
         if loading.iid:
             small += f"\nbands: pointwise {100 * confidence:g} % intervals of order statistics"
         page, panels = style.panels(f"{loading.name}: load spectra over the joints", small)
-        for group, letter, ax in panels:
-            here = [name for name in channels if name.startswith(group) and f".{letter}" in name]
+        for group, kind, ax in panels:
+            here = [name for name in channels if is_in(CHANNELS[name], group, kind)]
             if here:
                 panel(ax, spectra(loading, here[:1], confidence=confidence), loading.settings.revolutions)
             else:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.cycles import Cycles, FloatArray, duty_cycle
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.shown import shown
-from tolstat.common.tables import BUSHINGS, Status
+from tolstat.common.tables import Status
 from tolstat.questions.fatigue import duty
 from tolstat.solver import rainflow
 from tolstat.store import revolutions

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from tolstat.common.tables import FAILED, PINS, STATUS_TEXT, UNSETTLED, VALID, Mode, Status
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID, Mode, Status
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text

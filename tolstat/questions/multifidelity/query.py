@@ -18,7 +18,7 @@ from tolstat.campaign.extend import grow
 from tolstat.campaign.plan import simulate_timed
 from tolstat.campaign.progress import Reporter, note, silent
 from tolstat.common.errors import Fault, InputError, StoreError, gather
-from tolstat.common.loads import BUSHING_LOADS, UNIT_OF_LOAD
+from tolstat.common.loads import SHOWN_LOADS, UNIT_OF_LOAD
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean, validate
 from tolstat.joint import perturb
@@ -155,7 +155,7 @@ def two_fidelities(
         As `campaign.run`; the same call resumes.
     """
     plans = _plans(study, low, high, folder, pilot)
-    names = study.asked or list(BUSHING_LOADS)
+    names = study.asked or list(SHOWN_LOADS)
     by = names[0] if by is None else by
     if by not in names:
         raise InputError([Fault("--by", f"{by!r} is not a load that the study asks for", did_you_mean(by, names))])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.tables import HOLES, PINS
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import HOLES
 from tolstat.display.joint_drawing.geometry import KINDS, Array, Dimensions, Feature, Pair
 from tolstat.joint import Joint, Operation, nominal_errors, perturb
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS

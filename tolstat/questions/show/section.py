@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolstat.common.loads import split
+from tolstat.common.load_kinds import PLACES
+from tolstat.common.loads import load_of
 from tolstat.common.tables import SIMULATED
 from tolstat.display import text
 from tolstat.display.asked import Asked
@@ -19,8 +20,8 @@ from tolstat.store.view import View
 from tolstat.store.worst import point_of
 
 LEGEND = (
-    "The joint from its own dimensions. Marked: the bushings and pins of the leading loads. Loads of cross1–4 act on "
-    "the pins, those of fork1–4 on the arms; their components are along and about the axes e, t, z of each."
+    "The joint from its own dimensions. Marked: the bushings, pins and shafts of the leading loads. Loads of cross1–4 "
+    "act on the pins, those of fork1–4 on the arms; their components are along and about the axes e, t, z of each."
 )
 """Text below the drawings of the joint."""
 WORST = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
@@ -35,21 +36,21 @@ def worst(view: View, load: str, asked: Asked) -> Panel | None:
     view : View
         A campaign.
     load : str
-        The load; empty for the front view without a mark.
+        The load; empty for a view without a mark.
     asked : Asked
         Takes a note if there is no drawing.
     """
     with asked.noting("the joint is not drawn"):
-        place = split(load)[0].rpartition(".")[0]
-        front, side, _ = _joint(view, [place] if place else [], load)
+        place = load_of(load).place if load else PLACES[""]
+        front, side, _ = _joint(view, [place.name], load)
         title = "The joint"
-        if place:
+        if load:
             own = view.load(load)
             exceeded = own.limit is not None and own.above(own.limit).count
-            title = f"{place}: {'most often above its limit' if exceeded else 'nearest to its limit'}"
-            title = title if own.limit is not None else f"{place}: the largest loads"
+            title = f"{place.name or load}: {'most often above its limit' if exceeded else 'nearest to its limit'}"
+            title = title if own.limit is not None else f"{place.name or load}: the largest loads"
             title += f", at {point_of(view, load)}" if len(view.points) > 1 else ""
-        return replace(side if place.startswith("fork") else front, key="joint-worst", title=title)
+        return replace(side if place.view == "side" else front, key="joint-worst", title=title)
     return None
 
 
@@ -71,7 +72,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
             if panels:
                 found.append(Section("drawn", "The worst joints, drawn", [Panels(panels), Text(WORST, small=True)]))
     with asked.noting("the joint and its errors are not drawn"):
-        marked = sorted({name.rpartition(".")[0] for name in view.leading} - {""})
+        marked = sorted({load_of(name).place.name for name in view.leading} - {""})
         joint = joint_of(view.store, 0)
         kinds = sheets.errors(query.positive(joint), query.dimensions(joint, 0.0))
         found.append(

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from tolstat.analysis import cycles, exceedance, quantile, sorted_loads
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.load_kinds import CHANNELS
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import CHANNELS, Status
+from tolstat.common.tables import Status
 from tolstat.store import revolutions
 from tolstat.store.view import View
 from tolstat.study.selection import Entry, quantity
@@ -66,7 +67,7 @@ def time_above(
     view : View
         A campaign with load histories, in full or as harmonics.
     by : sequence of str
-        Loads of bushings, `tables.CHANNELS`: ``cross1.F``, ``fork2.T_e``; by default those that have a limit.
+        Loads of bushings, `load_kinds.CHANNELS`: ``cross1.F``, ``fork2.T_e``; by default those that have a limit.
     levels : sequence of str
         ``"700 N"``; by default the load's limit. A level applies to all loads of its unit.
     curves : bool
@@ -111,7 +112,7 @@ def _levels(view: View, by: Sequence[str], levels: Sequence[str]) -> dict[str, F
         for name in names
         if name not in CHANNELS
     ]
-    units = {CHANNELS[name] for name in names if name in CHANNELS}
+    units = {CHANNELS[name].unit for name in names if name in CHANNELS}
     given: dict[str, list[float]] = {unit: [] for unit in units}
     for text in levels if units else ():
         with gather(faults):
@@ -119,7 +120,7 @@ def _levels(view: View, by: Sequence[str], levels: Sequence[str]) -> dict[str, F
             given[unit].append(value)
     found = {}
     for name in (name for name in names if name in CHANNELS):
-        own = given[CHANNELS[name]] or ([] if levels or name not in view.limits else [view.limits[name]])
+        own = given[CHANNELS[name].unit] or ([] if levels or name not in view.limits else [view.limits[name]])
         if not own and not faults:
             faults.append(Fault("--level", f"{name} has neither a level nor a limit", 'give one: --level "700 N"'))
         found[name] = np.array(own, dtype=float)
@@ -147,7 +148,7 @@ def _shares(
     for part in revolutions.blocks(len(slots)):
         loads = revolutions.loads(view.store, slots[part])
         for name, own in levels.items():
-            load = revolutions.channel(loads, name)
+            load = CHANNELS[name].of(loads)
             ends[name] = min(ends[name][0], float(load.min())), max(ends[name][1], float(load.max()))
             for k, level in enumerate(own):
                 shares[name][part, k] = cycles.share_of_revolution_above(load, float(level))
@@ -162,7 +163,7 @@ def _rows(
         for level, time in zip(own, shares[name].T, strict=True):
             sample = sorted_loads.sort_out(time, np.full(time.size, int(Status.OK)))
             above = exceedance.curve_of(sample, [0.0], confidence, iid)[0]
-            row = {"load": name, "unit": CHANNELS[name], "level": float(level)}
+            row = {"load": name, "unit": CHANNELS[name].unit, "level": float(level)}
             row |= _ends("joints_above", *(float(above[name]) for name in ("estimate", "lower", "upper")))
             # a variable in [0, 1] has at most the variance of a Bernoulli variable with the same mean
             mean = exceedance.clopper_pearson(time.sum(), time.size, confidence) if iid else (np.nan, np.nan)

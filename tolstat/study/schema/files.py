@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import json_schema, loads, strict
 from tolstat.common.files import data_dir
+from tolstat.common.load_kinds import UNIT_OF_CHANNEL
 from tolstat.common.loads import UNIT_OF_LOAD
-from tolstat.common.tables import CHANNELS
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import DEFAULT_JOINT
@@ -189,7 +189,9 @@ def tables() -> dict[str, Schema]:
         "quantity": {"type": ["string", "number"]},
         fits.KEY: of_model(fits.FitEntry),
         "points": {"type": "object", "additionalProperties": of_model(StressPointEntry)},
-        "lines": table({name: {"x-table": _of_unit(LineEntry.__name__, unit)} for name, unit in CHANNELS.items()}),
+        "lines": table(
+            {name: {"x-table": _of_unit(LineEntry.__name__, unit)} for name, unit in UNIT_OF_CHANNEL.items()}
+        ),
     }
     for name, unit in TOLERANCED.items():
         kinds = [for_unit(of_model(model), unit) for model in dict.fromkeys(kinds_of(name).values())]
@@ -202,7 +204,7 @@ def tables() -> dict[str, Schema]:
     for unit in dict.fromkeys(UNIT_OF_LOAD.values()):
         found[_of_unit("limit", unit)] = _positive(unit)
     line = of_model(LineEntry)
-    for unit in dict.fromkeys(CHANNELS.values()):
+    for unit in dict.fromkeys(UNIT_OF_CHANNEL.values()):
         size = {key: value for key, value in line["properties"]["S0"].items() if key != "x-table"} | _positive(unit)
         found[_of_unit(LineEntry.__name__, unit)] = line | {"properties": line["properties"] | {"S0": size}}
     return found

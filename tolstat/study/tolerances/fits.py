@@ -15,8 +15,9 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict
-from tolstat.common.tables import HOLES, PINS
+from tolstat.common.tables import HOLES
 from tolstat.display.text import percent
 from tolstat.study import selection
 from tolstat.study.selection import Entry

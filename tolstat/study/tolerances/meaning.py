@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tolstat.common.tables import HOLES, PINS
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import HOLES
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced

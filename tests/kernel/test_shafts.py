@@ -1,0 +1,144 @@
+"""What the shafts carry: closed forms of the ideal joint, the naive twin, orders of known curves and of joints."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support import naive
+from tolstat.common.load_kinds import ORDERS, SPAN
+from tolstat.common.loads import LOADS
+from tolstat.common.tables import RESULT, Options, Status, for_kernels
+from tolstat.kernel.mechanics import dynamics, loads
+from tolstat.kernel.mechanics.topology import INPUT_SHAFT
+from tolstat.kernel.mechanics.work import make_work
+from tolstat.kernel.revolution.orders import write_orders
+from tolstat.kernel.revolution.settle import make_samples, write_shaft
+from tolstat.solver.simulation import simulate_rows
+
+RPM = np.pi / 30
+TORQUE = 100.0
+SLIDING = {"slides": 1.0, "m_s": 5.0, "k_a": 3e6, "c_a": 2e4, "F_a": 150.0}
+
+
+def of(name: str, results: np.ndarray) -> float:
+    (value,) = LOADS[name].of(results)
+    return float(value)
+
+
+@pytest.mark.parametrize("fidelity", range(3))
+@pytest.mark.parametrize("sense", [1, -1])
+def test_ideal_joint_carries_secondary_couples_and_no_force(params, fidelity: int, sense: int) -> None:
+    """Seherr-Thoss, Schmelz, Aucktor (2006), ch. 4: couples up to T sin(alpha), T tan(alpha), driving torque T tau."""
+    alpha = np.radians(25.0)
+    found = simulate_rows(params(alpha=alpha, speed=sense * RPM), Options(fidelity=fidelity)).results
+    assert found["status"] == Status.OK
+    assert of("input.moment", found) == pytest.approx(TORQUE * np.sin(alpha), rel=1e-4)
+    assert of("output.moment", found) == pytest.approx(TORQUE * np.tan(alpha), rel=1e-4)
+    assert of("input.drive", found) == pytest.approx(TORQUE / np.cos(alpha), rel=1e-4)
+    for shaft in ("input", "output"):
+        assert of(f"{shaft}.axial", found) < 1e-3
+        assert of(f"{shaft}.lateral", found) < 1e-3
+
+
+@pytest.mark.parametrize("fidelity", range(3))
+def test_orders_of_the_ideal_joint_are_those_of_its_closed_form(params, fidelity: int) -> None:
+    """Couples of the ideal joint, slowly turned, by FFT in axes that do not turn; odd orders vanish."""
+    alpha = np.radians(25.0)
+    found = simulate_rows(params(alpha=alpha, speed=RPM), Options(fidelity=fidelity)).results
+    theta = 2 * np.pi * np.arange(720) / 720
+    beta, sine = np.arctan(np.tan(alpha) * np.sin(theta)), np.sin(alpha) * np.cos(theta)
+    ratio = np.cos(alpha) / (1 - sine**2)
+    output = np.arctan2(np.sin(theta), np.cos(theta) * np.cos(alpha))
+    curves = {
+        "input.moment": TORQUE * np.sin(beta) / np.sqrt(1 - sine**2) * 1j * np.exp(1j * theta),
+        "output.moment": TORQUE * sine / np.sqrt(1 - sine**2) * np.exp(1j * output),
+        "input.drive": TORQUE * ratio,
+    }
+    for name, curve in curves.items():
+        spectrum = np.fft.fft(curve) / theta.size
+        for n in ORDERS:
+            expected = abs(spectrum[n]) + abs(spectrum[-n])
+            assert of(f"{name}_{n}x", found) == pytest.approx(expected, abs=2e-4 * TORQUE), f"{name}_{n}x"
+        assert of(f"{name}_1x", found) < 1e-4 * TORQUE
+
+
+def test_a_force_that_turns_and_one_that_swings_have_the_same_amplitude() -> None:
+    """At order 2 both ways round and to and fro, beside a constant force and other orders."""
+    theta = 2 * np.pi * np.arange(90) / 90
+    turning = 22 * np.exp(2j * theta) + 500 + 3 * np.exp(1j * theta)
+    for curve in (turning, turning.conj(), 22 * np.exp(0.7j) * np.cos(2 * theta + 0.4) + 500 + 3 * np.exp(1j * theta)):
+        samples, result = make_samples(1, 90)[0], for_kernels(np.zeros(1, RESULT))[0]
+        samples.shafts[:], samples.psi[:] = 0.0, 1e-3 * np.cos(3 * theta - 1)
+        samples.shafts[:, 1, 0], samples.shafts[:, 1, 1] = curve.real, curve.imag
+        samples.shafts[:, 0, 5] = 100 + 7 * np.sin(4 * theta)
+        write_orders(samples, result)
+        largest = {key: result.largest[span] for key, span in SPAN.items()}
+        assert largest["lateral_orders"] == pytest.approx([0, 0, 0, 0, 3, 22, 0, 0], abs=1e-10)
+        assert largest["drive_orders"] == pytest.approx([0, 0, 0, 7], abs=1e-10)
+        assert largest["psi_orders"] == pytest.approx([0, 0, 1e-3, 0], abs=1e-14)
+        assert largest["moment_orders"] == pytest.approx(np.zeros(8))
+
+
+@pytest.mark.parametrize("speed", [500 * RPM, -500 * RPM])
+@pytest.mark.parametrize("slides", [False, True])
+def test_shafts_carry_what_the_naive_twin_says(params, random_errors, speed: float, slides: bool) -> None:
+    """Forces and moments about O in axes that do not turn, from world coordinates, at a state far from rest."""
+    par = params(alpha=0.3, speed=speed, **random_errors(4))[0]
+    for name, value in SLIDING.items() if slides else ():
+        par[name] = value
+    rng = np.random.default_rng(8)
+    q, v, t = 1e-4 * rng.normal(size=56), 1e-2 * rng.normal(size=56), 0.019
+    q[55] = 3e-4
+    work, found = make_work(), np.empty((2, 6))
+    dynamics.forces(t, q, v, par, work)
+    loads.write_loads(0, 0.0, par, work)
+    force, bodies = naive.forces(t, q, v, par)[0], naive.Bodies(t, q, par)
+    output = naive.turn((0, 1, 0), par.alpha)
+    for shaft, (name, axes) in enumerate((("in", np.eye(3)), ("out", output))):
+        f, about = force[name][:3], bodies.position[name]
+        m = force[name][3:] + np.cross(about, f)
+        f, m = axes.T @ f, axes.T @ m
+        if name == "out" and slides:
+            f[2] = par.k_a * q[55] + par.c_a * v[55] - par.F_a
+        write_shaft(shaft, 0, par, work, found[shaft])
+        np.testing.assert_allclose(found[shaft], [*f, *m], rtol=1e-6, atol=1e-5 * np.abs(f).max())
+        assert work.loads[loads.LATERAL + shaft] == pytest.approx(f[0] ** 2 + f[1] ** 2, rel=1e-5)
+        assert work.loads[loads.MOMENT + shaft] == pytest.approx(m[0] ** 2 + m[1] ** 2, rel=1e-4)
+        assert work.loads[loads.AXIAL + shaft] == pytest.approx(abs(f[2]), rel=1e-6)
+    assert work.pos[INPUT_SHAFT, 2] == 0
+
+
+@pytest.mark.parametrize(("speed", "fidelity"), [(500 * RPM, 0), (-500 * RPM, 0), (500 * RPM, 1)])
+def test_loads_of_a_joint_follow_from_its_history(params, random_errors, speed: float, fidelity: int) -> None:
+    """Largest values and orders of the recorded revolution by NumPy; with the phase of the motion, also backwards."""
+    row = params(alpha=0.25, speed=speed, **random_errors(3))
+    made = simulate_rows(row, Options(fidelity=fidelity, peak_substeps=1), "full")
+    shafts, tau = made.histories["shafts"][0].astype(float), made.histories["tau"][0]
+    phase = np.sign(speed) * 2 * np.pi * np.arange(len(shafts)) / len(shafts)
+    sine = np.sin(0.25) * np.cos(phase)
+    curves = {
+        f"{shaft}.{load}": shafts[:, s, k] + 1j * shafts[:, s, k + 1]
+        for s, shaft in enumerate(("input", "output"))
+        for load, k in (("lateral", 0), ("moment", 3))
+    }
+    curves |= {"input.drive": shafts[:, 0, 5], "psi": 1 - np.cos(0.25) / (1 - sine**2) / tau}
+    for name, curve in curves.items():
+        assert of(name, made.results) == pytest.approx(np.abs(curve).max(), rel=3e-3), name
+        for n in ORDERS:
+            plus, minus = (np.mean(z * np.exp(-1j * n * phase)) for z in (curve, curve.conj()))
+            value = of(f"{name}_{n}x", made.results)
+            assert value == pytest.approx(abs(plus) + abs(minus), rel=1e-4, abs=1e-6 * np.abs(curve).max()), name
+    for s, shaft in enumerate(("input", "output")):
+        assert of(f"{shaft}.axial", made.results) == pytest.approx(np.abs(shafts[:, s, 2]).max(), rel=3e-3)
+
+
+def test_a_joint_that_is_refined_has_all_loads(params) -> None:
+    """Explicit steps: peaks are followed at every step, orders come from the samples of each revolution."""
+    found = simulate_rows(params(alpha=0.3, speed=3000 * RPM, torque=5.0, pin1__offset_t=1e-4), Options()).results
+    assert found["steps_per_rev"] > 180
+    for name in LOADS:
+        assert of(name, found) > 0, name
+    for name in ("input.lateral", "output.lateral", "input.moment", "output.moment", "psi"):
+        parts = [of(f"{name}_{n}x", found) for n in ORDERS]
+        assert max(parts) < 1.3 * of(name, found)

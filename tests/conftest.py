@@ -36,10 +36,9 @@ DEFAULT_KIND = blocks.default_kind
 
 def with_law(par: np.recarray, law: str) -> np.recarray:
     """Give joints of PARAM the contact stations that `law` names; returns them."""
-    stations = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
     still = joints.Operation.model_construct(alpha=0, speed=1, torque=0)
-    own = joints.perturb(stations, still, joints.nominal_errors(1))
-    for name in ("n_stations", "station_s", "station_k1", "station_k2", "station_weight"):
+    own = joints.perturb(joint_with_law(law), still, joints.nominal_errors(1))
+    for name in (*(name for name in PARAM.names if name.startswith("station_")), "n_stations", "needle_b"):
         par[name] = own[name][0]
     return par
 
@@ -49,6 +48,12 @@ def sliding(par: np.recarray, k_a: float = 2e7, c_a: float = 2e3, F_a: float = 2
     for name, value in {"slides": 1.0, "m_s": 5.0, "k_a": k_a, "c_a": c_a, "F_a": F_a}.items():
         par[name] = value
     return par
+
+
+def joint_with_law(law: str) -> joints.Joint:
+    """Load the joint of Cirelli et al. with another contact law, and needle bearings for it."""
+    bearing = {"needles": 32, "needle_length": "22 mm"}
+    return joints.load("cirelli2021", {"contact": {"law": law}, "bearing": bearing}, "test", None)
 
 
 @pytest.fixture(scope="session")

@@ -20,7 +20,7 @@ from tolstat.store.new_file import SESSION
 
 DOCS = Path(__file__).parent.parent / "docs"
 FORMAT, MODEL, STUDY = DOCS / "result_format.md", DOCS / "model.md", DOCS / "study.md"
-SCHEMA = DOCS / "schemas" / f"schema{tables.SCHEMA_VERSION}.md"
+SCHEMA = DOCS / "schemas" / "schema.md"
 PAGE = """# Columns of a result file of schema {version}
 
 Datasets of the groups `/errors` and `/results`; what they are about is in [the result file](../result_format.md).
@@ -78,7 +78,7 @@ def motion_table() -> str:
 
 def law_table() -> str:
     """Markdown table of the contact laws, a line for each kind of station."""
-    lines = ["| law | stations at s | k1, k2 of a station | weight |", "|---|---|---|---|"]
+    lines = ["| law | stations at s | coefficients of a station | weight |", "|---|---|---|---|"]
     for name, law in LAWS.items():
         for i, row in enumerate(law.rows):
             lines.append(" | ".join(["|" if i else f"| `{name}`", *row]) + " |")

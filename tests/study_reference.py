@@ -61,6 +61,9 @@ def kind(own: Mapping[str, Any]) -> str:
     """Type of a key in words, with its bounds."""
     if "enum" in own:
         return ", ".join(f'`"{word}"`' for word in own["enum"])
+    if "x-unit" in own and "anyOf" in own:
+        words, written = own["anyOf"]
+        return f"{kind(words)}, {kind(written | {key: own[key] for key in own if key != 'anyOf'})}"
     bounds = "".join(f", {sign} {own[bound]:g}" for bound, sign in BOUNDS.items() if own.get(bound, 1e10) < 1e10)
     if "x-table" in own:
         return "quantity" if own["x-table"] == "quantity" else "number or table" if "anyOf" in own else "table"

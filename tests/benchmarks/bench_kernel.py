@@ -16,7 +16,7 @@ from tolstat.common.tables import Fidelity
 from tolstat.solver import simulation
 
 pytest.importorskip("pytest_benchmark")
-STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"
+STUDY = REFERENCE.parents[1] / "studies" / "rigid_shafts.toml"
 
 
 @pytest.fixture(scope="module")

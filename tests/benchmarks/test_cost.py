@@ -17,7 +17,7 @@ from tolstat.benchmarks.cost.flops import Counting
 from tolstat.benchmarks.cost.scaling import Stint
 from tolstat.benchmarks.cost.split import Once
 
-STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"
+STUDY = REFERENCE.parents[1] / "studies" / "rigid_shafts.toml"
 
 
 def counted(function):

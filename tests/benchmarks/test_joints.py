@@ -14,7 +14,7 @@ STUDIES = REFERENCE.parents[1] / "studies"
 
 @pytest.mark.parametrize("method", ["random", "lhs"])
 def test_any_rows_are_those_of_the_campaign(method, tmp_path):
-    text = (STUDIES / "iso2768_f.toml").read_text(encoding="utf-8")
+    text = (STUDIES / "rigid_shafts.toml").read_text(encoding="utf-8")
     path = tmp_path / "study.toml"
     path.write_text(text.replace('method = "random"', f'method = "{method}"'), encoding="utf-8")
     base = study.load(path)
@@ -33,7 +33,7 @@ def test_each_joint_of_a_family_has_its_own_variant():
 
 
 def test_chosen_joints_are_nominal_and_random_ones_then_a_block():
-    base = study.load(STUDIES / "iso2768_f.toml")
+    base = study.load(STUDIES / "rigid_shafts.toml")
     params, count = choose(base, 6, 4, 64)
     assert (len(params), count) == (64, 7)
     nominal = joint.perturb(base.joint, base.operation, joint.nominal_errors(1))

@@ -54,7 +54,7 @@ def test_jobs_cover_every_contender_joint_and_setting(installed, monkeypatch):
 
 @pytest.mark.slow
 def test_every_fault_of_a_setup_is_told(tmp_path):
-    text = STUDY.read_text(encoding="utf-8").replace('"iso2768_f.toml"', f'"{STUDY.parent / "iso2768_f.toml"}"')
+    text = STUDY.read_text(encoding="utf-8").replace('"rigid_shafts.toml"', f'"{STUDY.parent / "rigid_shafts.toml"}"')
     path = tmp_path / "setup.toml"
     path.write_text(text.replace('"bdf2"', '"bdf3"').replace("limit = 10.0", "limit = -1").replace("seed", "sed"))
     with pytest.raises(InputError) as caught:
@@ -62,18 +62,18 @@ def test_every_fault_of_a_setup_is_told(tmp_path):
     told = str(caught.value)
     for place in ("tolstat.methods[0]", "others.limit", "sed: unknown key", "seed: missing key"):
         assert place in told
-    few = STUDY.with_name("iso2768_f.toml").read_text(encoding="utf-8").replace("n = 1024", "n = 38")
+    few = STUDY.with_name("rigid_shafts.toml").read_text(encoding="utf-8").replace("n = 1024", "n = 38")
     (tmp_path / "few.toml").write_text(few, encoding="utf-8")
-    path.write_text(text.replace("joints = 6 ", "joints = 39").replace(f"{STUDY.parent}/iso2768_f.toml", "few.toml"))
+    path.write_text(text.replace("joints = 6 ", "joints = 39").replace(f"{STUDY.parent}/rigid_shafts.toml", "few.toml"))
     with pytest.raises(InputError, match="39 of the 38 joints"):
         setup.load(path)
-    path.write_text(text.replace("iso2768_f.toml", "cirelli2021/cirelli2021.toml"))
+    path.write_text(text.replace("rigid_shafts.toml", "cirelli2021/cirelli2021.toml"))
     with pytest.raises(InputError, match="lists its joints"):
         setup.load(path)
 
 
 def test_exudyn_needs_steps(tmp_path):
-    text = STUDY.read_text(encoding="utf-8").replace('"iso2768_f.toml"', f'"{STUDY.parent / "iso2768_f.toml"}"')
+    text = STUDY.read_text(encoding="utf-8").replace('"rigid_shafts.toml"', f'"{STUDY.parent / "rigid_shafts.toml"}"')
     path = tmp_path / "setup.toml"
     path.write_text(re.sub(r"steps_per_rev = .*(?=# of Exudyn)", "", text), encoding="utf-8")
     with pytest.raises(InputError, match=r"others.steps_per_rev(.|\n)*Exudyn"):

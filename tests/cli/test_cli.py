@@ -389,7 +389,8 @@ def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatc
     with Reader.open(path) as store:
         counts = store.counts()
     monkeypatch.setattr(campaign, "run", lambda *_, **__: counts)
-    told = unwrapped(call("run", "small.toml", "--no-report").stderr).splitlines()
+    first, *told = unwrapped(call("run", "small.toml", "--no-report").stderr).splitlines()
+    assert first == "small: shafts rigid along their axes; contact law mode"
     assert told[0] == "small.h5: 61 joints, 3 failed, 1 not settled"
     assert told[1].startswith("3 joints newton_failed: ")
     assert told[2].startswith("  hint, for row 57: failed at step 0 (")

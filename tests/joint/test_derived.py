@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from tolstat import joint as joints
 from tolstat.common import files, units
 from tolstat.common.errors import InputError
+from tolstat.common.strict import validate
 from tolstat.joint import Joint, derived, material
 from tolstat.joint.derived import BEARING, DERIVED, get
 from tolstat.joint.overrides import leaves
@@ -339,3 +340,53 @@ def test_roots_of_a_change() -> None:
     assert derived.changed({"pin.d"}, GIVEN) >= {"pin.A", "pin.mass", "contact.c_d", "bushing.cross.k_tz"}
     assert not derived.changed({"pin.d"}, GIVEN) & {"contact.k1u", "cross.r_b", "hub.mass"}
     assert "contact.k1u" in derived.changed({"pin.d"}, GIVEN.keys() - {"contact.D_P"})
+
+
+# --- the load range of the fit ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("clearance", "used"), [("0.1 mm", 2e4), ("0.005 mm", 1e4), ("0.001 mm", 2.5e3)])
+def test_the_load_range_is_halved_until_contact_stiffens(tmp_path: Path, clearance: str, used: float) -> None:
+    """By eq. (3) itself: force rises faster than displacement up to this load, but not up to twice this load."""
+    joint = overridden(contact__clearance=clearance)
+    of, steel = joint.contact, joint.material
+    assert of.fit_load == used
+    (k1, k2), (above, below) = (
+        np.polynomial.polynomial.polyfit(delta, force / delta, 1, w=delta)[::-1]
+        for load in (used, 2 * used)
+        for force in [np.linspace(0, load, 101)[1:]]
+        for delta in [material.contact_displacement(force / of.z, of.D_H, of.D_P, steel.E, steel.nu)]
+    )
+    assert_allclose((of.k1u, of.k2u), (k1, k2), rtol=1e-6)
+    told = [fault for fault in joint.warnings() if fault.place == "contact.fit_load"]
+    assert bool(told) == (used < 2e4)
+    if told:
+        assert not (above >= 0 and below > 0)
+        assert told[0].found.startswith("up to 20 kN eq. (3) gives no stiffening contact")
+        assert f'fit_load = "{used / 1e3} kN"' in told[0].remedy
+    held = joint.given("json")
+    assert units.to_si(held["contact"]["fit_load"], "N") == used  # so that a result file says what was used
+    assert validate(Joint, held, "file.h5").model_dump() == joint.model_dump()
+
+
+def test_given_coefficients_need_no_fit() -> None:
+    joint = overridden(contact={"clearance": "0.001 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"})
+    assert joint.contact.fit_load == 2e4
+    assert not [fault for fault in joint.warnings() if fault.place == "contact.fit_load"]
+
+
+def test_what_no_load_range_can_mend() -> None:
+    with pytest.raises(InputError) as caught:
+        overridden(contact__clearance="1e-9 mm")
+    (fault,) = caught.value.faults
+    assert "no stiffening contact, not even up to a thousandth of fit_load" in fault.found
+    assert "a larger clearance" in fault.remedy
+
+
+@pytest.mark.parametrize("E", ["210 MPa", "210e3 Pa", "0 GPa", "-210 GPa"])
+def test_a_wrong_modulus_is_not_a_matter_of_the_fit(E: str) -> None:
+    with pytest.raises(InputError) as caught:
+        overridden(material__E=E)
+    (fault,) = caught.value.faults
+    assert fault.place == "case: joint.material.E"
+    assert E in fault.found

@@ -313,7 +313,7 @@ def test_factor_on_E(joint, operation):
     nominal = joints.perturb(joint, operation, one())
     p = joints.perturb(joint, operation, one(material__E_factor=1.21))
     for name in PARAM.names:
-        scale = 1.21 if name in ("k_cross", "k_fork", "station_k1", "station_k2") else 1.0
+        scale = 1.21 if name in ("k_cross", "k_fork", "station_k1", "station_k2", "station_k3") else 1.0
         scale = 1.1 if name in ("c_cross", "c_fork") else scale
         assert_allclose(p[name], scale * nominal[name], rtol=1e-14, err_msg=name)
 
@@ -336,9 +336,10 @@ STATIONS = [
 )
 def test_a_law_is_a_set_of_stations(joint, law, s, k1, k2, weight):
     own = joints.load("cirelli2021", {"contact": {"law": law}}, "case.toml")
-    stations = own.contact.springs()
-    for found, expected in zip(stations, (np.array(s) * MM, k1, k2, weight), strict=True):
-        assert_allclose(found, expected, rtol=1e-12)
+    stations = own.contact.springs(None)
+    expected = {"s": np.array(s) * MM, "k1": k1, "k2": k2, "k3": 0.0, "weight": weight, "b": 0.0}
+    for name, found in stations._asdict().items():
+        assert_allclose(found, expected[name], rtol=1e-12)
     if law == "mode":
         assert sum(stations.k1) == pytest.approx(joint.contact.k1u)
         assert sum(stations.k2) == pytest.approx(joint.contact.k2u)

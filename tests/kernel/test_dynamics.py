@@ -10,7 +10,7 @@ from tests.support import naive
 from tolstat.benchmarks.cost.dense import dense
 from tolstat.common.load_kinds import RESULTANT
 from tolstat.common.tables import Mode, Options
-from tolstat.joint.contact import FROM_COEFFICIENTS
+from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.motion import ideal_motion
 from tolstat.kernel.mechanics.topology import N_DOF, PSI, S
@@ -65,7 +65,7 @@ def test_frames_are_those_of_the_output_shaft(theta, alpha):
 
 
 @SHAFTS
-@pytest.mark.parametrize("law", FROM_COEFFICIENTS)
+@pytest.mark.parametrize("law", PREDEFINED)
 def test_loads_are_those_of_the_naive_twin(params, random_errors, law, shaft):
     par, t, q, v = loaded(params, random_errors, law, shaft=shaft)
     work = make_work()
@@ -90,7 +90,7 @@ def test_contact_modes_are_those_of_the_naive_twin(params, random_errors, law):
 
 
 @SHAFTS
-@pytest.mark.parametrize("law", FROM_COEFFICIENTS)
+@pytest.mark.parametrize("law", PREDEFINED)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_accelerations_balance_the_naive_twin(params, random_errors, law, seed, shaft):
     """Momentum and angular momentum of every body change by the forces on it, in world coordinates."""
@@ -116,7 +116,7 @@ def test_residual_of_the_acceleration_is_zero(params, random_errors, shaft):
 
 
 @SHAFTS
-@pytest.mark.parametrize("law", FROM_COEFFICIENTS)
+@pytest.mark.parametrize("law", PREDEFINED)
 def test_tangent_is_the_derivative_of_the_residual(params, random_errors, law, shaft):
     """Up to what the tangent leaves out on purpose, which must cost Newton less than a tenth a step."""
     par, t, q, v = loaded(params, random_errors, law, shaft=shaft)

@@ -7,19 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from tests.conftest import REFERENCE
+from tests.conftest import REFERENCE, joint_with_law, sliding
 from tolstat import joint as joints
 from tolstat import sampling, study
 from tolstat.benchmarks.cost import iteration
 from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status, iterations_allowed
-from tolstat.joint.contact import FROM_COEFFICIENTS
+from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
 from tolstat.kernel.simd.jit import njit_inner
 from tolstat.kernel.simd.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
 from tolstat.solver import simulation, stationary
 
-STUDY = REFERENCE.parents[1] / "studies" / "iso2768_f.toml"
+STUDY = REFERENCE.parents[1] / "studies" / "rigid_shafts.toml"
 FAST = Options(steps_per_rev=45, max_revs=6, max_refinements=0)
 STATIC = FAST._replace(fidelity=int(Fidelity.QUASISTATIC))
 
@@ -94,11 +94,14 @@ def test_records_are_read_and_written_lane_by_lane():
 
 @pytest.fixture(scope="module")
 def mixed(cirelli):
-    """Joints of all laws, tight and wide, some that halve their steps, some that fail, some outside the model."""
+    """Joints of all laws, tight and wide, some that halve their steps, some that fail, some outside the model.
+
+    The output shafts of a third of them slide, with and without support.
+    """
     rng = np.random.default_rng(11)
     rows = []
-    for law in FROM_COEFFICIENTS:
-        joint = joints.load("cirelli2021", {"contact": {"law": law}}, "test", None)
+    for law in PREDEFINED:
+        joint = joint_with_law(law)
         n = 7
         operation = joints.Operation.model_construct(alpha=0.3, speed=52.0, torque=100.0)
         errors = joints.nominal_errors(n)
@@ -113,6 +116,8 @@ def mixed(cirelli):
     params = np.concatenate(rows)
     params["clearance"][6] = -1e-5
     params["clearance"][9], params["c_t"][16] = 0.0, 0.0
+    free, held = sliding(params[::4].copy(), 0.0, 2e4, 0.0), sliding(params[1::4].copy())
+    params = np.concatenate([params, free, held])
     return params[rng.permutation(len(params))]
 
 

@@ -23,7 +23,7 @@ from tolstat.solver import refinement
 from tolstat.solver.reference import first_order
 from tolstat.solver.simulation import explicit_steps, simulate_rows, simulate_together
 
-STUDY = ROOT / "studies" / "iso2768_f.toml"
+STUDY = ROOT / "studies" / "rigid_shafts.toml"
 STARTED, LONG, DURATION = 100, 1100, 100
 """Revolutions left out, made, and in a group of which the largest load is asked for."""
 REVOLUTIONS, APART = 120, 1e-8

@@ -1,6 +1,6 @@
 """``python -m tests.measure.rattle_precision``: work against error where contacts hit, beside other integrators.
 
-Three joints of studies/iso2768_f.toml at 30 deg, 1500 rpm and 100 N m, from the equilibrium that the solver starts
+Three joints of studies/rigid_shafts.toml at 30 deg, 1500 rpm and 100 N m, from the equilibrium that the solver starts
 from. Others make six revolutions, of which the last counts; the solver makes as many as it needs. Errors are of the
 largest |F| or |T|, relative to the largest of the kind, against scipy's RK45 at a tolerance of 1e-7.
 """
@@ -22,7 +22,7 @@ from tolstat.common.tables import Method, Options
 from tolstat.solver.reference import FirstOrder, Largest, first_order
 from tolstat.solver.simulation import simulate_rows
 
-STUDY = ROOT / "studies" / "iso2768_f.toml"
+STUDY = ROOT / "studies" / "rigid_shafts.toml"
 ROWS, REVOLUTIONS, LIMIT = (2, 5, 9), 6, 200.0
 ANGLES = 23_040
 """At which the loads of others are looked at: spikes of impacts last a degree."""

@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.conftest import joint_with_law
 from tolstat import joint, sampling, study
 from tolstat.common.tables import RESULT, SIMULATED, Options, Status, iterations_allowed
-from tolstat.joint.contact import FROM_COEFFICIENTS
+from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.integrators import first_order
 from tolstat.kernel.integrators.integrate import reset
 from tolstat.kernel.integrators.state import CV_FACTORISED, H_OLD, make_state_record
@@ -58,8 +59,7 @@ class Growth(NamedTuple):
 def rows_of(path: Path, n: int, law: str, torque: float | None) -> Table:
     """The first `n` joints of a study, all with one contact law, at a torque (N m) or their own."""
     plan = study.load(path, n=n)
-    changed = joint.load("cirelli2021", {"contact": {"law": law}}, str(path))
-    params = joint.perturb(changed, plan.operation, sampling.draw(plan)[1:])
+    params = joint.perturb(joint_with_law(law), plan.operation, sampling.draw(plan)[1:])
     if torque is not None:
         params["torque"] = torque
     return params
@@ -170,7 +170,7 @@ def main() -> None:
     parser.add_argument("study", type=Path)
     parser.add_argument("--joints", type=int, default=128)
     parser.add_argument("--torque", type=float, nargs="*", default=[None], metavar="N_M")
-    parser.add_argument("--law", nargs="*", default=["mode"], choices=FROM_COEFFICIENTS)
+    parser.add_argument("--law", nargs="*", default=["mode"], choices=PREDEFINED)
     parser.add_argument("--exponents", type=int, default=0, metavar="K", help="of K joints that are ok, all others too")
     parser.add_argument("--steps", type=int, default=2880, help="steps a revolution of the exponents")
     given = parser.parse_args()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -247,6 +248,18 @@ def test_refused_files():
         lives_of(view(method="sweep"))
 
 
+def test_a_bearing_for_the_contact_alone_has_no_life():
+    bearing = {"needles": 32, "needle_length": "22 mm", "pitch_diameter": "42 mm", "required_life": "5000 h"}
+    made = views.view(joint=joint.load("cirelli2021", {"bearing": bearing}, "x.toml").given("json"))
+    with pytest.raises(StoreError, match="bearings without C, needle_diameter, which a rating life needs") as caught:
+        lives_of(made)
+    assert "no joint is simulated again" in str(caught.value)
+    assert query.summary(made, 0.95) == {}
+    asked = Asked(Path(made.path))
+    assert sections(made, asked) == []
+    assert any("bearing life is left out" in note and "C, needle_diameter" in note for note in asked.notes)
+
+
 STUDY = (
     synthetic.HEAD
     + """
@@ -265,6 +278,23 @@ n = 40
 seed = 1
 """
 )
+
+
+@pytest.mark.parametrize(("law", "decide"), [("mode", False), ("needles", True)])
+def test_needles_of_the_contact_law_belong_to_the_campaign(tmp_path, law, decide):
+    """Other keys of the bearing, and all of them with another law, may be edited after the run."""
+    file = tmp_path / "study.toml"
+    contact = f'[joint.contact]\nlaw = "{law}"\n[joint.bearing]\nneedle_length = "22 mm"'
+    text = STUDY.replace("[joint.bearing]", contact)
+
+    def identity(old, new):
+        file.write_text(text.replace(old, new), encoding="utf-8")
+        return tolstat.load(file).identity()
+
+    first = identity("", "")
+    assert identity("10 kN", "20 kN") == identity("42 mm", "43 mm") == identity("20000 h", "1 h") == first
+    for change in (("= 32", "= 31"), ("22 mm", "21 mm")):
+        assert (identity(*change) != first) == decide
 
 
 @pytest.mark.slow

@@ -40,8 +40,8 @@ def relative(found, expected):
 
 @pytest.fixture(scope="module")
 def campaign_joints():
-    """Parameters of 24 joints of the study iso2768_f, the nominal one first."""
-    plan = study.load(STUDIES / "iso2768_f.toml", n=23)
+    """Parameters of 24 joints of the study rigid_shafts, the nominal one first."""
+    plan = study.load(STUDIES / "rigid_shafts.toml", n=23)
     return joint.perturb(plan.joint, plan.operation, sampling.draw(plan))
 
 

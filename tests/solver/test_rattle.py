@@ -28,8 +28,8 @@ UNIFORM = Options(method=int(Method.TR_BDF2), steps_per_rev=20_000, max_refineme
 
 
 def joints(alpha: float, rpm: float, torque: float, rows: list[int]) -> np.ndarray:
-    """Joints of iso2768_f.toml at another operating point (deg, 1/min, N m)."""
-    made = study.load(STUDIES / "iso2768_f.toml", n=max(rows) + 1)
+    """Joints of rigid_shafts.toml at another operating point (deg, 1/min, N m)."""
+    made = study.load(STUDIES / "rigid_shafts.toml", n=max(rows) + 1)
     params = joint.perturb(made.joint, made.operation, sampling.draw(made)[1:])[rows]
     params["alpha"], params["omega"], params["torque"] = np.radians(alpha), rpm * RPM, torque
     return params
@@ -254,7 +254,7 @@ def test_torque_reverses_where_the_inertia_of_the_output_shaft_says() -> None:
 
 @pytest.mark.slow
 def test_the_plan_tells_of_joints_that_rattle(tmp_path: Path) -> None:
-    text = (STUDIES / "iso2768_f.toml").read_text()
+    text = (STUDIES / "rigid_shafts.toml").read_text()
     calm = tmp_path / "calm.toml"
     calm.write_text(text)
     rattling = tmp_path / "rattling.toml"

@@ -15,7 +15,7 @@ from tolstat.solver.simulation import simulate_rows
 STUDIES = ROOT / "studies"
 PLAIN = Options(peak_substeps=1, max_refinements=0)
 RINGING = (163, 293, 594, 844, 883)
-"""Rows of iso2768_f.toml whose largest load is ringing after a contact switches: 5 in a thousand low at 180 steps."""
+"""Rows of rigid_shafts.toml whose largest load is ringing after a contact switches: 5 in 1000 low at 180 steps."""
 WRONG, FINE = 644, 142
 """Rows of fuzz.toml: a third low at 180 steps; the same at any number of steps."""
 DAMPED = (302, 519, 1189)
@@ -44,7 +44,7 @@ def parameters(name: str, *rows: int) -> np.ndarray:
 
 
 def test_ringing_on_a_peak_is_met_by_a_closer_look() -> None:
-    params = parameters("iso2768_f.toml", *RINGING)
+    params = parameters("rigid_shafts.toml", *RINGING)
     true = simulate_rows(params, PLAIN._replace(steps_per_rev=5760)).results
     plain = simulate_rows(params, PLAIN).results
     near = simulate_rows(params, Options())

@@ -189,7 +189,7 @@ def test_nothing_but_the_own_layout_is_read_anywhere_in_a_file(path: Path, chang
         Reader.open(path)
 
 
-POINT = {"alpha": 0.1, "speed": 1.0, "torque": 1.0, "share": None}
+POINT = {"alpha": 0.1, "speed": 1.0, "torque": 1.0, "axial_force": 0.0, "share": None}
 ABSENT = object()
 """Stands for a key that is taken out."""
 CONTENTS = {
@@ -204,12 +204,10 @@ CONTENTS = {
         {"cross1.F": float("inf")},
     ],
     "points": [
-        *({}, [], 3, {"cruise": 3}, {"": {"alpha": 0.1, "speed": 1.0, "torque": 1.0}}),
+        *({}, [], 3, {"cruise": 3}, {"": {key: POINT[key] for key in POINT if key != "share"}}),
         *({name: POINT} for name in ("cruise", "../x")),
-        *(
-            {"": POINT | wrong}
-            for wrong in ({"alpha": 2.0}, {"speed": 0.0}, {"torque": "x"}, {"share": 2.0}, {"x": 1.0})
-        ),
+        *({"": POINT | wrong} for wrong in ({"alpha": 2.0}, {"speed": 0.0}, {"torque": "x"}, {"axial_force": "x"})),
+        *({"": POINT | wrong} for wrong in ({"share": 2.0}, {"x": 1.0})),
         {"": POINT},
     ],
     "options": [{}, {"steps_per_rev": 10**9}, {"method": "rk4"}, {"fidelity": 1}, {"newton_tol": "1e-6"}, {"warp": 9}],

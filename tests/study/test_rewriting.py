@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tolstat.common.errors import InputError
-from tolstat.study.rewriting import with_keys
+from tolstat.study.rewriting import with_keys, with_settings
 
 TILT = ("tolerances", "pin1", "tilt_t")
 QUOTED = ("tolerances", "pin*.tilt_t")
@@ -90,3 +90,57 @@ def test_of_each_study_only_the_line_changed_is_another(path):
 def test_what_tomlkit_would_move_or_cannot_read_is_refused(text):
     with pytest.raises(InputError, match=r"a\.toml: cannot be changed in place"):
         with_keys(text, {("sampling",): {"n": 4}}, "a.toml")
+
+
+SETTABLE = """# A comment.
+[joint]
+base = "cirelli2021"
+contact.clearance = "0.1 mm"  # why
+shaft = { mass = "3 kg" }
+
+[operation]
+alpha = "15 deg"
+# about the next table
+[tolerances]
+"pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("setting", "old", "new"),
+    [
+        ("joint.shaft.axial=free", '{ mass = "3 kg" }', '{ mass = "3 kg", axial = "free" }'),
+        ('joint.shaft.mass="4 kg"', "3 kg", "4 kg"),
+        ("joint.contact.clearance = 0.2 mm", '"0.1 mm"  # why', '"0.2 mm"  # why'),
+        (
+            "joint.bushing.cross.k_x=2e9 N/m",
+            'shaft = { mass = "3 kg" }\n',
+            'shaft = { mass = "3 kg" }\nbushing = { cross = { k_x = "2e9 N/m" } }\n',
+        ),
+        ("operation.alpha=0 deg", "15 deg", "0 deg"),
+        ("operation.axial_force=3 N", '"15 deg"\n', '"15 deg"\naxial_force = "3 N"\n'),
+    ],
+)
+def test_a_setting_of_the_command_line_changes_one_value(setting: str, old: str, new: str) -> None:
+    assert with_settings(SETTABLE, [setting]) == SETTABLE.replace(old, new, 1)
+
+
+def test_a_setting_adds_the_section_that_is_missing() -> None:
+    made = with_settings(SETTABLE, ["sampling.n=90", "sampling.method=random"])
+    assert made == f'{SETTABLE}\n[sampling]\nn = 90\nmethod = "random"\n'
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("joint.shaft.axial", "is not a setting"),
+        ("joint=3", "is not a setting"),
+        ("operation..alpha=1 deg", "is not a setting"),
+        ("tolerances.pin1.offset_t=3", "is in section 'tolerances'"),
+        ("joint.base.x=4", "joint.base is no single table"),
+        ("solver.steps_per_rev=90", "is in section 'solver'"),
+    ],
+)
+def test_what_cannot_be_set_is_refused(setting: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        with_settings(SETTABLE, [setting])

@@ -12,6 +12,8 @@ Deformations are read off the force functions of the joint: a second row of para
 no damper, a third dampers of 1 and no spring.
 """
 
+import math
+
 from tolstat.common.fields import Field, dtype_of
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
@@ -72,6 +74,18 @@ def bushing_energy(i, par, springs, dampers, work, out):
 
 
 @njit
+def needle_energy(k3, delta, lost):
+    """Integral of k3 x^(9/8) sqrt(x/(x + lost)) up to `delta`, J, by Simpson's rule in x^(1/8)."""
+    n, total = 200, 0.0
+    for i in range(n + 1):
+        u = (i / n) * delta**0.125
+        x = u**8
+        if x > 0:
+            total += (1 if i == n else 4 if i % 2 else 2) * x**1.625 / math.sqrt(x + lost) * 8 * u**7
+    return k3 * total * delta**0.125 / (3 * n)
+
+
+@njit
 def contact_energy(pin, par, springs, work, out):
     """Add the elastic energy and the powers of the contact of `pin`; ``work.station`` holds the full forces."""
     for j in range(par.n_stations):
@@ -85,6 +99,7 @@ def contact_energy(pin, par, springs, work, out):
         out.contact_damping -= station[FORCE] * station[V_NORMAL]
         out.film += par.c_t * weight * smooth_step(delta / par.delta_d) * station[V_TANGENT] ** 2
         out.contacts += (par.station_k1[j] * delta / 3 + par.station_k2[j] / 2) * delta**2
+        out.contacts += needle_energy(par.station_k3[j], delta, par.needle_b * par.clearance[pin])
 
 
 @njit

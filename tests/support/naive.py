@@ -132,11 +132,12 @@ def forces(t, q, v, par):
             slip = slip - velocity[arm] - np.cross(spin[arm], point - body.position[arm])
             stations.append((point, g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p - 1], slip))
         modes.append(contact_mode([(n, delta) for _, n, delta, _ in stations]))
-        springs = zip(par.station_k1, par.station_k2, par.station_weight, strict=True)
-        for (point, n, delta, slip), (k1, k2, weight) in zip(stations, springs, strict=False):
+        springs = zip(par.station_k1, par.station_k2, par.station_k3, par.station_weight, strict=True)
+        for (point, n, delta, slip), (k1, k2, k3, weight) in zip(stations, springs, strict=False):
             if delta <= 0:
                 continue
             elastic = k1 * delta**2 + k2 * delta
+            elastic += k3 * delta ** (13 / 8) / np.sqrt(delta + par.needle_b * par.clearance[p - 1])
             ramp = weight * smooth_step(delta / par.delta_d)
             pressing = max(0.0, elastic + par.c_d * ramp * (slip @ n))
             tangential = slip - (slip @ n) * n - (slip @ axis) * axis

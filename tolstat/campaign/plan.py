@@ -44,7 +44,7 @@ SHARES = (0.5, 0.1, 0.01)
 """Exceedances for which the width of the interval is predicted."""
 QUANTILES = (0.95, 0.99, 0.999)
 ORDINARY = 680.0
-"""Work of a joint that does not rattle, from `studies/iso2768_f.toml` with the default settings, Newton iterations."""
+"""Newton iterations of a joint that does not rattle, from `studies/rigid_shafts.toml` with the default settings."""
 CONFIDENCE = 0.95
 DRAWN = 1 << 14
 """Largest number of joints whose clearances are computed."""

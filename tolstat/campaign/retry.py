@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,8 +12,10 @@ from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import HistorySpec, Options, Status
+from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
 from tolstat.store import ResultStore
+from tolstat.study.rewriting import given
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -82,6 +83,8 @@ def parse(statuses: str, settings: Sequence[str], study: Study) -> Retry:
     with gather(faults):
         new = {key.removeprefix("solver."): value for key, value in changed.items()}
         solver = strict.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
+    if study.has_axial_force and solver.fidelity == "ideal":
+        faults.append(Fault("--set: solver.fidelity", *NO_CLOSED_FORM))
     if faults:
         raise InputError(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))
@@ -92,10 +95,7 @@ def _setting(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if not (equals and key.startswith("solver.")):
         raise InputError([Fault("--set", f"{text!r} is not a solver setting", "write --set solver.steps_per_rev=360")])
-    try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key.strip(), value.strip()  # a string whose quotes the shell has removed
+    return key.strip(), given(value)
 
 
 def begin(store: ResultStore, retry: Retry, specs: Mapping[str, HistorySpec], tell: Callable[[str], None]) -> None:

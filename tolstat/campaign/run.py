@@ -274,7 +274,8 @@ def choose_fidelity(study: Study, stages: Stages | None = None, execution: Execu
     simulate = supervised(stages.simulate, stages.warm_up, [options], execution or Execution())
     budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
     with kept_workers():
-        return fidelity.choose(params, options, budget, study.asked, simulate, min_steps).record
+        closed_form = not study.has_axial_force
+        return fidelity.choose(params, options, budget, study.asked, simulate, min_steps, closed_form).record
 
 
 def _min_steps(histories: str, n_harmonics: int) -> int:

@@ -227,10 +227,20 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
 
-def print_study_warnings(path: Path, study: Study) -> None:
-    """Print the warnings of a study: of its joints, common axes that are too short, shares without an interval."""
+def print_study_notes(path: Path, study: Study) -> None:
+    """Print what a study stands on, and its warnings.
+
+    These are mounting and contact law; warnings of its joints, common axes that are too short, shares without an
+    interval, and a note where rigid shafts meet errors along them.
+    """
     from tolstat.campaign.remedy import without_interval
+    from tolstat.study import mounting
     from tolstat.study.tolerances import zones
+
+    say(f"{study.name}: {study.joint_in_words}")
+    axial = [joint.shaft.axial for joint in study.joints]
+    if said := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
+        say(f"note: {said}")
 
     print_warnings(path, study.joints, study.variants)
     for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):

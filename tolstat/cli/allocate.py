@@ -68,7 +68,7 @@ def allocate(
     entries as TOML, and a verdict: "holds", or "needs new runs" if the joints in FILE do not suffice. With --out,
     writes a study with the proposed tolerances and another seed, to be run next.
 
-    Example: tolstat allocate iso2768_f.h5 --target "P(cross1.F > 1500 N) < 0.06"
+    Example: tolstat allocate iso2768_f.h5 --target "P(any limit) < 0.1"
     """
     from tolstat.common.files import check_target
     from tolstat.display import text

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_study_warnings
+from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_study_notes
 from tolstat.cli._talk import progress, say, wrapped
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def plan(
     from tolstat.campaign import plan as plans
 
     loaded = study.load(study_file, n=n)
-    print_study_warnings(study_file, loaded)
+    print_study_notes(study_file, loaded)
     announce_compilation()
     with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)

@@ -64,15 +64,18 @@ def report(
         return
     from tolstat.common.cores import available_cores
     from tolstat.report import build
-    from tolstat.store import Reader
+    from tolstat.store import Reader, recorded, viewed
 
     accepted = math.nan if accept is None else parse_share(accept)
     if out is not None:
         Reader.open(file).close()  # check the file before the folder is created
         make_folder(out)
-    with progress("report") as shown:
-        made = build(file, out, width_of(wide), shown.stage, accepted, point or "", available_cores())
-    tell(made)
+    with viewed(file) as view:
+        with progress("report") as shown:
+            made = build(view, out, width_of(wide), shown.stage, accepted, point or "", available_cores())
+        tell(made)
+        if note := recorded.note_on_mounting(view.store):
+            say(f"note: {note}")
 
 
 def _page(file: Path, out: Path, accept: str | None, again: int | None, point: str) -> None:

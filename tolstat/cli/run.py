@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_warnings, tell, width_of
+from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_notes, tell, width_of
 from tolstat.cli._shortage import check_memory
 from tolstat.cli._talk import fail, progress, say
 from tolstat.common.cores import available_cores
@@ -75,7 +76,10 @@ def run(
     settings: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="KEY=VALUE", help="With --retry: changed setting, solver.steps_per_rev=360; repeatable."
+            "--set",
+            metavar="KEY=VALUE",
+            help="Key in place of that of the study, joint.shaft.axial=free; with --retry also of the solver for the "
+            "joints simulated again, solver.steps_per_rev=360; repeatable.",
         ),
     ] = None,
     rows: Annotated[
@@ -103,6 +107,9 @@ def run(
     Simulates the joints that are pending in the result file, which is created if missing. To resume after an
     interruption (Ctrl-C, kill, power failure), run the same command again.
 
+    With --set the study is run with another value of a key of its sections joint, operation, sampling or output: give
+    --out, too, and the same --set again to resume.
+
     Prints the share of joints above each limit (see tolstat report) and of those that keep all limits, why joints have
     no valid load, and the next command. Writes the result file, and beside it the curves as PNG, SVG and CSV.
 
@@ -112,7 +119,9 @@ def run(
     from tolstat.common.files import check_target
 
     limit, part, again = 0.0, None, None
-    faults = _cannot_be_combined(rows, until, retry, settings)
+    retried = [own for own in settings or () if own.startswith("solver.")]
+    changes = [own for own in settings or () if own not in retried]
+    faults = _cannot_be_combined(rows, until, retry, retried)
     if scheduler is not None and executor is not Executor.DASK:
         faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     with gather(faults):
@@ -126,19 +135,22 @@ def run(
         from tolstat import study
         from tolstat.campaign.blocks import Execution
         from tolstat.campaign.retry import parse
+        from tolstat.common import strict
+        from tolstat.study import rewriting
 
         with gather(faults):
-            plan = study.load(study_file, n=n)
-            again = None if retry is None else parse(retry, settings or (), plan)
+            text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
+            plan = study.load(study_file, n=n, text=text)
+            again = None if retry is None else parse(retry, retried, plan)
         if faults:
             raise InputError(faults)
-        print_study_warnings(study_file, plan)
+        print_study_notes(study_file, plan)
         execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
         if until is None:
             simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
         else:
             simulate(plan, path, until, execution=execution, check=verify)
-    conclude(path, report, wide, str(study_file))
+    conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(own)}" for own in changes)]))
 
 
 @contextmanager
@@ -152,16 +164,15 @@ def _workers_ahead(executor: Executor, workers: int | None) -> Iterator[None]:
         yield
 
 
-def _cannot_be_combined(
-    rows: str | None, until: str | None, retry: str | None, settings: list[str] | None
-) -> list[Fault]:
+def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None, settings: list[str]) -> list[Fault]:
     faults = []
     if rows is not None and until is not None:
         faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
     if until is not None and retry is not None:
         faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
     if settings and retry is None:
-        faults.append(Fault("--set", "is used with --retry only", "add --retry newton_failed, or edit the study"))
+        remedy = "add --retry newton_failed, or edit the study"
+        faults.append(Fault(f"--set {settings[0]!r}", "sets the solver, which --retry alone can", remedy))
     return faults
 
 
@@ -217,7 +228,7 @@ def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) 
 def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None:
     """Print the report of a campaign if asked for, why joints have no valid load, and the next command.
 
-    `study` is the study file as the user gave it.
+    `study` is the study file as the user gave it, with its settings.
     """
     from tolstat.campaign.remedy import reasons
     from tolstat.store import Reader

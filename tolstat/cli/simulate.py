@@ -32,11 +32,13 @@ def simulate(
     from tolstat import study
     from tolstat.campaign import trace
     from tolstat.common.files import check_target
+    from tolstat.joint.mounting import in_words
 
     if out is not None:
         check_target(out, case)
     loaded = study.load_case(case)
     print_warnings(case, [loaded.joint])
+    say(f"{loaded.name}: {in_words([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
     announce_compilation()
     with progress("simulation"):
         result = trace.simulate_case(loaded)

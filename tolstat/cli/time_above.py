@@ -39,7 +39,7 @@ def time_above(
     the joints; and the exceedance, the share of joints that are above the level at any time. The study must keep load
     histories (output.histories "full" or "harmonics").
 
-    Example: tolstat time-above iso2768_f.h5 --by cross1.F --level "1500 N"
+    Example: tolstat time-above iso2768_f.h5 --by cross1.F --level "1000 N"
     """
     from tolstat.display import text
     from tolstat.questions.time_above import query, rendering

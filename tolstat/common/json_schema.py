@@ -23,7 +23,7 @@ WITH_UNIT = rf"^\s*{_SIGN}\s*{NUMBER}\s*(?:1\s*/|[eE][^\d+-]|[A-DF-Za-df-zµμ°
 Without look-around, which some editors' regular expressions lack."""
 
 
-def quantity(unit: str, example: str) -> dict[str, Any]:
+def quantity(unit: str, example: str, words: tuple[str, ...] = ()) -> dict[str, Any]:
     """JSON schema of a quantity as a file writes it.
 
     Parameters
@@ -32,9 +32,14 @@ def quantity(unit: str, example: str) -> dict[str, Any]:
         SI unit; of unit ``"1"`` are bare numbers, of all others texts with a number and a unit.
     example : str
         How such a value is written.
+    words : tuple of str
+        Words that may stand in place of a quantity.
     """
     if unit == "1":
         return {"type": ["number", "string"], "pattern": PURE, "x-unit": unit}
+    if words:
+        written = {"type": "string", "pattern": WITH_UNIT}
+        return {"anyOf": [{"enum": list(words)}, written], "x-unit": unit, "examples": [example]}
     return {"type": "string", "pattern": WITH_UNIT, "x-unit": unit, "examples": [example]}
 
 

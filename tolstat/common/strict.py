@@ -47,18 +47,11 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     InputError
         When the file cannot be read or is not TOML.
     """
+    text = read_text(path) if text is None else text
     try:
-        text = read_input(path) if text is None else text
         data = tomllib.loads(text)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(
-            [Fault(str(path), f"cannot be read: {reason}", "check the path and its permissions")]
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
     except tomllib.TOMLDecodeError as error:
-        line, said, remedy = toml_lines.of_syntax(error, text or "")
+        line, said, remedy = toml_lines.of_syntax(error, text)
         raise InputError([Fault(f"{path}:{line}", f"is not TOML: {said}", remedy)]) from error
     except RecursionError:
         data = None
@@ -66,6 +59,25 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
         found = f"has tables and lists nested deeper than {MAX_DEPTH}"
         raise InputError([Fault(str(path), found, "no key needs more than a few: remove brackets")])
     return data
+
+
+def read_text(path: Path) -> str:
+    """Read the text of an input file.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or is not UTF-8.
+    """
+    try:
+        return read_input(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(
+            [Fault(str(path), f"cannot be read: {reason}", "check the path and its permissions")]
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
 
 
 def read_section(place: Path, text: str, name: str) -> dict[str, Any]:

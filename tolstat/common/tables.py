@@ -18,7 +18,7 @@ from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 7
+SCHEMA_VERSION = 8
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
 STEPS_PER_ITERATION = 5
@@ -244,6 +244,7 @@ def _error_fields() -> tuple[Field, ...]:
             "factor on Young's modulus: bushings, their damping, contact coefficients",
         ),
         *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in PINS),
+        Field("operation.axial_force", "N", "deviation of the axial force on the output shaft"),
     ]
     return tuple(fields)
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 import sys
 import tokenize
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -22,6 +23,8 @@ from tolstat.common.usual_units import FACTORS
 
 if TYPE_CHECKING:
     import pint
+
+ValueT = TypeVar("ValueT", bound=float | str)
 
 EXAMPLES = {
     "m": "0.1 mm",
@@ -49,6 +52,7 @@ DISPLAY_UNITS = {
     "m": ("mm", 1e3),
     "rad": ("deg", 180.0 / math.pi),
     "rad/s": ("rpm", 30.0 / math.pi),
+    "N": ("N", 1.0),
     "N*m": ("N m", 1.0),
     "1": ("", 1.0),
 }
@@ -282,11 +286,14 @@ class Quantity:
 
     unit: str
     mark: str = ""
+    words: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return the schema: parse on validation, write value and unit on JSON dump."""
 
-        def read(value: object, info: core_schema.ValidationInfo) -> float:
+        def read(value: object, info: core_schema.ValidationInfo) -> float | str:
+            if isinstance(value, str) and self.words and notation.read(value) is None:
+                return self._word(value)
             si = isinstance(value, float) and bool(info.context and info.context.get("si"))
             return to_si(value, "1" if si else self.unit, self.mark)
 
@@ -295,13 +302,20 @@ class Quantity:
             serialization=core_schema.plain_serializer_function_ser_schema(self.written, when_used="json"),
         )
 
-    def written(self, value: float) -> str | float:
-        """Return an SI value as a file writes it: ``"0.0001 m"``."""
-        return value if self.unit == "1" else f"{value!r} {self.unit}"
+    def _word(self, value: str) -> str:
+        if value in self.words:
+            return value
+        quoted = ", ".join(f'"{word}"' for word in self.words)
+        remedy = f'write {quoted} or a quantity such as "{EXAMPLES[self.unit]}"'
+        raise _fault(f"{value!r} is neither a word of this key nor a number with a unit", self.unit, remedy)
+
+    def written(self, value: float | str) -> str | float:
+        """Return an SI value, or a word, as a file writes it: ``"0.0001 m"``."""
+        return value if self.unit == "1" or isinstance(value, str) else f"{value!r} {self.unit}"
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema of the quantity as a file writes it."""
-        return json_schema.quantity(self.unit, EXAMPLES[self.unit])
+        return json_schema.quantity(self.unit, EXAMPLES[self.unit], self.words)
 
 
 def _sign(must: str, remedy: str) -> PydanticCustomError:
@@ -309,9 +323,9 @@ def _sign(must: str, remedy: str) -> PydanticCustomError:
     return PydanticCustomError("sign", "{found}", {"found": f"{{input}} {must}", "remedy": remedy})
 
 
-def positive(value: float) -> float:
-    """Validate a quantity that must be greater than zero."""
-    if not value > 0:
+def positive(value: ValueT) -> ValueT:
+    """Validate a quantity that must be greater than zero; a word in its place passes."""
+    if not (isinstance(value, str) or value > 0):
         raise _sign("must be positive", "give a value above zero")
     return value
 
@@ -330,7 +344,7 @@ def not_zero(value: float) -> float:
     return value
 
 
-SIGNS = {positive: "exclusiveMinimum", not_negative: "minimum"}
+SIGNS: dict[Callable[..., Any], str] = {positive: "exclusiveMinimum", not_negative: "minimum"}
 """Keyword of JSON schema for each validator of a sign."""
 
 Length = Annotated[float, Quantity("m")]
@@ -339,6 +353,7 @@ Area = Annotated[float, Quantity("m^2")]
 AreaMoment = Annotated[float, Quantity("m^4")]
 Angle = Annotated[float, Quantity("rad")]
 Speed = Annotated[float, Quantity("rad/s")]
+Force = Annotated[float, Quantity("N")]
 Torque = Annotated[float, Quantity("N*m")]
 Stress = Annotated[float, Quantity("Pa")]
 Time = Annotated[float, Quantity("s")]

@@ -196,7 +196,7 @@ class Page:
     Attributes
     ----------
     title, description, subtitle : str
-        Name of the study, text about its joint, and a sentence on the number of joints.
+        Name of the study, text about its joint, and sentences on its mounting and contact law and the number of joints.
     sections : sequence of Section
         In reading order; none is empty.
     """

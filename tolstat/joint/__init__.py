@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tolstat.joint.bearing import Bearing as Bearing
-    from tolstat.joint.model import AFFECT_NOTHING as AFFECT_NOTHING
     from tolstat.joint.model import Joint as Joint
+    from tolstat.joint.model import affecting_results as affecting_results
+    from tolstat.joint.model import affects_results as affects_results
     from tolstat.joint.model import load as load
     from tolstat.joint.perturbation import HOLE_OF_PIN as HOLE_OF_PIN
     from tolstat.joint.perturbation import Operation as Operation
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "bearing": ("Bearing",),
-    "model": ("AFFECT_NOTHING", "Joint", "load"),
+    "model": ("affecting_results", "affects_results", "Joint", "load"),
     "perturbation": ("HOLE_OF_PIN", "Operation", "nominal_errors", "operating", "perturb"),
     "variant": ("varied",),
 }

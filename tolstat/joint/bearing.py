@@ -1,19 +1,23 @@
-"""``[bearing]`` of a joint file: the needle bearings of the pins. It affects no load."""
+"""``[bearing]`` of a joint file: the needle bearings of the pins, for the contact law `needles` and the rating life."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Iterable
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.analysis.rating_life import A1, critical_amplitude
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
-from tolstat.joint.contact import Force
-from tolstat.joint.sections import POSITIVE, Length, Number
+from tolstat.joint.sections import POSITIVE, Force, Length, Number
 
 Time = Annotated[units.Time, POSITIVE]
+FOR_LIFE = ("C", "needle_diameter", "pitch_diameter")
+"""Keys without which a bearing has no rating life."""
+LEFT_OUT: Any = None
+"""Default of a key that one purpose needs and another does not; `Bearing.lacking` is asked before it is read."""
 
 
 def _tabulated(reliability: float) -> float:
@@ -24,14 +28,28 @@ def _tabulated(reliability: float) -> float:
 
 
 class Bearing(Strict):
-    """Needle bearing of each of the four pins, for its rating life; affects no load."""
+    """Needle bearing of each of the four pins.
 
-    C: Annotated[Force, Field(description="basic dynamic load rating of one bearing (ISO 281)", examples=["30 kN"])]
+    With the contact law `needles` its `needles` and `needle_length` say how stiff it is; the other keys affect no load.
+    """
+
     needles: Annotated[int, Field(strict=True, ge=3, le=1000, description="needles of one bearing", examples=[32])]
-    needle_diameter: Annotated[Length, Field(description="diameter of a needle", examples=["4 mm"])]
+    needle_length: Annotated[
+        Length, Field(description="length of a needle, needed with law `needles`", examples=["22 mm"])
+    ] = LEFT_OUT
+    C: Annotated[
+        Force,
+        Field(
+            description="basic dynamic load rating of one bearing (ISO 281), needed for the life", examples=["30 kN"]
+        ),
+    ] = LEFT_OUT
+    needle_diameter: Annotated[
+        Length, Field(description="diameter of a needle, needed for the life", examples=["4 mm"])
+    ] = LEFT_OUT
     pitch_diameter: Annotated[
-        Length, Field(description="diameter of the circle of the needles' axes", examples=["42 mm"])
-    ]
+        Length,
+        Field(description="diameter of the circle of the needles' axes, needed for the life", examples=["42 mm"]),
+    ] = LEFT_OUT
     required_life: Annotated[
         Time | None, Field(description="life that all four bearings of a joint must reach", examples=["5000 h"])
     ] = None
@@ -53,6 +71,10 @@ class Bearing(Strict):
             found = f"no circle of {{pitch_diameter}} has room for {needles} needles of {{needle_diameter}}"
             raise refuse(found, f"give needles <= {room}, or other diameters", "pitch_diameter", "needle_diameter")
         return value
+
+    def lacking(self, keys: Iterable[str]) -> list[str]:
+        """Those of `keys` that are left out."""
+        return [key for key in keys if getattr(self, key) is None]
 
     @property
     def critical_amplitude(self) -> float:

@@ -1,7 +1,7 @@
 """The contact section of a joint file: damping of a pin in its hole, and the registry of contact laws.
 
 A contact law is a set of stations (model, section 5): places along the pin, each with its own force
-f(delta) = k1 delta^2 + k2 delta and its own weight of damping and film.
+f(delta) = k1 delta^2 + k2 delta + k3 delta^(9/8) sqrt(delta/(delta + b c)) and its own weight of damping and film.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from tolstat.common import units
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
+from tolstat.joint.bearing import Bearing
+from tolstat.joint.needles import fit_needles
 from tolstat.joint.sections import (
     FOLLOWS,
     NOT_NEGATIVE,
-    POSITIVE,
     Array,
     Diameter,
+    Force,
     Length,
     Number,
     Ratio,
@@ -31,7 +33,6 @@ from tolstat.joint.sections import (
 
 QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
 Damping = Annotated[units.Damping, NOT_NEGATIVE]
-Force = Annotated[float, units.Quantity("N"), POSITIVE]
 
 
 class Stations(NamedTuple):
@@ -43,14 +44,20 @@ class Stations(NamedTuple):
         Signed distance from P along the pin's axis, m.
     k1, k2 : ndarray, shape (n,)
         Quadratic (N/m^2) and linear (N/m) coefficient of the force, eq. (5).
+    k3 : ndarray, shape (n,)
+        Coefficient of the force of needles (N/m^(9/8)).
     weight : ndarray, shape (n,)
         Weight of damping c_d and film c_t.
+    b : float
+        Share of the clearance in the force of needles.
     """
 
     s: Array
     k1: Array
     k2: Array
+    k3: Array
     weight: Array
+    b: float = 0.0
 
 
 def _check_position(ratio: float) -> float:
@@ -90,62 +97,81 @@ class Law(NamedTuple):
     Attributes
     ----------
     stations : callable
-        Contact section -> stations, at the material's nominal Young's modulus.
+        Sections contact and bearing -> stations, at the material's nominal Young's modulus.
     rows : tuple of tuple of str
-        Lines of the table of laws in docs/model.md: where stations are, their k1 and k2, their weight.
+        Lines of the table of laws in docs/model.md: where stations are, their coefficients, their weight.
     needs : tuple of str
         Keys of the contact section that the law needs, without those of the coefficients.
+    of_bearing : tuple of str
+        Keys of the bearing section that the law needs.
     from_coefficients : bool
         Whether the stations follow from the coefficients of uniform and point contact.
     middle : bool
         Whether a station has what two ends in point contact leave of uniform contact; it must not be negative.
     """
 
-    stations: Callable[[Contact], Stations]
+    stations: Callable[[Contact, Bearing | None], Stations]
     rows: tuple[tuple[str, str, str], ...]
     needs: tuple[str, ...] = ()
+    of_bearing: tuple[str, ...] = ()
     from_coefficients: bool = True
     middle: bool = False
 
 
-def _mode(contact: Contact) -> Stations:
+def _mode(contact: Contact, bearing: Bearing | None) -> Stations:
     k1u, k2u, k1p, k2p = contact.coefficients()
     ends = contact.ends()
     return Stations(
         np.array([ends[0], 0.0, ends[1]]),
         np.array([k1p, max(k1u - 2.0 * k1p, 0.0), k1p]),
         np.array([k2p, max(k2u - 2.0 * k2p, 0.0), k2p]),
+        np.zeros(3),
         np.array([1.0, 0.0, 1.0]),
     )
 
 
-def _uniform(contact: Contact) -> Stations:
+def _uniform(contact: Contact, bearing: Bearing | None) -> Stations:
     k1u, k2u, _, _ = contact.coefficients()
     one = np.ones(2)
-    return Stations(contact.ends(), 0.5 * k1u * one, 0.5 * k2u * one, one)
+    return Stations(contact.ends(), 0.5 * k1u * one, 0.5 * k2u * one, 0.0 * one, one)
 
 
-def _point(contact: Contact) -> Stations:
+def _point(contact: Contact, bearing: Bearing | None) -> Stations:
     _, _, k1p, k2p = contact.coefficients()
     one = np.ones(2)
-    return Stations(contact.ends(), k1p * one, k2p * one, one)
+    return Stations(contact.ends(), k1p * one, k2p * one, 0.0 * one, one)
 
 
-def _sliced(contact: Contact) -> Stations:
+def _slices(contact: Contact) -> tuple[Array, Array]:
+    """Places of the slices from -1 to 1, the outermost first, and their weights, which sum to 2."""
     assert contact.n_stations is not None
-    k1u, k2u, _, _ = contact.coefficients()
     x, weight = np.polynomial.legendre.leggauss(contact.n_stations)
-    weight = weight[::-1]
-    return Stations(0.5 * contact.z * x[::-1], 0.5 * k1u * weight, 0.5 * k2u * weight, weight)
+    return x[::-1], weight[::-1]
 
 
-def _given(contact: Contact) -> Stations:
+def _sliced(contact: Contact, bearing: Bearing | None) -> Stations:
+    k1u, k2u, _, _ = contact.coefficients()
+    x, weight = _slices(contact)
+    return Stations(0.5 * contact.z * x, 0.5 * k1u * weight, 0.5 * k2u * weight, 0.0 * weight, weight)
+
+
+def _needles(contact: Contact, bearing: Bearing | None) -> Stations:
+    assert bearing is not None
+    assert bearing.needle_length is not None
+    assert contact.fit_load is not None
+    k3, b = fit_needles(contact.fit_load, contact.clearance, bearing.needles, bearing.needle_length)
+    x, weight = _slices(contact)
+    return Stations(0.5 * bearing.needle_length * x, 0.0 * weight, 0.0 * weight, 0.5 * k3 * weight, weight, b)
+
+
+def _given(contact: Contact, bearing: Bearing | None) -> Stations:
     assert contact.stations is not None
     own = sorted(contact.stations, key=lambda station: -station.s_over_z)
     return Stations(
         contact.z * np.array([station.s_over_z for station in own]),
         np.array([station.k1 for station in own]),
         np.array([station.k2 for station in own]),
+        np.zeros(len(own)),
         np.array([station.weight for station in own]),
     )
 
@@ -164,6 +190,13 @@ LAWS = {
         (("n Gauss–Legendre points on z, weights w_j that sum to 2", "w_j k1u/2, w_j k2u/2", "w_j"),),
         needs=("n_stations",),
     ),
+    "needles": Law(
+        _needles,
+        (("n Gauss–Legendre points on `bearing.needle_length`, weights w_j that sum to 2", "w_j k3/2; b", "w_j"),),
+        needs=("n_stations", "fit_load"),
+        of_bearing=("needles", "needle_length"),
+        from_coefficients=False,
+    ),
     GIVEN: Law(
         _given,
         (("`contact.stations`: 1 to 16 of one's own", "as given", "as given"),),
@@ -172,11 +205,11 @@ LAWS = {
     ),
 }
 """Registry of the contact laws, by the word for ``contact.law``."""
-FROM_COEFFICIENTS = tuple(name for name, law in LAWS.items() if law.from_coefficients)
-"""Laws whose stations follow from the coefficients."""
+PREDEFINED = tuple(name for name in LAWS if name != GIVEN)
+"""Laws whose stations follow from other keys."""
 COEFFICIENTS = (
-    *("k1u", "k2u", "k1p", "k2p", "H", "fit_load"),
-    *dict.fromkeys(key for name in FROM_COEFFICIENTS for key in LAWS[name].needs),
+    *("k1u", "k2u", "k1p", "k2p", "H"),
+    *dict.fromkeys(key for name in PREDEFINED for key in ("fit_load", *LAWS[name].needs)),
 )
 """Keys that define the stations of all laws but `GIVEN`."""
 if TYPE_CHECKING:
@@ -203,7 +236,7 @@ class Contact(Strict):
 
     law: Annotated[LawName, Field(description="set of contact stations, see the contact laws of the joint model")]
     n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = Field(
-        default=None, validate_default=True, description="stations of a pin, for law `sliced`"
+        default=None, validate_default=True, description="stations of a pin, for laws `sliced` and `needles`"
     )
     stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = Field(
         default=None,
@@ -228,7 +261,9 @@ class Contact(Strict):
         validate_default=True,
         description="displacement in point contact over that in uniform contact at the same force",
     )
-    fit_load: Force | None = Field(default=None, description="largest load of the fit of k1u and k2u")
+    fit_load: Force | None = Field(
+        default=None, validate_default=True, description="largest load of the fit of k1u and k2u, or of that to needles"
+    )
     c_d: Annotated[Damping, follows("contact.c_d", "damping of a station")] = FOLLOWS
     xi: Ratio | None = Field(default=None, description="damping ratio of the contact, from which c_d follows")
     c_t: Annotated[
@@ -285,7 +320,8 @@ class Contact(Strict):
     @classmethod
     def _point(cls, value: float | None, info: ValidationInfo) -> float | None:
         k1p, k2p = info.data.get("k1p"), info.data.get("k2p")
-        if info.data.get("law") == GIVEN or (k1p is not None and k2p is not None):
+        law = LAWS[info.data.get("law", DEFAULT)]
+        if not law.from_coefficients or (k1p is not None and k2p is not None):
             return value
         if value is None:
             raise refuse("missing key, needed where k1p and k2p are not given", "add H, or both k1p and k2p")
@@ -296,14 +332,14 @@ class Contact(Strict):
         return value
 
     def coefficients(self) -> tuple[float, float, float, float]:
-        """k1u (N/m^2), k2u (N/m), k1p (N/m^2), k2p (N/m); NaN with the law ``"stations"``, which has none."""
+        """k1u (N/m^2), k2u (N/m), k1p (N/m^2), k2p (N/m); NaN with a law that does not use them."""
         if not LAWS[self.law].from_coefficients:
             return (math.nan,) * 4
         return self.k1u, self.k2u, self.k1p, self.k2p
 
-    def springs(self) -> Stations:
+    def springs(self, bearing: Bearing | None) -> Stations:
         """Contact stations of the law (model, section 5), at the nominal Young's modulus of the material."""
-        return LAWS[self.law].stations(self)
+        return LAWS[self.law].stations(self, bearing)
 
     def ends(self) -> Array:
         """Distance of the pin's ends from P along its axis, m, the outer one first."""

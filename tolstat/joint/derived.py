@@ -26,6 +26,8 @@ PIN_CHI, ARM_CHI = 1.11, 1.2
 """Shear factors of a circular and of a rectangular section, Cirelli et al. (2021), above Table 3."""
 BEARING = ("contact.D_H", "contact.D_P", "contact.clearance")
 """Keys any two of which define the third."""
+HALVINGS = 10
+"""Maximum number of times that the largest load of the fit to eq. (3) is halved."""
 ROUND, RECTANGULAR = ("arm.d",), ("arm.width", "arm.depth")
 """Keys of a round and of a rectangular section of the arms; a joint has one of the two, or neither."""
 
@@ -135,11 +137,25 @@ def _hub_inertia(joint: Any) -> tuple[float, ...] | None:
     return None if hub is None else tuple(joint.hub.mass / hub[0] * one for one in hub[1])
 
 
+def fitted_load(steel: Any, contact: Any) -> float:
+    """Largest load (N) of the fit of k1u and k2u: `fit_load`, or what has to be taken in its place.
+
+    It is halved until the fit stiffens, at most `HALVINGS` times.
+    """
+    load = float(contact.fit_load)
+    for _ in range(HALVINGS):
+        k1, k2 = material.fit_contact(load, contact.z, contact.D_H, contact.D_P, steel.E, steel.nu)
+        if k1 >= 0.0 and k2 > 0.0:
+            break
+        load *= 0.5
+    return load
+
+
 def _fitted(joint: Any) -> tuple[float, float] | tuple[None, None]:
     of, steel = joint.contact, joint.material
     if not of.D_H > of.D_P > 0.0:
         return None, None
-    return material.fit_contact(of.fit_load, of.z, of.D_H, of.D_P, steel.E, steel.nu)
+    return material.fit_contact(fitted_load(steel, of), of.z, of.D_H, of.D_P, steel.E, steel.nu)
 
 
 def _contact_damping(joint: Any) -> float:

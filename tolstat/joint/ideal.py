@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.common.errors import Fault, InputError
+
 Array = NDArray[np.float64]
+
+NO_CLOSED_FORM = (
+    "'ideal' does not hold with an axial force on an output shaft that is not rigid: its joint carries none",
+    'write fidelity = "quasistatic", or leave the axial force out',
+)
+"""Fault of joints that have no closed form, and the remedy."""
 
 
 def speed_ratio(theta: ArrayLike, alpha: float) -> Array:
@@ -104,6 +112,23 @@ def reversal_torque(params: NDArray[np.void]) -> Array:
     return np.asarray(inertia * params["omega"] ** 2 * steepest)
 
 
+def check(params: NDArray[np.void]) -> None:
+    """Refuse joints whose output shaft an axial force moves: they have no closed form.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (n,)
+        Joints.
+
+    Raises
+    ------
+    InputError
+        When there is such a joint.
+    """
+    if np.any((params["slides"] != 0.0) & (params["F_a"] != 0.0)):
+        raise InputError([Fault("fidelity", *NO_CLOSED_FORM)])
+
+
 def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
     """Loads of all bushings and contact forces of the ideal joint at its operating point.
 
@@ -128,11 +153,17 @@ def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
         marker and in its axes.
     contact : ndarray, shape (n, 4)
         Force between each pin and its hole, N.
+
+    Raises
+    ------
+    InputError
+        See `check`.
     """
     from tolstat.common.tables import Options
     from tolstat.kernel.mechanics.ideal_loads import ideal_loads
     from tolstat.kernel.revolution.simulate import make_scratch
 
+    check(par)
     angles = np.atleast_1d(np.asarray(theta, float))
     row: Any = par.view(np.recarray)[0]
     work, state, *_ = make_scratch(Options())

@@ -155,10 +155,13 @@ def fit_contact(load_range: float, z: float, D_H: float, D_P: float, E: float, n
     Returns
     -------
     k1u, k2u : float
-        Quadratic (N/m^2) and linear (N/m) coefficient of uniform contact.
+        Quadratic (N/m^2) and linear (N/m) coefficient of uniform contact; NaN where eq. (3) stops rising before
+        `load_range`, because the logarithms of 2 D / b become too small.
     """
     force = np.linspace(0.0, load_range, FIT_LOADS + 1)[1:]
     delta = contact_displacement(force / z, D_H, D_P, E, nu)
+    if not (np.diff(delta) > 0.0).all():
+        return math.nan, math.nan
     scale = delta[-1]
     x = delta / scale
     (k1, k2), *_ = np.linalg.lstsq(np.column_stack([x * x, x]), force, rcond=None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -19,16 +19,27 @@ from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
-from tolstat.joint.contact import COEFFICIENTS, GIVEN, LAWS, Contact
+from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
 from tolstat.joint.derived import DERIVED
 from tolstat.joint.overrides import leaves, overridden
 from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
 
-AFFECT_NOTHING = ("description", "bearing")
-"""Keys of a joint that affect no result of its simulation."""
 DEFAULT_JOINT = "cirelli2021"
 """Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
 NO_FIT = "the pin does not fit into the hole: D_P, by default pin.d, is not above zero and up to D_H", "give D_P <= D_H"
+
+
+def affects_results(key: str, law: str | None = None) -> bool:
+    """Whether a dotted key of a joint affects results of its simulation with a contact law; None: with any."""
+    section, _, name = key.partition(".")
+    laws = LAWS.values() if law is None else [LAWS[law]]
+    return section != "description" and (section != "bearing" or any(name in one.of_bearing for one in laws))
+
+
+def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of a joint by dotted key, of sections as `Joint.given` returns them, that affect results."""
+    values = leaves(given)
+    return {key: value for key, value in values.items() if affects_results(key, values.get("contact.law"))}
 
 
 class Joint(Strict):
@@ -49,7 +60,12 @@ class Joint(Strict):
     bushing: Bushing
     contact: Contact
     bearing: Annotated[
-        Bearing | None, Field(description="Needle bearing of each pin, for its rating life; affects no load")
+        Bearing | None,
+        Field(
+            validate_default=True,
+            description='Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` '
+            "and `needle_length` say how stiff it is; other keys are for its rating life and affect no load",
+        ),
     ] = None
     _inherited: tuple[Fault, ...] = ()
     _replaced: Mapping[str, str] = {}
@@ -60,7 +76,8 @@ class Joint(Strict):
         """Fill in the keys that follow from others; refuse a section that lacks one which does not."""
         name = str(info.field_name)
         section = derived.completed(name, value, info.data)
-        exempt = [f"contact.{key}" for key in COEFFICIENTS] if getattr(section, "law", None) == GIVEN else []
+        own = isinstance(section, Contact) and not LAWS[section.law].from_coefficients
+        exempt = [f"contact.{key}" for key in COEFFICIENTS] if own else []
         lacking = derived.missing(name, section, info.data, exempt)
         if lacking:
             raise refuse(*_lacking(lacking, section))
@@ -98,15 +115,36 @@ class Joint(Strict):
     @field_validator("contact")
     @classmethod
     def _stiffens(cls, value: Contact, info: ValidationInfo) -> Contact:
-        """Refuse a load range in which eq. (3) stops rising, because the logarithms of 2 D / b become negative."""
-        if value.law == GIVEN or not info.data.keys() >= {"material", "pin"}:
+        """Record the load up to which eq. (3) was fitted; refuse contact that does not stiffen up to any."""
+        if not LAWS[value.law].from_coefficients or not info.data.keys() >= {"material", "pin"}:
             return value
         k1u, k2u, k1p, k2p = value.coefficients()
         if not (k1u >= 0.0 and k2u > 0.0):
-            raise refuse("the fit to eq. (3) gives no stiffening contact", "give a smaller contact.fit_load")
+            found = "the fit to eq. (3) gives no stiffening contact, not even up to a thousandth of fit_load"
+            raise refuse(found, "give a smaller contact.fit_load, a larger clearance, or k1u and k2u")
+        if not value.model_fields_set >= {"k1u", "k2u"}:
+            value = value.model_copy(update={"fit_load": derived.fitted_load(info.data["material"], value)})
         if LAWS[value.law].middle and (2.0 * k1p > k1u or 2.0 * k2p > k2u):
             found = "two ends are stiffer than uniform contact: the middle station would be negative"
             raise refuse(found, "give smaller k1p and k2p, or another law")
+        return value
+
+    @field_validator("bearing")
+    @classmethod
+    def _has_needles(cls, value: Bearing | None, info: ValidationInfo) -> Bearing | None:
+        """Refuse a bearing that lacks what the contact law needs, or whose needles reach past the joint centre."""
+        contact, cross = info.data.get("contact"), info.data.get("cross")
+        if contact is None:
+            return value
+        needed = LAWS[contact.law].of_bearing
+        lacking = list(needed) if value is None else value.lacking(needed)
+        if lacking:
+            found = f'missing {_keys(lacking)}, needed with contact.law = "{contact.law}"'
+            raise refuse(found, f"add {' and '.join(f'bearing.{key}' for key in lacking)}, or write another law")
+        if needed and cross is not None and value is not None and value.needle_length >= 2.0 * cross.R:
+            found = "needles of {bearing.needle_length} reach past the joint centre"
+            remedy = "give bearing.needle_length < 2 cross.R, where cross.R = {cross.R}"
+            raise refuse(found, remedy, "bearing.needle_length", "cross.R")
         return value
 
     def warnings(self) -> list[Fault]:
@@ -171,7 +209,11 @@ def _lacking(keys: list[str], section: BaseModel) -> tuple[str, str]:
     begun = [way for way in ways if any(derived.get(section, of.partition(".")[2]) is not None for of in way)]
     them = "it" if len(names) == 1 else "them"
     instead = "".join(f", or {' and '.join(left)}" for way in begun or ways if (left := _left_out(way, keys, section)))
-    return f"missing {'key' if len(names) == 1 else 'keys'} {', '.join(names)}", f"give {them}{instead}"
+    return f"missing {_keys(names)}", f"give {them}{instead}"
+
+
+def _keys(names: Sequence[str]) -> str:
+    return f"key{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
 def _left_out(way: tuple[str, ...], keys: list[str], section: BaseModel) -> list[str]:
@@ -219,7 +261,8 @@ def load(
             joint = strict.validate(Joint, overridden(data, overrides), place, examples=examples())
         except InputError as error:
             raise InputError(_attributed(error.faults, data, path, place, section)) from error
-    joint._inherited = tuple(_inherited(joint, data, overrides, path))
+    merged = leaves(overridden(data, overrides))
+    joint._inherited = (*_inherited(joint, data, overrides, path), *_lowered(joint, merged.get("contact.fit_load")))
     given, held = leaves(overrides), leaves(data)
     gone = given.keys() | derived.replaced(given, held)
     joint._replaced = {key: str(held[key]) for key in derived.BEARING if key in held and key in gone}
@@ -274,6 +317,16 @@ def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], p
         new = _quoted(words if isinstance(text, list) else words[0])
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
         yield Fault(key, f"{_quoted(text)} is inherited from {path.stem}; {reason} {new}", remedy)
+
+
+def _lowered(joint: Joint, written: object) -> Iterator[Fault]:
+    """Warn of a largest load of the fit that is smaller than the one `written`; see `Joint._stiffens`."""
+    used = joint.contact.fit_load
+    if written is None or used is None or math.isclose(used, units.to_si(written, "N"), rel_tol=1e-9):
+        return
+    text = str(units.written(used, "N", written))
+    found = f"up to {written} eq. (3) gives no stiffening contact, so that k1u and k2u are fitted up to {text}"
+    yield Fault("contact.fit_load", found, f'write fit_load = "{text}", or give k1u and k2u')
 
 
 def _as_before(held: object, diameter: float) -> bool:

@@ -57,6 +57,14 @@ class Operation(Strict):
             description="resisting torque on the output shaft; negative: drives the output shaft", examples=["100 N*m"]
         ),
     ]
+    axial_force: Annotated[
+        units.Force,
+        Field(
+            description="axial force on an output shaft that is not rigid along its axis; above zero: pulls it away "
+            "from the joint",
+            examples=["500 N"],
+        ),
+    ] = 0.0
 
 
 def nominal_errors(n: int) -> Table:
@@ -78,7 +86,7 @@ def operating(operation: Operation, errors: Table) -> dict[str, Array]:
     Returns
     -------
     dict of str to ndarray, shape (n,)
-        ``alpha`` (rad), ``speed`` (rad/s) and ``torque`` (N m).
+        ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m) and ``axial_force`` (N).
     """
     return {name: getattr(operation, name) + errors[f"operation.{name}"] for name in Operation.model_fields}
 
@@ -88,7 +96,7 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
 
     Position errors, tilts, diameters and clearances affect the contacts only: they change no marker, mass, inertia or
     stiffness. The factor on E scales stiffness and contact coefficients in proportion and bushing damping by its
-    square root, eq. (12); it does not change contact damping.
+    square root, eq. (12); it does not change contact damping, nor what holds the output shaft along its axis.
 
     Parameters
     ----------
@@ -109,8 +117,10 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         params[name] = value
     point = operating(operation, errors)
     params["alpha"], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
+    if joint.shaft.slides:
+        params["F_a"] = point["axial_force"]
     factor = errors["material.E_factor"]
-    for name in ("k_cross", "k_fork", "station_k1", "station_k2"):
+    for name in ("k_cross", "k_fork", "station_k1", "station_k2", "station_k3"):
         params[name] *= factor[:, None]
     with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
         for name in ("c_cross", "c_fork"):
@@ -127,12 +137,16 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
 def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that do not depend on the errors, at factor 1 on E."""
     pin, arm = joint.pin, joint.arm
-    stations = joint.contact.springs()
+    stations = joint.contact.springs(joint.bearing)
     n_stations = len(stations.s)
-    padding = (0, MAX_STATIONS - n_stations)
-    xi = joint.bushing.xi
+    columns = {f"station_{name}": getattr(stations, name) for name in ("s", "k1", "k2", "k3", "weight")}
+    xi, shaft = joint.bushing.xi, joint.shaft
     return {
-        "Js": joint.shaft.Js,
+        "Js": shaft.Js,
+        "slides": shaft.slides,
+        "m_s": shaft.mass if shaft.slides else 0.0,
+        "k_a": shaft.k_a,
+        "c_a": shaft.axial_damping if shaft.slides else 0.0,
         "R": joint.cross.R,
         "r_b": joint.cross.r_b,
         "l_f": joint.arm.l_f,
@@ -150,7 +164,8 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "c_t": joint.contact.c_t,
         "delta_d": joint.contact.delta_d,
         "n_stations": n_stations,
-    } | {f"station_{name}": np.pad(values, padding) for name, values in stations._asdict().items()}
+        "needle_b": stations.b,
+    } | {name: np.pad(values, (0, MAX_STATIONS - n_stations)) for name, values in columns.items()}
 
 
 def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:

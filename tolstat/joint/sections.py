@@ -29,10 +29,17 @@ Stress = Annotated[units.Stress, POSITIVE]
 Mass = Annotated[units.Mass, POSITIVE]
 Inertia = Annotated[units.Inertia, POSITIVE]
 Density = Annotated[units.Density, POSITIVE]
+Force = Annotated[float, units.Quantity("N"), POSITIVE]
 Stiffness = Annotated[units.Stiffness, POSITIVE]
 RotaryStiffness = Annotated[units.RotaryStiffness, POSITIVE]
 Number = Annotated[units.Number, POSITIVE]
 Ratio = Annotated[units.Number, NOT_NEGATIVE]
+
+
+def _modulus(E: float) -> float:
+    if E < LEAST_E:
+        raise refuse("{E} is not Young's modulus of a metal", "check its unit; steel has 210 GPa", "E")
+    return E
 
 
 def _poisson(nu: float) -> float:
@@ -49,6 +56,8 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
     return inertia
 
 
+LEAST_E = 1e9
+"""Young's modulus (Pa) below that of any metal."""
 Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
 
 
@@ -83,7 +92,7 @@ def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
 class Material(Strict):
     """Material of all parts."""
 
-    E: Annotated[Stress, Field(description="Young's modulus")]
+    E: Annotated[Annotated[Stress, AfterValidator(_modulus)], Field(description="Young's modulus")]
     nu: Annotated[
         Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
     ]
@@ -149,10 +158,54 @@ class Hub(Strict):
     inertia: Annotated[Triple, follows("hub.inertia", "moments of inertia about x, y, z of the cross")] = FOLLOWS
 
 
+RIGID, FREE = "rigid", "free"
+"""Words of ``shaft.axial``."""
+
+
 class Shaft(Strict):
-    """Output shaft."""
+    """Output shaft, and what holds it along its axis.
+
+    A shaft that is not rigid along its axis needs the mass that moves and the damping of its motion.
+    """
 
     Js: Annotated[Inertia, Field(description="inertia of the output shaft about its axis")]
+    mass: Annotated[
+        Mass | None, Field(description="mass that moves along the axis; needed unless `axial` is rigid")
+    ] = None
+    axial_damping: Annotated[
+        Annotated[units.Damping, NOT_NEGATIVE] | None,
+        Field(description="damping of the motion along the axis, as by grease; needed unless `axial` is rigid"),
+    ] = None
+    axial: Annotated[
+        float | str,
+        units.Quantity("N/m", words=(RIGID, FREE)),
+        POSITIVE,
+        Field(
+            description="what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose "
+            "bearing; or the stiffness of the bearings of both shafts in series",
+            examples=[FREE],
+        ),
+    ] = RIGID
+
+    @field_validator("axial")
+    @classmethod
+    def _can_move(cls, value: float | str, info: ValidationInfo) -> float | str:
+        lacking = [key for key in ("mass", "axial_damping") if key in info.data and info.data[key] is None]
+        if value != RIGID and lacking:
+            found = f"a shaft that is not rigid along its axis needs {' and '.join(lacking)}"
+            given = {"mass": 'mass = "5 kg"', "axial_damping": 'axial_damping = "2e4 N*s/m"'}
+            raise refuse(found, f'give {", ".join(given[key] for key in lacking)} with your values, or axial = "rigid"')
+        return value
+
+    @property
+    def slides(self) -> bool:
+        """Whether the shaft may move along its axis."""
+        return self.axial != RIGID
+
+    @property
+    def k_a(self) -> float:
+        """Axial stiffness of the shafts' bearings, N/m; 0 where the shaft is free, and where it is rigid."""
+        return 0.0 if isinstance(self.axial, str) else self.axial
 
 
 class Cross(Strict):

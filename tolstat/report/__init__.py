@@ -20,8 +20,9 @@ from tolstat.common.tables import VALID
 from tolstat.display import table, text
 from tolstat.display.asked import silent
 from tolstat.display.table import WIDTH
+from tolstat.joint.mounting import in_words
 from tolstat.solver import fidelity
-from tolstat.store import Reader, viewed
+from tolstat.store import Reader, recorded, viewed
 from tolstat.store.view import View
 
 
@@ -31,7 +32,7 @@ class Report(NamedTuple):
     Attributes
     ----------
     table : str
-        The numbers that the study asks for, as aligned text.
+        Mounting of the shafts and contact law; the numbers that the study asks for, as aligned text.
     notes : str
         How many joints were evaluated, and what the intervals cover.
     files : list of Path
@@ -128,6 +129,13 @@ def build(
         raise InputError([Fault(str(folder), found, "give another folder with --out")]) from error
 
 
+def _headed(table: str, store: Reader, width: int | None, verdict: str = "") -> str:
+    """Table below the verdict, if there is one, and below mounting and contact law."""
+    lines = [verdict, in_words(*recorded.mountings(store))]
+    said = [text.sentence(line) for line in lines if line]
+    return "\n".join([*(said if width is None else (textwrap.fill(line, width) for line in said)), "", table])
+
+
 def _noted(report: Report, note: str) -> Report:
     return report._replace(notes=f"{report.notes}\n{note}") if note else report
 
@@ -171,12 +179,10 @@ def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Repo
         shown, more = table.fitted(rendering.LIMITS, limits, width)
         if points := query.point_rows(view):
             shown += f"\n\n{rendering.AT_POINTS}\n{table.as_text(rendering.at_points(view), points, width)}"
-    if verdict is not None:
-        sentence = text.sentence(verdict.sentence)
-        shown = f"{sentence if width is None else textwrap.fill(sentence, width)}\n\n{shown}"
-        if verdict.answer and not view.weighted and view.known is None and view.count(*VALID):
-            kept = capabilities.together(capability.limit_rows(view))
-            shown += f"\n\nyield: {kept.value} {kept.words}"
+    shown = _headed(shown, view.store, width, verdict.sentence if verdict else "")
+    if verdict and verdict.answer and not view.weighted and view.known is None and view.count(*VALID):
+        kept = capabilities.together(capability.limit_rows(view))
+        shown += f"\n\nyield: {kept.value} {kept.words}"
     notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]
     return Report(shown, "\n".join(note for note in notes if note), files)
 
@@ -191,7 +197,8 @@ def _sweep(view: View, stem: Path, width: int | None) -> Report:
     shown, more = table.fitted(
         table.plain(short, [str(name) for name in short.columns if "." in str(name)][1:]), short, width
     )
-    return Report(shown, "\n".join(note for note in (more, view.head(), _accuracy(view)) if note), files)
+    notes = "\n".join(note for note in (more, view.head(), _accuracy(view)) if note)
+    return Report(_headed(shown, view.store, width), notes, files)
 
 
 def _accuracy(view: View) -> str:
@@ -212,7 +219,7 @@ def _cases(store: Reader, stem: Path, width: int | None) -> Report:
     )
     if full["note"].any():
         files.append(_text(cases.markdown(full), stem, "cases.md"))
-    return Report(shown, notes, files)
+    return Report(_headed(shown, store, width), notes, files)
 
 
 def _text(content: str, stem: Path, ending: str) -> Path:

@@ -13,9 +13,11 @@ from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
 from tolstat.display.asked import Asked, silent
 from tolstat.display.blocks import Facts, Listing, Page, Section
+from tolstat.display.text import sentence
+from tolstat.joint.mounting import in_words
 from tolstat.questions.causes import ahead
 from tolstat.solver import fidelity
-from tolstat.store import viewed
+from tolstat.store import recorded, viewed
 from tolstat.store.integrity import DIGEST
 from tolstat.store.recorded import joint_of
 from tolstat.store.result_file import BLOCK
@@ -93,9 +95,8 @@ def compose(view: View, asked: Asked) -> Page:
     ahead.begin(view, asked)
     from tolstat.report import joint_values, verdict  # draw, and take long to import: joints are being simulated
 
-    asked.notes.extend(
-        note for note in (fidelity.sentence(view.store.options, view.store.fidelity), _stopped(view)) if note
-    )
+    stands_on = fidelity.sentence(view.store.options, view.store.fidelity)
+    asked.notes.extend(note for note in (stands_on, _stopped(view), recorded.note_on_mounting(view.store)) if note)
     if len(view.points) > 1:
         point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
         remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
@@ -107,7 +108,13 @@ def compose(view: View, asked: Asked) -> Page:
     lead = [section for section in sections if section.lead]
     rest = [section for section in sections if not section.lead]
     described = joint_of(view.store, 0).description
-    return Page(view.name, described, f"{view.head()}.", [verdict.section(view, asked), *lead, *rest, provenance])
+    mounted = sentence(in_words(*recorded.mountings(view.store)))
+    return Page(
+        view.name,
+        described,
+        f"{mounted} {sentence(view.head())}",
+        [verdict.section(view, asked), *lead, *rest, provenance],
+    )
 
 
 def _stopped(view: View) -> str:

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Status
+from tolstat.joint.mounting import in_words
 from tolstat.report.headline import headline
 from tolstat.solver.fidelity import sentence
+from tolstat.store import recorded
 
 if TYPE_CHECKING:
     from tolstat.store.view import View
@@ -35,7 +37,8 @@ def statistics(view: View, confidence: float = 0.95, accepted: float = math.nan)
         status;
         ``limits`` (share above each), ``quantiles`` of every load kept, ``capability`` (empty for weighted joints),
         each the rows of the table that the question of this name returns; ``numerical_error`` by kind of load;
-        ``fidelity``, a sentence on the fidelity of the results; ``provenance``.
+        ``joint``, mounting of the shafts and contact law in words; ``fidelity``, a sentence on the fidelity of the
+        results; ``provenance``.
 
     Raises
     ------
@@ -69,4 +72,5 @@ def statistics(view: View, confidence: float = 0.95, accepted: float = math.nan)
         "stop": store.stop,
     }
     found = questions.summary(view, confidence)
-    return head | found | {"fidelity": sentence(store.options, store.fidelity), "provenance": provenance}
+    stands_on = {"joint": in_words(*recorded.mountings(store)), "fidelity": sentence(store.options, store.fidelity)}
+    return head | found | stands_on | {"provenance": provenance}

@@ -78,6 +78,7 @@ def choose(
     loads: Sequence[str],
     simulate: Callable[..., Simulation],
     min_steps: int = 0,
+    closed_form: bool = True,
 ) -> Choice:
     """Choose a rung by a pilot of joints.
 
@@ -99,6 +100,8 @@ def choose(
         (n,) table PARAM, Options -> Simulation.
     min_steps : int
         Minimum number of steps a revolution, as load histories need it.
+    closed_form : bool
+        Whether the joints of the campaign have closed forms, see `ideal.check`.
 
     Returns
     -------
@@ -108,7 +111,7 @@ def choose(
     truth = simulate(params, _at(options, REFERENCE)).results
     table = []
     for rung in RUNGS:
-        if rung.steps_per_rev >= min_steps:
+        if rung.steps_per_rev >= min_steps and (closed_form or rung.fidelity != Fidelity.IDEAL):
             table.append(_entry(rung, simulate(params, _at(options, rung)).results, truth, names))
     good = [entry for entry in table if _meets(entry, budget)]
     met = bool(good)

@@ -193,7 +193,14 @@ def simulate_rows(
     -------
     Simulation
         Results, and histories; NaN (mode: 0) where a joint has none.
+
+    Raises
+    ------
+    InputError
+        When closed forms are asked for and a joint has none, see `ideal.check`.
     """
+    if options.fidelity == Fidelity.IDEAL:
+        ideal.check(params)
     specs = history_specs(options, histories, n_harmonics)
     kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
     allowed = iterations_allowed(options.steps_per_rev, options.max_revs)

@@ -19,7 +19,7 @@ from h5py import h5t
 from tolstat.common.columns import ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.common.loads import split
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec
-from tolstat.joint import AFFECT_NOTHING, Operation
+from tolstat.joint import Operation, affecting_results
 from tolstat.store import integrity, layout, metadata
 from tolstat.store.layout import Stored
 from tolstat.store.result_file import FILETYPE, check_column, descriptions, place_of, store_error, text
@@ -127,7 +127,7 @@ def joint(file: h5py.File) -> dict[str, Any]:
         When it is not the joint of the campaign.
     """
     held: dict[str, Any] = metadata.read(file, "joint")
-    _check_identity(file, "joint.", {key: value for key, value in held.items() if key not in AFFECT_NOTHING})
+    _check_identity(file, "joint.", affecting_results(held))
     return held
 
 

@@ -26,6 +26,7 @@ OPERATING = {
     "operation.alpha": "misalignment of the shafts",
     "operation.speed": "angular velocity of the input shaft",
     "operation.torque": "resisting torque on the output shaft",
+    "operation.axial_force": "axial force on the output shaft",
 }
 """Meaning of the columns that an export holds as the joint's own values instead of deviations."""
 

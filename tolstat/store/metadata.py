@@ -96,6 +96,7 @@ class PointRecord(_File):
     alpha: Annotated[float, Field(gt=-math.pi / 2, lt=math.pi / 2)]
     speed: Annotated[float, AfterValidator(units.not_zero)]
     torque: float
+    axial_force: float
     share: Annotated[float, Field(gt=0, le=1)] | None
 
 

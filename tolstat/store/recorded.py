@@ -13,7 +13,9 @@ from tolstat.common.strict import validate
 from tolstat.common.tables import PARAM, Options
 from tolstat.joint import Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
+from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
+from tolstat.study import mounting
 from tolstat.study.design import nested
 from tolstat.study.model import Solver
 from tolstat.study.swept import KEYS
@@ -80,13 +82,42 @@ def settings(solver: Solver, choice: dict[str, Any]) -> Options:
 
 
 def swept(store: Reader) -> dict[str, NDArray[np.float64]]:
-    """Dimensions that a sweep varies: dotted key to the value of every joint, (n,), in the unit of `swept.KEYS`."""
+    """Dimensions that a sweep varies: dotted key to the value of every joint, (n,), in the unit of `swept.KEYS`.
+
+    NaN where a joint has a word in place of a value: ``shaft.axial`` of one that is rigid.
+    """
     names = [name for names, *_ in store.identity.get("sweep", []) for name in names if name in KEYS]
     if not names:
         return {}
     nominal, variant = validate(Joint, store.joint, f"{store.path}: joint"), store.design()["variant"]
     joints = [varied(nominal, one.values) for one in store.variants]
-    return {name: np.array([get(joint, name) for joint in joints])[variant] for name in names}
+    values = {name: [get(joint, name) for joint in joints] for name in names}
+    return {
+        name: np.array([np.nan if isinstance(value, str) else value for value in own], float)[variant]
+        for name, own in values.items()
+    }
+
+
+def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
+    """``shaft.axial`` and ``contact.law`` of each variant whose joints are in the file, see `mounting.in_words`.
+
+    Raises
+    ------
+    InputError
+        When this version cannot read the joint in the file.
+    """
+    nominal = validate(Joint, store.joint, f"{store.path}: joint")
+    numbers = np.unique(store.design()["variant"]) if store.variants else ()
+    own = [store.variants[number].values for number in numbers] or [{}]
+    axial = [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in own]
+    return axial, [values.get("contact.law", nominal.contact.law) for values in own]
+
+
+def note_on_mounting(store: Reader) -> str:
+    """Note where rigid shafts meet errors along them, see `mounting.note`; empty for other files."""
+    names = {".".join(key.split(".")[1:3]) for key in store.identity if key.startswith("tolerances.")}
+    joint, name = joint_of(store, 0), store.study_name
+    return mounting.note(names, mountings(store)[0], mounting.command(f"{name}.toml", name, joint))
 
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:

@@ -7,10 +7,12 @@ from pathlib import Path
 
 from tolstat.common import shown
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.strict import with_lines
+from tolstat.common.strict import dotted, with_lines
 from tolstat.joint import Joint, Operation
+from tolstat.study import mounting
 from tolstat.study.file import StudyFile
 from tolstat.study.model import Solver
+from tolstat.study.mounting import Setting
 from tolstat.study.points import Point
 
 
@@ -89,4 +91,8 @@ def load_case(path: str | Path) -> Case:
     assert joint is not None
     assert operation is not None
     assert solver is not None
-    return Case(file.path, file.text, joint, operation, solver, errors)
+    case = Case(file.path, file.text, joint, operation, solver, errors)
+    found = mounting.refusals([Setting(("operation",), joint, operation, solver.fidelity)], ())
+    if faults := [case.fault(dotted(path), text, remedy) for path, text, remedy in found]:
+        raise InputError(faults)
+    return case

@@ -167,8 +167,4 @@ def _parse(text: str) -> _Setting:
     pattern, dot, key = path.strip().rpartition(".")
     if not (equals and dot and pattern and key and value.strip()):
         raise InputError([Fault(f"--set {text!r}", "is not a setting", EXAMPLE)])
-    try:
-        read = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        read = value.strip()
-    return _Setting(pattern, key, read, text)
+    return _Setting(pattern, key, rewriting.given(value), text)

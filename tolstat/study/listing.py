@@ -243,9 +243,10 @@ class Variants:
         faults = []
         for key in ranges:
             where = f"{self._place}: {strict.dotted(at)}.{key}"
-            if not isinstance(low[key], float):
+            words = [end[key] for end in (low, high) if not isinstance(end[key], float)]
+            if words:
                 faults.append(
-                    Fault(where, f"{low[key]!r} is not a quantity that can vary", "write one variant for each value")
+                    Fault(where, f"{words[0]!r} is not a quantity that can vary", "write one variant for each value")
                 )
             elif low[key] == high[key]:
                 faults.append(Fault(where, "from and to are equal", "write a constant value in joint"))

@@ -25,7 +25,7 @@ class Point(NamedTuple):
     name : str
         Its name; empty for that of ``[operation]``, which has none.
     operation : Operation
-        Misalignment, speed and torque.
+        Misalignment, speed, torque and axial force.
     share : float
         Share of the service time; NaN where none is given.
     """
@@ -36,13 +36,14 @@ class Point(NamedTuple):
 
     @property
     def in_words(self) -> str:
-        """``"10 deg, 500 rpm, 100 N m"``, and the share of the time if it is given of several points."""
+        """``"10 deg, 500 rpm, 100 N m"``; an axial force; of several points the share of the time if it is given."""
         own = self.operation
         said = f"{math.degrees(own.alpha):.4g} deg, {own.speed * 30 / math.pi:.4g} rpm, {own.torque:.4g} N m"
+        said += f", axial force {own.axial_force:.4g} N" if own.axial_force else ""
         return f"{said}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else said
 
     def values(self) -> dict[str, Any]:
-        """JSON values: ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``share`` or null."""
+        """JSON values: ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null."""
         return self.operation.model_dump() | {"share": None if math.isnan(self.share) else self.share}
 
 

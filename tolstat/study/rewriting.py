@@ -1,8 +1,12 @@
-"""Change keys in the text of a study; comments, order and all other values stay as they are written."""
+"""Change keys in the text of a study; comments, order and all other values stay as they are written.
+
+Of a study file for `with_settings`: ``tolstat run STUDY --set joint.shaft.axial=free``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import getitem
 from typing import Any
@@ -12,6 +16,67 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable, Table
 
 from tolstat.common.errors import Fault, InputError
+
+SETTABLE = ("joint", "operation", "sampling", "output")
+"""Sections whose keys `with_settings` sets; a setting of the solver is one of ``run --retry``."""
+
+
+def with_settings(text: str, settings: Sequence[str]) -> str:
+    """Set keys of a study from the command line.
+
+    Parameters
+    ----------
+    text : str
+        TOML of a study.
+    settings : sequence of str
+        ``"joint.shaft.axial=free"``: dotted key, and value as in TOML; quotes may be left out.
+
+    Returns
+    -------
+    str
+        TOML.
+
+    Raises
+    ------
+    InputError
+        When a setting is none, or is in another section than those of `SETTABLE`; see `with_keys`.
+    """
+    for setting in settings:
+        place = f"--set {setting!r}"
+        name, equals, value = setting.partition("=")
+        section, *path = (part.strip() for part in name.split("."))
+        if not (equals and value.strip() and path and all(path)):
+            raise InputError([Fault(place, "is not a setting", "write --set joint.shaft.axial=free")])
+        if section not in SETTABLE:
+            allowed = f"set keys of {', '.join(SETTABLE)}; edit the study for others"
+            raise InputError([Fault(place, f"is in section {section!r}", allowed)])
+        text = _set(text, [section, *path], given(value), place)
+    return text
+
+
+def given(value: str) -> Any:
+    """Value of a setting of the command line: as in TOML; a text may lack its quotes."""
+    try:
+        return tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return value.strip()
+
+
+def _set(text: str, path: Sequence[str], value: Any, place: str) -> str:
+    """Set a key at a dotted path, in the innermost of the tables around it that the text has."""
+    inner: Any = tomllib.loads(text)
+    if path[0] not in inner:
+        text = f"{text.rstrip()}\n\n[{path[0]}]\n"
+        inner = {path[0]: {}}
+    depth = 0
+    while depth < len(path) - 1 and isinstance(inner, Mapping) and path[depth] in inner:
+        inner = inner[path[depth]]
+        depth += 1
+    if not isinstance(inner, Mapping):
+        raise InputError([Fault(place, f"{'.'.join(path[:depth])} is no single table", "edit the study")])
+    for key in reversed(path[depth + 1 :]):
+        value = {key: value}
+    return with_keys(text, {tuple(path[:depth]): {path[depth]: value}}, place)
 
 
 def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, Any]], place: str) -> str:
@@ -54,8 +119,12 @@ def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, An
 
 
 def inline(table: Mapping[str, Any]) -> str:
-    """Table in one line."""
-    return f"{{ {', '.join(f'{key} = {tomlkit.item(value).as_string()}' for key, value in table.items())} }}"
+    """Table in one line, with the tables in it."""
+    values = {
+        key: inline(value) if isinstance(value, Mapping) else tomlkit.item(value).as_string()
+        for key, value in table.items()
+    }
+    return f"{{ {', '.join(f'{key} = {value}' for key, value in values.items())} }}"
 
 
 def _put(table: Any, key: str, value: Any) -> None:

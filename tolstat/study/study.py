@@ -12,10 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
+from tolstat.common.strict import dotted
 from tolstat.common.tables import DESIGN, Variant
-from tolstat.joint import AFFECT_NOTHING, Joint, Operation
-from tolstat.study import listing
+from tolstat.joint import Joint, Operation, affecting_results
+from tolstat.joint.mounting import in_words
+from tolstat.study import listing, mounting
 from tolstat.study.axes import Axis
 from tolstat.study.case import Case
 from tolstat.study.design import Design, flat
@@ -23,6 +26,7 @@ from tolstat.study.fatigue import Fatigue
 from tolstat.study.file import StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
+from tolstat.study.mounting import Setting
 from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.proposal import Proposal
 from tolstat.study.sorting import Gauge
@@ -99,6 +103,42 @@ class Study(Case):
     groups: tuple[Group, ...] = ()
     fit: Fit | None = None
     rejects: tuple[Gauge, ...] = ()
+
+    @property
+    def has_axial_force(self) -> bool:
+        """Whether an axial force moves the output shaft of some joint."""
+        return any(own.moved(self._force_varies) for own in self._settings)
+
+    @property
+    def joint_in_words(self) -> str:
+        """Mounting of the shafts and contact law, in words."""
+        joints = self.joints
+        return in_words([own.shaft.axial for own in joints], [own.contact.law for own in joints])
+
+    def faults_of_mounting(self) -> list[Fault]:
+        """Faults of settings that do not go with what holds the output shaft along its axis."""
+        found = mounting.refusals(self._settings, self._force_varies)
+        return [self.fault(dotted(path), text, remedy) for path, text, remedy in found]
+
+    @property
+    def _settings(self) -> list[Setting]:
+        """Each of `joints` at each of its operating points."""
+        if self.listed:
+            each = zip(self.joints, self.operations, self.solvers, strict=True)
+            return [
+                Setting(("operation",) if at == self.operation else ("variant",), joint, at, solver.fidelity)
+                for joint, at, solver in each
+            ]
+        paths = [("operation", number) if point.name else ("operation",) for number, point in enumerate(self.points)]
+        at = list(zip(paths, (point.operation for point in self.points), strict=True))
+        return [Setting(path, joint, point, self.solver.fidelity) for joint in self.joints for path, point in at]
+
+    @property
+    def _force_varies(self) -> list[str]:
+        """Sections in which the axial force scatters or is swept."""
+        grid = {name for point in self.listed.points for name in point} if self.listed else set()
+        names = {"tolerances": self.tolerances, "sweep": [n for axis in self.sweep for n in axis.names], "grid": grid}
+        return [section for section, own in names.items() if mounting.FORCE in own]
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -197,11 +237,11 @@ class Study(Case):
     def identity(self) -> dict[str, Any]:
         """All settings that determine results, as dotted key to JSON value.
 
-        Limits, bearings, comments and the file's name do not belong to it. Two studies of equal identity have the
-        same rows with the same results.
+        Limits, lives of bearings, comments and the file's name do not belong to it. Two studies of equal identity have
+        the same rows with the same results.
         """
         parts: dict[str, Any] = {
-            "joint": {k: v for k, v in self.joint.given("json").items() if k not in AFFECT_NOTHING},
+            "joint": affecting_results(self.joint.given("json")),
             "operation": self._operation_identity(),
             "solver": self.solver.model_dump(),
             "errors": self.errors,
@@ -300,7 +340,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     assert solver is not None
     assert sampling is not None
     assert output is not None
-    return Study(
+    made = Study(
         path=file.path,
         text=file.text,
         joint=joint,
@@ -325,3 +365,6 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         fatigue=fatigue,
         groups=moved,
     )
+    if found := made.faults_of_mounting():
+        raise InputError(found)
+    return made

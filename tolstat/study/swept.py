@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.common.units import Quantity
-from tolstat.joint import AFFECT_NOTHING, Joint
+from tolstat.joint import Joint, affects_results
 from tolstat.joint.sections import quantities
 from tolstat.study.design import nested
 from tolstat.study.listing import Variants
 from tolstat.study.model import SweepAxis
 
-KEYS = {key: unit for key, unit in quantities(Joint).items() if key.partition(".")[0] not in AFFECT_NOTHING}
+KEYS = {key: unit for key, unit in quantities(Joint).items() if affects_results(key)}
 """SI unit of each quantity of a joint that affects results, by dotted key."""
 MAX_JOINTS = 10_000
 """Maximum number of joints with dimensions of their own."""

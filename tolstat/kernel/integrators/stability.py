@@ -1,8 +1,9 @@
 """Longest step for which `verlet` is stable, from the parameters of a joint.
 
 The joint is linearised in the ideal pose with the stations of all pins closed, at one depth and in both directions
-across the pin: more than can press at a time. The largest eigenvalue of M^-1 (h^2/4 K + h C), which must be below 1 for
-`verlet`, is found by power iteration.
+across the pin: more than can press at a time. The depth is that of the pin with the largest clearance: with needles the
+same force presses no other pin deeper, and slopes rise with the depth. The largest eigenvalue of
+M^-1 (h^2/4 K + h C), which must be below 1 for `verlet`, is found by power iteration.
 """
 
 import math
@@ -10,6 +11,7 @@ import math
 from tolstat.kernel.mechanics.bushing import accumulate, markers
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.scale import typical_force
+from tolstat.kernel.mechanics.spring import elastic, has_needles, penetration
 from tolstat.kernel.mechanics.topology import (
     ARM,
     ARM_OF_PIN,
@@ -88,7 +90,7 @@ def multiply(h, depth, par, work):
     for pin in range(4):
         body = PIN + pin
         for j in range(par.n_stations):
-            slope = 2 * par.station_k1[j] * depth + par.station_k2[j]
+            _, slope = elastic(j, depth, par.clearance[pin], has_needles(par), par)
             across = press_on(h, slope, max(par.c_d, par.c_t) * par.station_weight[j])
             at = scale(par.station_s[j], row(TRIAD[body], 0))
             connect(body, ARM + ARM_OF_PIN[pin], at, at, (0.0, across, across), (0.0, 0.0, 0.0), work)
@@ -142,10 +144,16 @@ def eigenvalue(h, depth, par, work):
 
 
 @njit
+def widest(par):
+    """Largest clearance (m) of the four pins."""
+    return max(par.clearance[0], par.clearance[1], par.clearance[2], par.clearance[3])
+
+
+@njit
 def depth_at(force, par):
-    """Depth (m) to which a normal force (N) presses an end station, eq. (5)."""
-    k1, k2 = par.station_k1[0], par.station_k2[0]
-    return 2 * force / (k2 + math.sqrt(k2 * k2 + 4 * k1 * force))
+    """Depth (m) to which a normal force (N) presses an end station at most; infinite without stiffness."""
+    depth = penetration(force, 0, widest(par), par)
+    return depth if depth > 0 else math.inf
 
 
 @njit
@@ -183,4 +191,4 @@ def largest_force(steps, par, work):
         if not eigenvalue(h, DEEPER * depth, par, work) <= STABLE:
             break
         depth *= DEEPER
-    return (par.station_k1[0] * depth + par.station_k2[0]) * depth
+    return elastic(0, depth, widest(par), has_needles(par), par)[0]

@@ -10,6 +10,7 @@ import math
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode as ContactMode
 from tolstat.kernel.mechanics.bushing import accumulate
+from tolstat.kernel.mechanics.spring import elastic, has_needles
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, PIN
 from tolstat.kernel.mechanics.vector import add, axpy, choose, cross, dot, row, scale, sub, turn, turn_back
 from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, POINT, RHO, SLOPE, TANGENT, V_NORMAL, V_TANGENT
@@ -73,6 +74,7 @@ def locate(pin, par, work):
 @njit
 def press(pin, par, work):
     """Write each station's normal force, eq. (5), and its slope by delta at constant rate to ``work.station[pin]``."""
+    needles = has_needles(par)
     for j in range(par.n_stations):
         station = work.station[pin, j]
         delta = station[DELTA]
@@ -83,9 +85,8 @@ def press(pin, par, work):
         damping = par.c_d * par.station_weight[j]
         ramp = smooth_step(delta / par.delta_d)
         ramp_slope = smooth_step_slope(delta / par.delta_d) / par.delta_d
-        elastic = (par.station_k1[j] * delta + par.station_k2[j]) * delta  # eq. (5)
-        slope = 2 * par.station_k1[j] * delta + par.station_k2[j]
-        total = elastic + damping * ramp * station[V_NORMAL]
+        force, slope = elastic(j, delta, par.clearance[pin], needles, par)
+        total = force + damping * ramp * station[V_NORMAL]
         pressed = touching & (total > 0)
         station[FORCE] = where(pressed, total, 0.0)
         station[SLOPE] = where(pressed, slope + damping * ramp_slope * station[V_NORMAL], 0.0)

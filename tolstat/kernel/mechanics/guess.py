@@ -13,6 +13,7 @@ from tolstat.kernel.mechanics.contact import locate
 from tolstat.kernel.mechanics.dynamics import set_bodies
 from tolstat.kernel.mechanics.motion import ideal_motion
 from tolstat.kernel.mechanics.scale import centring_stiffness, mean_clearance
+from tolstat.kernel.mechanics.spring import penetration
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, HUB, PIN, PSI, TRIAD, S
 from tolstat.kernel.mechanics.vector import add, axpy, cross, dot, row, scale, turn_back
 from tolstat.kernel.mechanics.work import NORMAL, RHO
@@ -30,13 +31,6 @@ def offset(pin, j, work):
     n = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
     d = scale(station[RHO], turn_back(work.relative, FRAME[ARM + ARM_OF_PIN[pin]], n))
     return dot(d, row(TRIAD[PIN + pin], 1)), d[2]
-
-
-@njit
-def depth(load, k1, k2):
-    """Penetration (m) at which a station carries `load` (N), eq. (5); 0 for a station without stiffness."""
-    slope = k2 + math.sqrt(k2 * k2 + 4 * k1 * load)
-    return 2 * load / slope if slope > 0 else 0.0
 
 
 @njit
@@ -62,7 +56,7 @@ def travel_to_contact(pin, side, across, par, work):
     load = abs(par.torque) / (2 * par.R)
     best, radius = 0.0, 0.0
     for j in (0, par.n_stations - 1):
-        reach = par.clearance[pin] + par.delta_d + depth(load, par.station_k1[j], par.station_k2[j])
+        reach = par.clearance[pin] + par.delta_d + penetration(load, j, par.clearance[pin], par)
         reach = max(math.sqrt(max(reach * reach - across * across, 0.0)), LEAST * reach)
         along, _ = offset(pin, j, work)
         want, r = side * reach - along, par.R + par.station_s[j]

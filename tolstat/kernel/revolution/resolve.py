@@ -15,17 +15,7 @@ import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Motion, Options, Status
 from tolstat.kernel.integrators.mesh import CELL, cells_of
-from tolstat.kernel.mechanics.loads import (
-    DECIDING,
-    FORCES,
-    N_AVERAGED,
-    N_DECIDING,
-    N_INSTANT,
-    N_MEASURES,
-    OF_MEASURE,
-    TORQUES,
-    size_of,
-)
+from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INSTANT, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
 from tolstat.kernel.revolution.closeup import extend
@@ -34,10 +24,12 @@ from tolstat.kernel.revolution.trail import (
     Trail,
     closure_trend,
     combine,
+    keep_deciding,
     lag_closure,
+    largest_change,
     make_trails,
     note_closure,
-    still_to_come,
+    with_slow_decay,
 )
 from tolstat.kernel.simd.jit import njit
 
@@ -186,13 +178,6 @@ def merge_extremes(one, out):
 
 
 @njit
-def keep_deciding(loads, kept):
-    """Copy the loads that decide to `kept`, (N_DECIDING,)."""
-    for j in range(N_DECIDING):
-        kept[j] = loads[DECIDING[j]]
-
-
-@njit
 def keep_revolution(par, samples, extremes, trail, r):
     """Store loads and statistics of revolution `r` (from 0) of the joint; reset `extremes`; return the statistics.
 
@@ -207,18 +192,6 @@ def keep_revolution(par, samples, extremes, trail, r):
     for s in range(0, samples.size, stride):
         keep_deciding(samples[s].loads, trail.loads[r % trail.revolution.size, s // stride])
     return own
-
-
-@njit
-def largest_change(before, out):
-    """Largest change of a largest load that decides against `before`, (N_DECIDING,), relative to its measure."""
-    worst = 0.0
-    for measure in range(N_MEASURES):
-        change, size = 0.0, size_of(measure, out.largest)
-        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
-            change = max(change, abs(out.largest[DECIDING[j]] - before[j]))
-        worst = max(worst, change / size if size > 0 else 0.0)
-    return worst
 
 
 @njit
@@ -389,7 +362,7 @@ def after_revolution(point, par, options, samples, past, out):
     if last > turns.since:
         closure = closure_error(0, samples.size, ALL_LOADS, samples)
         note_closure(turns.revolution, closure, trail.notes)
-        out.closure = still_to_come(turns.revolution, par, trail.notes) * closure
+        out.closure = with_slow_decay(closure, turns.revolution, par, trail.notes)
         if repeats(last, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_PERIODIC), False
     elif turns.period == 1 and turns.halved < options.max_refinements and largest_change(turns.before, own) > FAR:

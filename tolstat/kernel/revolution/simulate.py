@@ -41,7 +41,7 @@ from tolstat.kernel.revolution.settle import (
     step_error,
     summarise,
 )
-from tolstat.kernel.revolution.trail import closure_trend, note_closure, still_to_come
+from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_slow_decay
 from tolstat.kernel.simd.jit import njit
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
@@ -91,11 +91,13 @@ def inside_model(par):
     """Whether a joint lies within the scope of the model; written so that NaN does not."""
     good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
     good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0
-    linear = 0.0
+    good = good and par.needle_b >= 0
+    bears = False
     for j in range(par.n_stations):
-        good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0
-        linear += par.station_k2[j]
-    good = good and linear > 0
+        good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0 and par.station_k3[j] >= 0
+        good = good and (par.needle_b > 0 or par.station_k3[j] == 0)
+        bears = bears or par.station_k2[j] > 0 or par.station_k3[j] > 0
+    good = good and bears
     for pin in range(4):
         good = good and par.clearance[pin] >= 0
     return good
@@ -219,16 +221,17 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
     out.revolutions = k / n
     if k == n + 2 * twelfth:
-        first, last, factor = twelfth + 1, 2 * twelfth + 1, still_to_come(out.revolutions, par, notes)
-        out.closure = factor * closure_error(first, last, ALL_LOADS, samples)
-        small = factor * closure_error(first, last, OWN, samples) <= EARLY_CLOSURE * options.settle_tol
-        small = small and out.closure <= EARLY_SUMS * options.settle_tol
+        first, last, bound = twelfth + 1, 2 * twelfth + 1, options.settle_tol
+        own, closure = closure_error(first, last, OWN, samples), closure_error(first, last, ALL_LOADS, samples)
+        out.closure = with_slow_decay(closure, out.revolutions, par, notes)
+        small = with_slow_decay(own, out.revolutions, par, notes) <= EARLY_CLOSURE * bound
+        small = small and out.closure <= EARLY_SUMS * bound
         if small and step_error(par, samples) <= EARLY_STEP_ERROR:
             return OK
     if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
         closure = closure_error(0, n, ALL_LOADS, samples)
         note_closure(out.revolutions, closure, notes)
-        out.closure = still_to_come(out.revolutions, par, notes) * closure
+        out.closure = with_slow_decay(closure, out.revolutions, par, notes)
         if out.closure <= options.settle_tol:
             return OK
     return NEWTON_FAILED if iterations > MAX_ITERATIONS * n * options.max_revs else NOT_SETTLED

@@ -10,7 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, LIFE_EXPONENT
-from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_AVERAGED, N_DECIDING, N_LOADS, N_MEASURES, OF_MEASURE
+from tolstat.kernel.mechanics.loads import (
+    DECIDING,
+    MEASURES,
+    N_AVERAGED,
+    N_DECIDING,
+    N_LOADS,
+    N_MEASURES,
+    OF_MEASURE,
+    size_of,
+)
 from tolstat.kernel.mechanics.scale import axial_decay
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit
@@ -90,21 +99,30 @@ def closure_trend(since, notes):
 
 
 @njit
-def still_to_come(revolutions, par, notes):
-    """Changes that a decaying motion still has ahead, in units of its last closure error; at least 1.
+def with_slow_decay(closure, revolutions, par, notes):
+    """Closure error, or what a slow decay still has ahead if that is more, up to 1, the whole load.
 
-    Where each revolution leaves the share rho of the change before, that is rho / (1 - rho). Only the motion of an
-    output shaft along its axis is slow enough to matter. Its rho follows from the closure errors of the last
-    revolution or, before these are known, from the joint's parameters.
+    Where each revolution leaves the share rho of the change before, those ahead sum to rho / (1 - rho) of the last
+    one. Only the motion of an output shaft along its axis is slow enough to matter. Its rho follows from the closure
+    errors of the last revolution or, before these are known, from the joint's parameters.
+
+    Parameters
+    ----------
+    closure : float
+        Closure error, the last of those noted, if any is.
+    revolutions : float
+        Revolutions at its end.
+    par, notes
+        As in all kernels.
     """
     rho = axial_decay(par)
     if rho < SLOW_DECAY:
-        return 1.0
+        return closure
     slope, _ = closure_trend(revolutions - 1.001, notes)
     if notes.count > 1 and notes.check[0, 0] < revolutions - 0.99 and slope == slope:
         rho = 10**slope
     rho = min(rho, SLOWEST_DECAY)
-    return max(1.0, rho / (1 - rho))
+    return max(closure, min(1.0, closure * rho / (1 - rho)))
 
 
 @njit
@@ -122,6 +140,25 @@ def lag_closure(last, lag, trail):
                     largest = max(largest, now[s, j])
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
+    return worst
+
+
+@njit
+def keep_deciding(loads, kept):
+    """Copy the loads that decide to `kept`, (N_DECIDING,)."""
+    for j in range(N_DECIDING):
+        kept[j] = loads[DECIDING[j]]
+
+
+@njit
+def largest_change(before, out):
+    """Largest change of a largest load that decides against `before`, (N_DECIDING,), relative to its measure."""
+    worst = 0.0
+    for measure in range(N_MEASURES):
+        change, size = 0.0, size_of(measure, out.largest)
+        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+            change = max(change, abs(out.largest[DECIDING[j]] - before[j]))
+        worst = max(worst, change / size if size > 0 else 0.0)
     return worst
 
 

@@ -17,6 +17,7 @@ from tolstat.common.load_kinds import PINS
 from tolstat.common.shown import shown
 from tolstat.common.tables import LIFE_EXPONENT, VALID
 from tolstat.joint import Bearing, operating
+from tolstat.joint.bearing import FOR_LIFE
 from tolstat.store import worst
 from tolstat.store.recorded import joint_of
 from tolstat.store.sample_load import SampleLoad
@@ -120,7 +121,8 @@ def lives_of(view: View) -> Lives:
     Raises
     ------
     StoreError
-        When the joint has no such section, the equivalent loads are not kept, or the joints are no sample.
+        When the joint has no such section or it lacks a key, the equivalent loads are not kept, or the joints are no
+        sample.
     InputError
         When the view has several operating points, and the study does not give their shares of the time.
     """
@@ -132,6 +134,10 @@ def lives_of(view: View) -> Lives:
             "no joint is simulated again"
         )
         raise StoreError(str(Fault(str(view.path), "holds a joint without bearings", remedy)))
+    if lacking := bearing.lacking(FOR_LIFE):
+        without = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
+        remedy = "add to [bearing] of the joint, then repeat tolstat run: no joint is simulated again"
+        raise StoreError(str(Fault(str(view.path), without, remedy)))
     if not keeps_loads(view):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise StoreError(str(Fault(str(view.path), "does not keep the equivalent loads of the bearings", remedy)))

@@ -13,6 +13,7 @@ from tolstat.analysis.sorted_loads import EXACT
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import LIFE_EXPONENT, Mode
 from tolstat.display import text
+from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, keeps_loads, lives_of
 from tolstat.store import worst
 from tolstat.store.error_budget import total_interval
@@ -153,7 +154,8 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
 
 def summary(view: View, confidence: float) -> dict[str, Any]:
     """JSON value ``bearing_life`` with the rows of `quantiles`, `below` and `contacts`; empty without bearings."""
-    if not (view.sampled and bearing_of(view) is not None and keeps_loads(view)):
+    bearing = bearing_of(view)
+    if bearing is None or bearing.lacking(FOR_LIFE) or not (view.sampled and keeps_loads(view)):
         return {}
     lives = lives_of(view)
     return {

@@ -22,6 +22,7 @@ from tolstat.common.loads import SHOWN_LOADS, UNIT_OF_LOAD
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean, validate
 from tolstat.joint import perturb
+from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.sampling import draw, draw_blocks
 from tolstat.store import Reader, ResultStore
 from tolstat.store.recorded import perturbed
@@ -95,6 +96,8 @@ def solver_of(study: Study, text: str, place: str) -> Solver:
     if fidelity == "auto" or (colon and not steps.isdecimal()):
         remedy = 'write "dynamic" or, with steps per revolution, "quasistatic:36"'
         raise InputError([Fault(place, f"{text!r} is not a fidelity", remedy)])
+    if fidelity == "ideal" and study.has_axial_force:
+        raise InputError([Fault(place, *NO_CLOSED_FORM)])
     return validate(Solver, own | ({"steps_per_rev": int(steps)} if colon else {}), place)
 
 

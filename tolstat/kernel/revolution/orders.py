@@ -23,7 +23,7 @@ def semi_major(x, y, n):
 
 @njit
 def plus(total, value, c, s):
-    """Add a value times cosine and sine to a pair of sums."""
+    """Return the pair of sums `total` plus `value` times cosine `c` and sine `s`."""
     return total[0] + value * c, total[1] + value * s
 
 

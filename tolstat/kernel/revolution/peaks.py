@@ -52,7 +52,7 @@ def follow_value(i, load, peaks):
 
 @njit
 def follow(par, work, v, peaks):
-    """Include the loads in ``work``; `v`: velocities that they were evaluated at, (56,)."""
+    """Include the loads in ``work`` in `peaks`; `v`: velocities that they were evaluated at, (56,)."""
     write_loads(ALL, v[PSI] / (work.shaft[0] + v[PSI]), par, work)
     for i in range(N_INSTANT):
         follow_value(i, work.loads[i], peaks)

@@ -19,7 +19,7 @@ from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INS
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
 from tolstat.kernel.revolution.closeup import extend
-from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, summarise
+from tolstat.kernel.revolution.settle import OWN, closure_error, summarise
 from tolstat.kernel.revolution.trail import (
     Trail,
     closure_trend,
@@ -43,8 +43,8 @@ NEARLY, PATIENT = 1.5e-2, 10
 """Closure error at which the steps are halved, if need be, and number of revolutions after which the first ones are
 halved anyway: a joint need not settle with all steps."""
 ENOUGH = 0.1
-"""Closure error at which a joint has settled in any case, in units of the last change of its largest loads: a third of
-their error."""
+"""Closure error at which a joint has settled in any case, in units of the last change of its largest bushing loads: a
+third of their error."""
 RESOLVED = 2e-2
 """Change of the largest loads by halving the steps, relative to the largest of their kind, up to which these are not
 halved again. A method of order 2 leaves a third of it as error."""
@@ -54,7 +54,7 @@ SETTLING = 16
 """Minimum number of revolutions with steps half as long before a joint is given up."""
 LONGEST_PERIOD = 8
 """Longest period that is recognised, revolutions."""
-MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.2, 10.0, 4.0
+MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.1, 10.0, 4.0
 """Minimum fall of log10(closure) over the revolutions kept that counts as settling. It must also exceed its scatter by
 the second factor (closure errors of chaotic joints wander, and fell by four to five times their scatter in some), or by
 the third if the Lyapunov exponent is not positive."""
@@ -231,15 +231,16 @@ def repeats(last, options, trail, turns, out):
     if period == 0 and not tired:
         return False
     combine(last, max(1, period), trail, out)
-    change = largest_change(turns.before, out) if turns.halved > 0 else np.nan
+    change = largest_change(True, turns.before, out) if turns.halved > 0 else np.nan
     if turns.halved < options.max_refinements and not change <= RESOLVED:
         halve_steps(period, turns, out)
         return False
-    period = find_period(last, out.closure, max(ENOUGH * change, options.settle_tol), turns, trail)
+    own = largest_change(False, turns.before, out) if turns.halved > 0 else np.nan
+    period = find_period(last, out.closure, max(ENOUGH * own, options.settle_tol), turns, trail)
     if period == 0:
         return False
     combine(last, period, trail, out)
-    out.refinement_change = largest_change(turns.before, out)
+    out.refinement_change = largest_change(True, turns.before, out)
     out.motion, out.period = PERIODIC if period == 1 else SUBHARMONIC, period
     out.closure_trend, _ = closure_trend(turns.since, trail.notes)
     return True
@@ -360,12 +361,12 @@ def after_revolution(point, par, options, samples, past, out):
         return NOT_FINITE, False
     turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
-        closure = closure_error(0, samples.size, ALL_LOADS, samples)
+        closure = closure_error(0, samples.size, OWN, samples)
         note_closure(turns.revolution, closure, trail.notes)
         out.closure = with_slow_decay(closure, turns.revolution, par, trail.notes)
         if repeats(last, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_PERIODIC), False
-    elif turns.period == 1 and turns.halved < options.max_refinements and largest_change(turns.before, own) > FAR:
+    elif turns.period == 1 and turns.halved < options.max_refinements and largest_change(True, turns.before, own) > FAR:
         halve_steps(1, turns, own)
     if turns.limit > BESIDE and turns.revolution >= turns.limit - BESIDE:
         if turns.revolution == turns.limit - BESIDE:

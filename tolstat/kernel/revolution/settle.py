@@ -94,7 +94,7 @@ def pressed(pin, lane, par, work):
 
 @njit
 def replace(i, lane, work, sample):
-    """Record load `i`; return its change since the revolution before, NaN in the first one."""
+    """Record load `i` in `sample`; return its change since the revolution before, NaN in the first one."""
     load, before = load_at(i, lane, work), sample.loads[i]
     sample.loads[i] = load
     return abs(load - before)
@@ -150,7 +150,7 @@ def record(k, lane, par, work, v, samples):
 
 @njit
 def write_shaft(shaft, lane, par, work, out):
-    """Write force and moment on a shaft to `out`, (6,), in G for the input shaft, in Ry(alpha) for the output shaft."""
+    """Write force and moment on `shaft` to `out`, (6,): of the input (0) in G, of the output shaft (1) in Ry(alpha)."""
     cosine, sine = pick(work.turned[shaft, 0], lane), pick(work.turned[shaft, 1], lane)
     first = 0
     for x, y, z in shaft_load(shaft, lane, par, work):

@@ -127,17 +127,17 @@ def with_slow_decay(closure, revolutions, par, notes):
 
 @njit
 def lag_closure(last, lag, trail):
-    """Closure error of revolution `last` (from 0) against the one `lag` earlier, defined as in `closure_error`."""
+    """Closure error of revolution `last` (from 0) against the one `lag` earlier, of bushing loads."""
     kept, angles = trail.loads.shape[0], trail.loads.shape[1]
     now, before = trail.loads[last % kept], trail.loads[(last - lag) % kept]
     worst = 0.0
     for measure in range(N_MEASURES):
         change = largest = 0.0
+        first, number = OF_MEASURE[measure, 0], MEASURES[measure, 1] - MEASURES[measure, 0]
         for s in range(angles):
-            for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+            for j in range(first, first + number):
                 change = larger(change, abs(now[s, j] - before[s, j]))
-                if MEASURES[measure, 0] <= DECIDING[j] < MEASURES[measure, 1]:
-                    largest = max(largest, now[s, j])
+                largest = max(largest, now[s, j])
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
     return worst
@@ -151,12 +151,16 @@ def keep_deciding(loads, kept):
 
 
 @njit
-def largest_change(before, out):
-    """Largest change of a largest load that decides against `before`, (N_DECIDING,), relative to its measure."""
+def largest_change(of_all, before, out):
+    """Largest change of a largest load that decides against `before`, (N_DECIDING,), relative to its measure.
+
+    With `of_all` false, changes of bushing loads count, without what the shafts carry.
+    """
     worst = 0.0
     for measure in range(N_MEASURES):
         change, size = 0.0, size_of(measure, out.largest)
-        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+        first, last = OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]
+        for j in range(first, last if of_all else first + MEASURES[measure, 1] - MEASURES[measure, 0]):
             change = max(change, abs(out.largest[DECIDING[j]] - before[j]))
         worst = max(worst, change / size if size > 0 else 0.0)
     return worst

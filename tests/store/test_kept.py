@@ -255,7 +255,7 @@ def test_sweeps_show_what_there_is(second: int) -> None:
 def test_reports_without_any_force_or_torque(tmp_path: Path) -> None:
     psi = report.build(synthetic.store(tmp_path, text("psi_max", body=PLAIN), "psi"))
     assert [file.name for file in psi.files] == ["psi_exceedance.csv", "psi_quantiles.csv"]
-    assert psi.table.splitlines()[1].startswith("psi ")
+    assert any(line.startswith("psi ") for line in psi.table.splitlines())
     assert "not kept, see [output] results of the study: cross1.F" in psi.notes
     means = report.build(synthetic.store(tmp_path, text("*.F_mean", body=PLAIN), "means"))
     assert means.files == []

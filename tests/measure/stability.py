@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.conftest import joint_with_law
 from tolstat import joint, sampling, study
 from tolstat.common.tables import RESULT, SIMULATED, Options, Status, iterations_allowed
 from tolstat.joint.contact import PREDEFINED
@@ -58,8 +59,7 @@ class Growth(NamedTuple):
 def rows_of(path: Path, n: int, law: str, torque: float | None) -> Table:
     """The first `n` joints of a study, all with one contact law, at a torque (N m) or their own."""
     plan = study.load(path, n=n)
-    changed = joint.load("cirelli2021", {"contact": {"law": law}}, str(path))
-    params = joint.perturb(changed, plan.operation, sampling.draw(plan)[1:])
+    params = joint.perturb(joint_with_law(law), plan.operation, sampling.draw(plan)[1:])
     if torque is not None:
         params["torque"] = torque
     return params

@@ -18,7 +18,8 @@ def bearing_life(file: ResultFile, wide: Wide = False, as_json: AsJson = False) 
     the bearings are loaded.
 
     The bearings are those of [bearing] in the joint file, or of [joint.bearing] in the study. To change them, edit the
-    file and repeat tolstat run: no joint is simulated again.
+    file and repeat tolstat run: no joint is simulated again. With contact.law = "needles" the keys needles and
+    needle_length are part of the campaign: to change them, run the study into another file.
 
     Example: tolstat bearing-life needle_bearings.h5
     """

@@ -63,8 +63,8 @@ class Joint(Strict):
         Bearing | None,
         Field(
             validate_default=True,
-            description="Needle bearing of each pin, for its rating life; with law `needles` of the contact, `needles` "
-            "and `needle_length` are its stiffness; other keys affect no load",
+            description='Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` '
+            "and `needle_length` say how stiff it is; other keys are for its rating life and affect no load",
         ),
     ] = None
     _inherited: tuple[Fault, ...] = ()

@@ -69,7 +69,7 @@ def test_loads_that_decide_are_compared_with_their_measure() -> None:
     for (first, last), (begin, end) in zip(MEASURES, OF_MEASURE, strict=True):
         (measure,) = set(of_load[first:last])
         assert {measure_of(KIND[key]).key for key in of_load[DECIDING[begin:end]]} == {measure}
-        assert set(range(first, last)) <= set(DECIDING[begin:end])
+        assert DECIDING[begin : begin + last - first].tolist() == list(range(first, last))
     assert {of_load[i] for i in DECIDING} == {kind.key for kind in LOAD_KINDS if kind.decides}
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolstat.common.load_kinds import SPAN
 from tolstat.common.tables import KERNEL_RESULT, Method, Motion, Options, Status
+from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_DECIDING, OF_MEASURE
 from tolstat.kernel.revolution.trail import Trail, closure_trend, combine, lag_closure, make_trails, note_closure
 from tolstat.solver.simulation import simulate_rows
 
@@ -105,13 +105,15 @@ def test_trend_is_the_line_through_the_logarithms():
 def test_closure_over_several_revolutions_finds_the_period():
     trail = make_trail(36, 10)
     rng = np.random.default_rng(2)
-    three = rng.uniform(1, 2, (3, 36, 16))
+    three = rng.uniform(1, 2, (3, 36, N_DECIDING))
     for r in range(20):
         trail.loads[r % 10] = three[r % 3]
     closures = [lag_closure(19, lag, trail) for lag in range(1, 9)]
     assert [c == 0 for c in closures] == [False, False, True, False, False, True, False, False]
-    kinds = [SPAN["F"], SPAN["T"]]
-    change = [np.abs(three[1] - three[0])[:, kind].max() / three[1][:, kind].max() for kind in kinds]
+    change = []
+    for (first, last), (least, most) in zip(OF_MEASURE, MEASURES, strict=True):
+        size = three[1][:, np.isin(DECIDING, np.arange(least, most))].max()
+        change.append(np.abs(three[1] - three[0])[:, first:last].max() / size)
     assert closures[0] == pytest.approx(max(change))
     trail.loads[19 % 10, 5, 11] = np.nan
     assert np.isnan(lag_closure(19, 3, trail))

@@ -188,8 +188,8 @@ def test_the_clearance_of_each_pin_is_a_result_whatever_becomes_of_the_joint(par
 
 def test_ramp_and_static_start_settle_to_the_same_revolution(params):
     par = params(alpha=0.2, **TWIST)
-    static, a = full(par, start=int(Start.STATIC), settle_tol=1e-6)
-    ramp, b = full(par, start=int(Start.RAMP), settle_tol=1e-6)
+    static, a = full(par, start=int(Start.STATIC), settle_tol=1e-6, newton_tol=1e-9)
+    ramp, b = full(par, start=int(Start.RAMP), settle_tol=1e-6, newton_tol=1e-9)
     assert static["status"] == ramp["status"] == Status.OK
     assert ramp["revolutions"] >= static["revolutions"]
     np.testing.assert_allclose(a["loads"], b["loads"], atol=2e-5 * np.abs(b["loads"]).max())

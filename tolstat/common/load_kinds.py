@@ -209,6 +209,7 @@ LOAD_KINDS = (
         f"force along the shaft, of a sliding output shaft that on its bearing, {OVER}",
         SHAFTS,
         measure="F",
+        decides=True,
     ),
     Kind(
         "lateral",
@@ -218,6 +219,7 @@ LOAD_KINDS = (
         f"force across the shaft {OVER}",
         SHAFTS,
         measure="F",
+        decides=True,
         modulus=True,
     ),
     Kind(
@@ -228,9 +230,19 @@ LOAD_KINDS = (
         f"bending moment of the shaft about the joint's centre {OVER}",
         SHAFTS,
         measure="T",
+        decides=True,
         modulus=True,
     ),
-    Kind("drive", "drive", "driving torque", "N*m", f"torque about the input shaft {OVER}", ("input",), measure="T"),
+    Kind(
+        "drive",
+        "drive",
+        "driving torque",
+        "N*m",
+        f"torque about the input shaft {OVER}",
+        ("input",),
+        measure="T",
+        decides=True,
+    ),
     *(
         Kind(
             f"{symbol}_orders",

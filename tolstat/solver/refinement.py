@@ -34,8 +34,8 @@ MAX_CHANGE = 0.05
 """Change of the largest loads by the last halving of the steps above which a joint is not resolved. A method of order 2
 leaves a third of it as error, or less."""
 MAX_INTERVAL_WIDTH = 0.03
-"""Width of a stationary joint's interval, relative to the largest load of the measure, up to which results of the
-uniform steps may stand."""
+"""Width of a stationary joint's interval, relative to its largest load, up to which results of the uniform steps may
+stand."""
 COUNTS = ("steps", "newton_iterations", "halvings", "factorisations")
 """Counters of work, summed over all runs of a joint."""
 
@@ -98,13 +98,14 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
 
 
 def _agree(plain: NDArray[np.void], found: NDArray[np.void]) -> NDArray[np.bool_]:
-    """Whether joints are stationary, with narrow intervals that contain the largest loads of the uniform steps."""
+    """Whether joints are stationary, with narrow intervals that contain the largest loads of the uniform steps.
+
+    Loads that measure others are compared: those of the shafts may be next to nothing.
+    """
     agree: NDArray[np.bool_] = found["status"] == Status.STATIONARY
-    for kind in (kind for kind in LOAD_KINDS if kind.decides):
-        lower, upper = found[f"{kind.key}_lower"], found[f"{kind.key}_upper"]
-        size, own = found[f"{measure_of(kind).key}_max"].max(axis=1), found[f"{kind.key}_max"].max(axis=1)
+    for key in dict.fromkeys(measure_of(kind).key for kind in LOAD_KINDS if kind.decides):
+        lower, upper = found[f"{key}_lower"], found[f"{key}_upper"]
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = plain[f"{kind.key}_max"].max(axis=1) / own
-            narrow = (upper - lower) * (own / size) <= MAX_INTERVAL_WIDTH
-        agree &= narrow & (lower <= ratio) & (ratio <= upper)
+            ratio = plain[f"{key}_max"].max(axis=1) / found[f"{key}_max"].max(axis=1)
+        agree &= (upper - lower <= MAX_INTERVAL_WIDTH) & (lower <= ratio) & (ratio <= upper)
     return agree

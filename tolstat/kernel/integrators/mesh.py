@@ -35,7 +35,7 @@ COARSENING_REVS = 3
 """Revolutions with one tolerance after which levels only rise: a changing mesh disturbs a settling motion."""
 UNKNOWN = 255
 """Level of a cell that has not been taken yet."""
-NEWTON_SHARE, SETTLE_SHARE = 0.01, 0.3
+NEWTON_SHARE, SETTLE_SHARE = 0.01, 0.1
 """Residual that ends Newton's iteration, relative to the joint's largest force: the smaller one of `NEWTON_SHARE` times
 the tolerance and `SETTLE_SHARE` times the closure error that is to be detected."""
 LAST_ITERATION_FACTOR = 3.0

@@ -22,7 +22,7 @@ from tolstat.kernel.revolution.resolve import (
     follows_error,
     merge_extremes,
 )
-from tolstat.kernel.revolution.settle import closure_error, grid_step, predict_increment, record
+from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, grid_step, predict_increment, record
 from tolstat.kernel.revolution.simulate import (
     NEWTON_FAILED,
     NOT_SETTLED,
@@ -178,7 +178,7 @@ def finish_angle(lane, par, lanes, options, control, motion, samples, out):
     if k == n:
         k = 0
         control.done[lane] += 1
-        out.closure, out.revolutions = closure_error(0, 1, samples), float(control.done[lane])
+        out.closure, out.revolutions = closure_error(0, 1, ALL_LOADS, samples), float(control.done[lane])
         if out.closure <= options.settle_tol:
             return OK
         tired = control.iterations[lane] > MAX_ITERATIONS * n * options.max_revs

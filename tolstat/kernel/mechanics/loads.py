@@ -35,6 +35,7 @@ def _deciding():
     found, bounds = [], [0]
     for key in _MEASURES:
         kinds = [kind for kind in LOAD_KINDS if kind.decides and measure_of(kind).key == key]
+        kinds.sort(key=lambda kind: kind.key != key)
         found += [i for kind in kinds for i in range(SPAN[kind.key].start, SPAN[kind.key].stop)]
         bounds.append(len(found))
     return np.array(found), np.array([bounds[:-1], bounds[1:]]).T
@@ -42,7 +43,7 @@ def _deciding():
 
 DECIDING, OF_MEASURE = _deciding()
 """Loads that decide on settling, closer look and steps; those compared with measure m are number ``OF_MEASURE[m, 0]``
-to ``OF_MEASURE[m, 1] - 1`` of them."""
+to ``OF_MEASURE[m, 1] - 1`` of them, first the loads that measure."""
 N_DECIDING = len(DECIDING)
 OTHERS = np.setdiff1d(np.arange(N_INSTANT), DECIDING)
 """Loads at one instant that do not decide."""

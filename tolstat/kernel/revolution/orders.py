@@ -15,48 +15,40 @@ LATERAL, MOMENT, DRIVE, PSI = (SPAN[f"{key}_orders"].start for key in ("lateral"
 
 
 @njit
-def semi_major(of_x, of_y, n):
-    """Amplitude of a vector from the sums of x e^(-i n theta) and y e^(-i n theta) over `n` samples."""
-    (a, b), (c, d) = of_x, of_y
+def semi_major(x, y, n):
+    """Amplitude of a vector from its sums over `n` samples: `x`, `y` times the cosine, and times the sine."""
+    (a, b), (c, d) = x, y
     return (math.sqrt((a - d) ** 2 + (b + c) ** 2) + math.sqrt((a + d) ** 2 + (b - c) ** 2)) / n
 
 
 @njit
-def of_shaft(shaft, order, samples):
-    """Amplitudes of lateral force and bending moment of a shaft (0 input, 1 output) at an order."""
-    n = samples.size
-    turn_c, turn_s = math.cos(2 * math.pi * order / n), -math.sin(2 * math.pi * order / n)
-    c, s = 1.0, 0.0
-    f_x = f_y = m_x = m_y = (0.0, 0.0)
-    for k in range(n):
-        load = samples[k].shafts[shaft]
-        f_x = (f_x[0] + load[0] * c, f_x[1] + load[0] * s)
-        f_y = (f_y[0] + load[1] * c, f_y[1] + load[1] * s)
-        m_x = (m_x[0] + load[3] * c, m_x[1] + load[3] * s)
-        m_y = (m_y[0] + load[4] * c, m_y[1] + load[4] * s)
-        c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
-    return semi_major(f_x, f_y, n), semi_major(m_x, m_y, n)
+def plus(total, value, c, s):
+    """Add a value times cosine and sine to a pair of sums."""
+    return total[0] + value * c, total[1] + value * s
 
 
 @njit
-def of_speed(order, samples):
-    """Amplitudes of driving torque and Psi at an order."""
+def of_order(i, samples, out):
+    """Write all amplitudes of order ``ORDERS[i]`` to a row of KERNEL_RESULT."""
     n = samples.size
-    turn_c, turn_s = math.cos(2 * math.pi * order / n), -math.sin(2 * math.pi * order / n)
+    turn_c, turn_s = math.cos(2 * math.pi * ORDERS[i] / n), -math.sin(2 * math.pi * ORDERS[i] / n)
     c, s = 1.0, 0.0
-    drive = psi = none = (0.0, 0.0)
+    none = (0.0, 0.0)
+    fx = fy = mx = my = gx = gy = nx = ny = drive = psi = none  # f, m of the input shaft, g, n of the output shaft
     for k in range(n):
-        drive = (drive[0] + samples[k].shafts[0, 5] * c, drive[1] + samples[k].shafts[0, 5] * s)
-        psi = (psi[0] + samples[k].psi * c, psi[1] + samples[k].psi * s)
+        one, two = samples[k].shafts[0], samples[k].shafts[1]
+        fx, fy, mx, my = plus(fx, one[0], c, s), plus(fy, one[1], c, s), plus(mx, one[3], c, s), plus(my, one[4], c, s)
+        gx, gy, nx, ny = plus(gx, two[0], c, s), plus(gy, two[1], c, s), plus(nx, two[3], c, s), plus(ny, two[4], c, s)
+        drive, psi = plus(drive, one[5], c, s), plus(psi, samples[k].psi, c, s)
         c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
-    return semi_major(drive, none, n), semi_major(psi, none, n)
+    of_output = len(ORDERS) + i
+    out.largest[LATERAL + i], out.largest[LATERAL + of_output] = semi_major(fx, fy, n), semi_major(gx, gy, n)
+    out.largest[MOMENT + i], out.largest[MOMENT + of_output] = semi_major(mx, my, n), semi_major(nx, ny, n)
+    out.largest[DRIVE + i], out.largest[PSI + i] = semi_major(drive, none, n), semi_major(psi, none, n)
 
 
 @njit
 def write_orders(samples, out):
     """Write the amplitudes of the recorded revolution to a row of KERNEL_RESULT."""
     for i in range(len(ORDERS)):
-        for shaft in range(2):
-            j = len(ORDERS) * shaft + i
-            out.largest[LATERAL + j], out.largest[MOMENT + j] = of_shaft(shaft, ORDERS[i], samples)
-        out.largest[DRIVE + i], out.largest[PSI + i] = of_speed(ORDERS[i], samples)
+        of_order(i, samples, out)

@@ -15,26 +15,18 @@ import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Motion, Options, Status
 from tolstat.kernel.integrators.mesh import CELL, cells_of
-from tolstat.kernel.mechanics.loads import (
-    DECIDING,
-    FORCES,
-    N_AVERAGED,
-    N_DECIDING,
-    N_INSTANT,
-    N_MEASURES,
-    OF_MEASURE,
-    TORQUES,
-    size_of,
-)
+from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INSTANT, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
 from tolstat.kernel.revolution.closeup import extend
-from tolstat.kernel.revolution.settle import closure_error, summarise
+from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, summarise
 from tolstat.kernel.revolution.trail import (
     Trail,
     closure_trend,
     combine,
+    keep_deciding,
     lag_closure,
+    largest_change,
     make_trails,
     note_closure,
     with_slow_decay,
@@ -62,7 +54,7 @@ SETTLING = 16
 """Minimum number of revolutions with steps half as long before a joint is given up."""
 LONGEST_PERIOD = 8
 """Longest period that is recognised, revolutions."""
-MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.1, 10.0, 4.0
+MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.2, 10.0, 4.0
 """Minimum fall of log10(closure) over the revolutions kept that counts as settling. It must also exceed its scatter by
 the second factor (closure errors of chaotic joints wander, and fell by four to five times their scatter in some), or by
 the third if the Lyapunov exponent is not positive."""
@@ -186,13 +178,6 @@ def merge_extremes(one, out):
 
 
 @njit
-def keep_deciding(loads, kept):
-    """Copy the loads that decide to `kept`, (N_DECIDING,)."""
-    for j in range(N_DECIDING):
-        kept[j] = loads[DECIDING[j]]
-
-
-@njit
 def keep_revolution(par, samples, extremes, trail, r):
     """Store loads and statistics of revolution `r` (from 0) of the joint; reset `extremes`; return the statistics.
 
@@ -207,18 +192,6 @@ def keep_revolution(par, samples, extremes, trail, r):
     for s in range(0, samples.size, stride):
         keep_deciding(samples[s].loads, trail.loads[r % trail.revolution.size, s // stride])
     return own
-
-
-@njit
-def largest_change(before, out):
-    """Largest change of a largest load that decides against `before`, (N_DECIDING,), relative to its measure."""
-    worst = 0.0
-    for measure in range(N_MEASURES):
-        change, size = 0.0, size_of(measure, out.largest)
-        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
-            change = max(change, abs(out.largest[DECIDING[j]] - before[j]))
-        worst = max(worst, change / size if size > 0 else 0.0)
-    return worst
 
 
 @njit
@@ -387,7 +360,7 @@ def after_revolution(point, par, options, samples, past, out):
         return NOT_FINITE, False
     turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
-        closure = closure_error(0, samples.size, samples)
+        closure = closure_error(0, samples.size, ALL_LOADS, samples)
         note_closure(turns.revolution, closure, trail.notes)
         out.closure = with_slow_decay(closure, turns.revolution, par, trail.notes)
         if repeats(last, options, trail, turns, out):

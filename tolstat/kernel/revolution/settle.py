@@ -8,6 +8,7 @@ import numpy as np
 from tolstat.kernel.mechanics.loads import (
     DECIDING,
     INTERPOLATED,
+    MEASURES,
     N_AVERAGED,
     N_INSTANT,
     N_MEASURES,
@@ -36,7 +37,7 @@ SAMPLE = np.dtype(
     [
         ("components", "f8", (8, 6)),  # of the bushing loads along and about e, t, z; N, N m
         ("loads", "f8", (N_INSTANT,)),  # kind after kind
-        ("change", "f8", (N_MEASURES,)),  # largest change of a load that decides, or of s as a force, in a revolution
+        ("change", "f8", (N_MEASURES, 2)),  # largest change in a revolution: of bushing loads, of all that decide
         ("s", "f8"),  # displacement of the output shaft along its axis, m
         ("shafts", "f8", (2, 6)),  # force and moment about O on input and output shaft, in axes that do not turn
         ("tau", "f8"),
@@ -49,6 +50,8 @@ SAMPLE = np.dtype(
     align=True,
 )
 """Sample k of a revolution belongs to theta = 2 pi k / steps_per_rev."""
+OWN, ALL_LOADS = 0, 1
+"""Columns of its ``change``: bushing loads, and s as a force; with them what the shafts carry."""
 
 
 def make_samples(joints: int, steps_per_rev: int) -> np.recarray:
@@ -90,6 +93,14 @@ def pressed(pin, lane, par, work):
 
 
 @njit
+def replace(i, lane, work, sample):
+    """Record load `i`; return its change since the revolution before, NaN in the first one."""
+    load, before = load_at(i, lane, work), sample.loads[i]
+    sample.loads[i] = load
+    return abs(load - before)
+
+
+@njit
 def record(k, lane, par, work, v, samples):
     """Record a grid point, and the change of the loads that decide since the revolution before.
 
@@ -112,17 +123,18 @@ def record(k, lane, par, work, v, samples):
     fetch(samples[(k + 2) % samples.size])
     sample.tau, sample.psi = output_speed(lane, par, work, v)
     write_loads(lane, sample.psi, par, work)
-    for measure in range(N_MEASURES):
-        change = 0.0
-        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
-            i = DECIDING[j]
-            load = load_at(i, lane, work)
-            change = larger(change, abs(load - sample.loads[i]))  # NaN in the first revolution
-            sample.loads[i] = load
-        sample.change[measure] = change
     s = pick(work.pos[OUTPUT_SHAFT, 2], lane)
     shift = centring_stiffness(lane, par) * abs(s - sample.s)
-    sample.change[OF_FORCES] = larger(sample.change[OF_FORCES], shift)
+    for measure in range(N_MEASURES):
+        change = shift if measure == OF_FORCES else 0.0
+        first, last = OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]
+        others = first + MEASURES[measure, 1] - MEASURES[measure, 0]
+        for j in range(first, others):
+            change = larger(change, replace(DECIDING[j], lane, work, sample))
+        sample.change[measure, OWN] = change
+        for j in range(others, last):
+            change = larger(change, replace(DECIDING[j], lane, work, sample))
+        sample.change[measure, ALL_LOADS] = change
     sample.s = s
     for i in OTHERS:
         sample.loads[i] = load_at(i, lane, work)
@@ -182,16 +194,16 @@ def predict_increment(k, q, v, ahead, samples):
 
 
 @njit
-def closure_error(first, last, samples):
-    """Largest change of any load that decides since the revolution before, relative to its measure.
+def closure_error(first, last, of, samples):
+    """Largest change of a load that decides since the revolution before, relative to its measure.
 
-    Changes count at samples `first` to `last` - 1.
+    Changes count at samples `first` to `last` - 1; `of`: those of bushing loads (`OWN`), or of `ALL_LOADS`.
     """
     worst = 0.0
     for measure in range(N_MEASURES):
         change = largest = 0.0
         for s in range(first, last):
-            change = larger(change, samples[s].change[measure])
+            change = larger(change, samples[s].change[measure, of])
         for s in range(samples.size):
             largest = max(largest, size_of(measure, samples[s].loads))
         error = change / largest if largest > 0 else change
@@ -211,18 +223,23 @@ def peak(before, here, ahead):
 
 
 @njit
-def extremes(values):
-    """Largest and smallest value of a periodic curve given at equally spaced angles, shape (n,), by parabolas."""
-    n = values.size
-    top = low = 0
+def highest(values):
+    """Largest value of a periodic curve given at equally spaced angles, shape (n,), by a parabola."""
+    n, top = values.size, 0
     for s in range(n):
         if values[s] > values[top]:
             top = s
+    return peak(values[top - 1], values[top], values[(top + 1) % n])
+
+
+@njit
+def lowest(values):
+    """Smallest value of such a curve."""
+    n, low = values.size, 0
+    for s in range(n):
         if values[s] < values[low]:
             low = s
-    highest = peak(values[top - 1], values[top], values[(top + 1) % n])
-    lowest = -peak(-values[low - 1], -values[low], -values[(low + 1) % n])
-    return highest, lowest
+    return -peak(-values[low - 1], -values[low], -values[(low + 1) % n])
 
 
 @njit
@@ -258,13 +275,13 @@ def summarise(par, samples, out):
     n = samples.size
     for i in range(N_INSTANT):
         if i < N_AVERAGED:
-            top, low = extremes(samples.loads[:, i])
+            top, low = highest(samples.loads[:, i]), lowest(samples.loads[:, i])
             total = 0.0
             for s in range(n):
                 total += samples[s].loads[i]
             out.largest[i], out.average[i], out.range[i] = top, total / n, top - max(low, 0.0)
         elif INTERPOLATED[i]:
-            out.largest[i], _ = extremes(samples.loads[:, i])
+            out.largest[i] = highest(samples.loads[:, i])
         else:
             out.largest[i] = 0.0
             for s in range(n):

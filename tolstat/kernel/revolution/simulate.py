@@ -30,6 +30,8 @@ from tolstat.kernel.revolution.equilibrium import CA_REGULAR, CV_REGULAR, build_
 from tolstat.kernel.revolution.quasistatic import angle_time, build_quasistatic, speed_ratios
 from tolstat.kernel.revolution.resolve import Past, follows_error, make_past
 from tolstat.kernel.revolution.settle import (
+    ALL_LOADS,
+    OWN,
     Ring,
     closure_error,
     grid_step,
@@ -50,10 +52,11 @@ RAMP = int(Start.RAMP)
 DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)
 CHECKS_PER_REV = 12
 """Checks of the closure error per revolution, once two revolutions are recorded."""
-EARLY_CLOSURE, EARLY_STEP_ERROR = 0.1, 0.02
+EARLY_CLOSURE, EARLY_SUMS, EARLY_STEP_ERROR = 0.1, 0.2, 0.02
 """A joint whose motion at one twelfth to two twelfths of a revolution is repeated a revolution later has settled: the
-start is forgotten within the first twelfth. The first number is the closure error there, in units of ``settle_tol``,
-the second the step error, up to which that holds. Of 12 000 joints (docs/notes/steps.md) none is settled by it
+start is forgotten within the first twelfth. The first number is the closure error of bushing loads there, in units of
+``settle_tol``, the second that of all loads, since a shaft carries the sum of two of them, the third the step error, up
+to which that holds. Of 12 000 joints (docs/notes/steps.md) none is settled by it
 that would not be at the end of the second revolution."""
 
 residual, acceleration = dynamics.residual, dynamics.acceleration
@@ -172,7 +175,7 @@ def run_quasistatic(par, options, work, state, ring, out):
     for revolutions in range(options.max_revs):
         if not revolution(revolutions == 0, par, options, work, state, ring):
             return NEWTON_FAILED
-        out.closure, out.revolutions = closure_error(0, 1, ring.samples), revolutions + 1.0
+        out.closure, out.revolutions = closure_error(0, 1, ALL_LOADS, ring.samples), revolutions + 1.0
         if out.closure <= options.settle_tol:
             break
         if state.counters[ITERATIONS] > MAX_ITERATIONS * n * options.max_revs:
@@ -218,13 +221,15 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
     out.revolutions = k / n
     if k == n + 2 * twelfth:
-        closure = closure_error(twelfth + 1, 2 * twelfth + 1, samples)
+        first, last, bound = twelfth + 1, 2 * twelfth + 1, options.settle_tol
+        own, closure = closure_error(first, last, OWN, samples), closure_error(first, last, ALL_LOADS, samples)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
-        smooth = out.closure <= EARLY_CLOSURE * options.settle_tol and step_error(par, samples) <= EARLY_STEP_ERROR
-        if smooth:
+        small = with_slow_decay(own, out.revolutions, par, notes) <= EARLY_CLOSURE * bound
+        small = small and out.closure <= EARLY_SUMS * bound
+        if small and step_error(par, samples) <= EARLY_STEP_ERROR:
             return OK
     if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
-        closure = closure_error(0, n, samples)
+        closure = closure_error(0, n, ALL_LOADS, samples)
         note_closure(out.revolutions, closure, notes)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
         if out.closure <= options.settle_tol:

@@ -10,7 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, LIFE_EXPONENT
-from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_AVERAGED, N_DECIDING, N_LOADS, N_MEASURES, OF_MEASURE
+from tolstat.kernel.mechanics.loads import (
+    DECIDING,
+    MEASURES,
+    N_AVERAGED,
+    N_DECIDING,
+    N_LOADS,
+    N_MEASURES,
+    OF_MEASURE,
+    size_of,
+)
 from tolstat.kernel.mechanics.scale import axial_decay
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit
@@ -131,6 +140,25 @@ def lag_closure(last, lag, trail):
                     largest = max(largest, now[s, j])
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
+    return worst
+
+
+@njit
+def keep_deciding(loads, kept):
+    """Copy the loads that decide to `kept`, (N_DECIDING,)."""
+    for j in range(N_DECIDING):
+        kept[j] = loads[DECIDING[j]]
+
+
+@njit
+def largest_change(before, out):
+    """Largest change of a largest load that decides against `before`, (N_DECIDING,), relative to its measure."""
+    worst = 0.0
+    for measure in range(N_MEASURES):
+        change, size = 0.0, size_of(measure, out.largest)
+        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
+            change = max(change, abs(out.largest[DECIDING[j]] - before[j]))
+        worst = max(worst, change / size if size > 0 else 0.0)
     return worst
 
 

@@ -279,7 +279,8 @@ def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
     assert done.exit_code == 0
     sentence, table = done.stdout.split("\n\n", 1)
     assert re.fullmatch(
-        r"[\d.]+ % of the joints keep all 7 limits \(\d+ of 60; total interval [\d.]+ \.\. [\d.]+ %\)\.",
+        r"[\d.]+ % of the joints keep all 7 limits \(\d+ of 60; total interval [\d.]+ \.\. [\d.]+ %\)\. "
+        r"Shafts rigid along their axes; contact law mode\.",
         sentence.replace("\n", " "),
     )
     assert table.startswith("load")
@@ -372,8 +373,9 @@ def test_completion_knows_the_commands_and_loads_nothing_heavy():
 def test_run_ends_with_the_report_and_resumes(study):
     done = call("run", study, "--executor", "serial")
     assert done.exit_code == 0, done.stderr
-    verdict, _, head, *_ = done.stdout.splitlines()
+    verdict, mounting, _, head, *_ = done.stdout.splitlines()
     assert verdict.startswith("No verdict")
+    assert mounting == "Shafts rigid along their axes; contact law mode."
     assert head.startswith("load")
     assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
     assert done.stderr.endswith("next: tolstat report small.h5 --out small.html\n")
@@ -431,6 +433,7 @@ def test_another_number_of_joints_is_an_extension_of_the_file(study):
     more = call("run", study, "--executor", "serial")
     assert more.exit_code == 2
     assert more.stderr == (
+        "small: shafts rigid along their axes; contact law mode\n"
         "error: small.h5: is the result file of this study with 5 joints, not 60\n"
         "  hint: simulate more of its joints: tolstat extend small.h5 --n 60\n"
     )

@@ -7,6 +7,7 @@ import re
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -17,7 +18,7 @@ from tolstat.cli import app
 from tolstat.common.tables import Simulation
 from tolstat.report import page, summary
 from tolstat.store import Reader
-from tolstat.store.recorded import mountings, note_on_mounting
+from tolstat.store.recorded import mountings, note_on_mounting, swept
 
 RIGID = "shafts rigid along their axes; contact law mode"
 FREE = "output shaft free along its axis; contact law mode"
@@ -119,3 +120,5 @@ def test_several_variants_are_counted(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, SWEPT, name="swept")
     said = "Shafts rigid along their axes in 1 of 5 variants, output shaft held with 1e+06 to 1e+08 N/m along its axis "
     assert unwrapped(report.build(path).table).startswith(f"{said}in 4 of 5 variants; contact law mode. shaft.axial")
+    with Reader.open(path) as store:
+        np.testing.assert_array_equal(swept(store)["shaft.axial"], [np.nan, 1e6, 3.4e7, 6.7e7, 1e8])

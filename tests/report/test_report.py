@@ -227,8 +227,9 @@ def test_report_of_a_random_view(tmp_path):
     assert [file.name for file in made.files] == names
     assert all(file.parent == tmp_path and file.stat().st_size > 500 for file in made.files)
     assert made.table.splitlines()[0].startswith("67.2 % of the joints keep all 7 limits (39 of 58 with a valid load;")
-    assert made.table.splitlines()[2].split()[:4] == ["load", "limit", "nominal", "above"]
-    assert len(made.table.splitlines()) == 2 + 1 + 7
+    assert made.table.splitlines()[1] == "Shafts rigid along their axes; contact law mode."
+    assert made.table.splitlines()[3].split()[:4] == ["load", "limit", "nominal", "above"]
+    assert len(made.table.splitlines()) == 3 + 1 + 7
     assert "60 joints (random sampling), 2 failed, 0 not settled" in made.notes
     limits = pd.read_csv(tmp_path / "small_limits.csv")
     assert list(limits["n"]) == [60] * 7  # the nominal joint is not among them
@@ -252,7 +253,7 @@ def test_report_without_limits_prints_quantiles(tmp_path):
     plain = synthetic.STUDY.partition("[limits]")[0]
     made = report.build(synthetic.store(tmp_path, plain))
     assert "95 % interval of 99 %" in made.table
-    assert len(made.table.splitlines()) == 1 + 16
+    assert len(made.table.splitlines()) == 2 + 1 + 16
     assert not (tmp_path / "small_limits.csv").exists()
 
 

@@ -33,7 +33,7 @@ FIDELITY = {
 
 def drawn(n: int, **operation: float) -> np.recarray:
     """The first joints of the study with ISO 2768-f, at another operating point."""
-    plan = study.load(ROOT / "studies" / "iso2768_f.toml", n=n)
+    plan = study.load(ROOT / "studies" / "rigid_shafts.toml", n=n)
     point = plan.operation.model_copy(update=operation)
     return joint.perturb(plan.joint, point, sampling.draw(plan)).view(np.recarray)
 

@@ -17,7 +17,7 @@ from tolstat.common.tables import Options
 from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import restore, simulate_rows
-from tolstat.store.recorded import joint_of, options_of
+from tolstat.store.recorded import joint_of, options_of, parameters
 from tolstat.store.result_file import RUN_AGAIN, pick
 
 if TYPE_CHECKING:
@@ -153,6 +153,42 @@ def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:
     return np.moveaxis(restore(real, imag, int(store.options["steps_per_rev"])), 0, 1)
 
 
+def on_shafts(store: Reader, slots: NDArray[np.intp]) -> tuple[list[FloatArray], str, float]:
+    """Return the loads on the shafts of a few joints of any campaign over the input angle.
+
+    Parameters
+    ----------
+    store : Reader
+        A result file, at one operating point.
+    slots : ndarray of int, shape (m,)
+        File slots; none pending. Without full histories each is simulated again, one after the other.
+
+    Returns
+    -------
+    loads : list of ndarray, shape (k, 2, 6)
+        Of each joint force (N) and moment about O (N m) on input and output shaft, components
+        `load_kinds.SHAFT_COMPONENTS`, in axes that do not turn, at k equally spaced input angles from zero.
+    origin : str
+    apart : float
+        As in `Revolutions`.
+
+    Raises
+    ------
+    InputError
+        When a joint has to be simulated again and this version cannot read the file's joint or options.
+    """
+    if "shafts" in store.history_specs:
+        return list(store.histories("shafts", slots).astype(float)), "stored", 0.0
+    if len(slots):
+        warm_up()
+    loads, apart = [], 0.0
+    for i, slot in enumerate(slots.tolist()):
+        found = simulate_rows(parameters(store, slots[i : i + 1]), options_of(store, slot), "full")
+        loads.append(found.histories["shafts"][0].astype(float))
+        apart = max(apart, float(_apart(found.results, store.results(slice(slot, slot + 1)))[0]))
+    return loads, AGAIN, apart
+
+
 class Ahead(NamedTuple):
     """Joints that are simulated again before anyone asks for them, and once for all who do.
 
@@ -232,9 +268,15 @@ def _simulate(
         found = simulate_rows(params[here], options, "full")
         samples = found.histories["loads"]
         loads[here] = samples[:, :: max(1, samples.shape[1] // steps)]
-        for name in LARGEST:
-            with np.errstate(invalid="ignore", divide="ignore"):
-                off = np.abs(found.results[name] / stored[name][here] - 1.0)
-            largest = off.max(axis=1, initial=0.0, where=np.isfinite(off))
-            apart[here] = np.maximum(apart[here], largest)
+        apart[here] = _apart(found.results, stored[here])
     return loads, apart
+
+
+def _apart(now: NDArray[np.void], stored: NDArray[np.void]) -> FloatArray:
+    """Largest relative difference of the fields `LARGEST` from the stored values of each joint, (m,)."""
+    apart = np.zeros(len(stored))
+    for name in LARGEST:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            off = np.abs(now[name] / stored[name] - 1.0)
+        apart = np.maximum(apart, off.max(axis=1, initial=0.0, where=np.isfinite(off)))
+    return apart

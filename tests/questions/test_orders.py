@@ -1,0 +1,213 @@
+"""Orders of the shafts' loads: quantiles by NumPy and SciPy, closed form of the ideal joint, known orbits, the page."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import binom
+from typer.testing import CliRunner
+
+import tolstat
+from tests.support import synthetic
+from tolstat import cli, sampling, study
+from tolstat.common.errors import StoreError
+from tolstat.common.load_kinds import ORDERS, SHAFTS
+from tolstat.common.loads import LOADS
+from tolstat.common.tables import Options, Simulation
+from tolstat.display.asked import Asked
+from tolstat.questions.orders import query, rendering, section
+from tolstat.questions.orders.query import orders_of
+from tolstat.solver.simulation import history_specs
+from tolstat.store import Reader, ResultStore
+
+ASKED = synthetic.STUDY.replace("[limits]", '[limits]\n"output.lateral_1x" = "200 N"')
+OTHERS = "'*.[FT]_max', 'pin1.contact_*', 'psi_max'"
+"""Columns that the limits of the invented campaigns need."""
+SAMPLES = 180
+THETA = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+SLOW = """
+[joint]
+base = "cirelli2021"
+[operation]
+alpha = "25 deg"
+speed = "1 rpm"
+torque = "100 N*m"
+[tolerances]
+"pin*.offset_t" = { plus_minus = "0.05 mm", distribution = "normal", cpk = 1.0 }
+"hole*.tilt_t" = { plus_minus = "0.1 deg", distribution = "normal", cpk = 1.0 }
+[sampling]
+n = 24
+seed = 5
+[solver]
+fidelity = "quasistatic"
+"""
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, ["orders", *map(str, arguments)])
+
+
+def semi_major(force, n):
+    """Amplitude of order n of points of an orbit, (k, 2), by NumPy's FFT."""
+    spectrum = np.fft.fft(force[:, 0] + 1j * force[:, 1]) / len(force)
+    return abs(spectrum[n]) + abs(spectrum[-n])
+
+
+@pytest.fixture(scope="module")
+def invented(tmp_path_factory):
+    return synthetic.store(tmp_path_factory.mktemp("orders"), ASKED, failed=3)
+
+
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory):
+    """Files of the same joints, slowly turned: without histories, and with full ones."""
+    folder = tmp_path_factory.mktemp("slow")
+    found = []
+    for name, text in (("none", SLOW), ("full", SLOW + '[output]\nhistories = "full"\n')):
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+        tolstat.run(tolstat.load(folder / f"{name}.toml"), folder / f"{name}.h5", workers=1)
+        found.append(folder / f"{name}.h5")
+    return found
+
+
+def test_quantiles_of_each_amplitude_with_their_order_statistics(invented):
+    with Reader.open(invented) as store:
+        found = orders_of(store.view(), orbits=False)
+        own = store.results(slice(1, 58))  # row 0 is the nominal joint, the last three have failed
+        nominal = store.results(slice(0, 1))
+    assert (found.joints, found.left_out, found.orbits) == (57, 3, [])
+    assert len(found.table) == 6 * len(ORDERS)
+    for row in found.table.to_dict("records"):
+        values = np.sort(LOADS[row["load"]].of(own))
+        assert row["nominal"] == LOADS[row["load"]].of(nominal)[0]
+        assert row["load"] == f"{row['quantity']}_{row['order']}x"
+        for key, share in (("q5", 0.05), ("qmedian", 0.5), ("q95", 0.95)):
+            assert row[key] == np.quantile(values, share, method="inverted_cdf")
+        low = int(binom.ppf(0.025, 57, 0.5))
+        assert row["qmedian_lower"] == values[low - 1]
+        assert row["qmedian_upper"] == values[57 - low]
+        assert (row["q5_lower"], row["q95_upper"]) == (0.0, np.inf)  # too few joints
+
+
+def test_ideal_joint_has_even_orders_of_its_closed_form(slow):
+    """Moment T|sin(beta)|/cos(gamma) about the normal to the input pins, which turn with the shaft."""
+    with Reader.open(slow[0]) as store:
+        table = orders_of(store.view(), orbits=False).table.set_index("load")
+    alpha, theta = np.radians(25.0), 2 * np.pi * np.arange(720) / 720
+    beta, sine = np.arctan(np.tan(alpha) * np.sin(theta)), np.sin(alpha) * np.cos(theta)
+    moment = 100.0 * np.sin(beta) / np.sqrt(1 - sine**2)
+    curve = np.column_stack([-moment * np.sin(theta), moment * np.cos(theta)])
+    for n in ORDERS:
+        assert table.loc[f"input.moment_{n}x", "nominal"] == pytest.approx(semi_major(curve, n), abs=0.02)
+        assert table.loc[f"output.lateral_{n}x", "nominal"] < 0.1
+    assert table.loc["input.moment_2x", "nominal"] > 1000 * table.loc["input.moment_1x", "nominal"]
+
+
+def test_orbits_simulated_again_are_those_of_the_histories_and_have_the_stored_orders(slow):
+    found = []
+    for path in slow:
+        with Reader.open(path) as store:
+            found.append(orders_of(store.view()))
+            load = {shaft: store.view().load(f"{shaft}.lateral") for shaft in SHAFTS}
+            stored = {name: LOADS[name].of(store.results(slice(0, None))) for name in LOADS if "lateral_" in name}
+    assert [one.origin for one in found] == ["simulated again", "stored"]
+    assert [one.apart for one in found] == [0.0, 0.0]
+    assert [orbit.near for orbit in found[0].orbits] == ["nominal", "median", "95 %"] * 2
+    for again, kept in zip(found[0].orbits, found[1].orbits, strict=True):
+        assert again[:4] == kept[:4]
+        np.testing.assert_array_equal(again.force, kept.force)
+        for n in ORDERS:
+            own = stored[f"{again.shaft}.lateral_{n}x"][again.row]
+            assert semi_major(again.force, n) == pytest.approx(own, rel=1e-4, abs=1e-4)
+        if again.near != "nominal":
+            share = query.NEAR[again.near]
+            expected = np.quantile(load[again.shaft].valid, share, method="inverted_cdf")
+            assert load[again.shaft].values[again.row - 1] == expected
+
+
+def known(rows):
+    """Loads on the shafts: on the output shaft 22 N of order 2 that turn (even rows) or swing, about 5 N; none else."""
+    loads = np.zeros((rows, SAMPLES, 2, 6), np.float32)
+    turns = np.arange(rows) % 2 == 0
+    curve = np.where(turns[:, None], 22 * np.exp(2j * THETA), 22 * np.exp(0.7j) * np.cos(2 * THETA + 0.4)) + 5.0
+    loads[:, :, 1, 0], loads[:, :, 1, 1] = curve.real, curve.imag
+    return loads
+
+
+def test_a_force_that_turns_and_one_that_swings_have_orbits_with_the_same_semi_axis(tmp_path):
+    source = tmp_path / "known.toml"
+    source.write_text(ASKED.replace("[limits]", '[output]\nhistories = "full"\n\n[limits]'), encoding="utf-8")
+    plan = study.load(source)
+    specs = {"shafts": history_specs(Options(steps_per_rev=SAMPLES), "full", 0)["shafts"]}
+    results = synthetic.results(plan.rows)
+    with ResultStore.create(tmp_path / "known.h5", plan, sampling.draw(plan), specs) as store:
+        store.write(np.arange(plan.rows), Simulation(results, {"shafts": known(plan.rows)}))
+        store.finish()
+    with Reader.open(tmp_path / "known.h5") as store:
+        orbits = orders_of(store.view()).orbits
+    for orbit in orbits:
+        axes = np.linalg.svd(orbit.force - orbit.force.mean(axis=0))[1] * np.sqrt(2 / SAMPLES)
+        if orbit.shaft == "input":
+            assert not orbit.force.any()
+        elif orbit.row % 2 == 0:
+            assert axes == pytest.approx([22, 22], rel=1e-6)
+        else:
+            assert axes == pytest.approx([22, 0], abs=1e-5)
+            assert np.ptp(np.linalg.norm(orbit.force - [5.0, 0.0], axis=1)) > 20
+        if orbit.near == "95 %":
+            largest = np.argsort(results["lateral_max"][1:, SHAFTS.index(orbit.shaft)])
+            assert orbit.row == 1 + largest[56]  # the 57th of 60 joints
+
+
+@pytest.mark.parametrize(
+    ("change", "asked"),
+    [
+        (("[limits]", "[limits]"), False),
+        (("[limits]", '[limits]\n"psi_2x" = 0.01'), True),
+        (("[limits]", '[limits]\n"input.axial" = "1 kN"'), True),
+        (("[limits]", f"[output]\nresults = [{OTHERS}, 'output.moment_max']\n[limits]"), True),
+        (("[limits]", f"[output]\nresults = [{OTHERS}]\n[limits]"), False),
+    ],
+)
+def test_the_page_shows_orders_where_the_study_asks_for_loads_of_the_shafts(tmp_path, change, asked):
+    path = synthetic.store(tmp_path, synthetic.STUDY.replace(*change))
+    with Reader.open(path) as store:
+        assert query.are_asked(store.view()) == asked
+        remarks = Asked(path)
+        found = section.sections(store.view(), remarks)
+    kept = "results" not in change[1]
+    assert [own.key for own in found] == (["orders"] if asked and kept else [])
+    assert bool(remarks.notes) == (asked and not kept)  # the study keeps no amplitudes
+
+
+def test_panels_are_of_each_quantity_and_shaft(slow):
+    with Reader.open(slow[1]) as store:
+        panels = rendering.panels(orders_of(store.view()))
+    quantities = ["input-lateral", "output-lateral", "input-moment", "output-moment", "input-drive", "psi"]
+    assert [panel.key for panel in panels] == [
+        *(f"orders-{name}" for name in quantities),
+        "orbit-input",
+        "orbit-output",
+    ]
+
+
+def test_command_prints_a_table_writes_files_and_refuses_files_without_amplitudes(slow, tmp_path):
+    done = run(slow[1], "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.stderr
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert [line.split()[0] for line in done.stdout.splitlines()[1:]][:5] == [
+        *(f"input.lateral_{n}x" for n in ORDERS),
+        "output.lateral_1x",
+    ]
+    orbits = pd.read_csv(tmp_path / "out" / "full_orbits.csv")
+    assert orbits.groupby(["shaft", "near"]).size().eq(SAMPLES).all()
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
+        f"full_{name}" for name in ("orbits.csv", "orders.csv", "orders.png", "orders.svg")
+    ]
+    found = json.loads(run(slow[1], "--json").stdout)
+    table = pd.read_csv(tmp_path / "out" / "full_orders.csv")
+    assert [row["q95"] for row in found["orders"]] == table["q95"].tolist()
+    few = synthetic.store(tmp_path, synthetic.STUDY.replace("[limits]", f"[output]\nresults = [{OTHERS}]\n[limits]"))
+    with Reader.open(few) as store, pytest.raises(StoreError, match="no amplitudes of orders"):
+        orders_of(store.view())

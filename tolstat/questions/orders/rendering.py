@@ -76,7 +76,7 @@ def note(found: Orders) -> str:
     else:
         lines = [f"{counts}; 95 % intervals"]
     if found.orbits:
-        lines.append(f"orbits: {', '.join(map(_joint, found.orbits))}; {ORIGIN[found.origin]}")
+        lines.append(f"{_which(found)}; {ORIGIN[found.origin]}")
     if found.apart:
         lines.append(
             f"largest loads of these joints differ by up to {found.apart:.1e} (relative) from the stored ones, which "
@@ -85,14 +85,19 @@ def note(found: Orders) -> str:
     return "\n".join(lines)
 
 
-def _joint(orbit: Orbit) -> str:
-    at = f" at {orbit.point}" if orbit.point else ""
-    return f"{orbit.shaft}{at} {ORBITS[orbit.near]} row {orbit.row}"
+def _which(found: Orders) -> str:
+    """Words on which joints the orbits are of."""
+    of_shaft: dict[str, list[str]] = {}
+    for own in found.orbits:
+        place = f"{own.shaft} shaft{f' at {own.point}' if own.point else ''}"
+        of_shaft.setdefault(place, []).append(f"{ORBITS[own.near]} row {own.row}")
+    parts = [f"{place} {', '.join(joints)}" for place, joints in of_shaft.items()]
+    return f"orbits: {'; '.join(parts)}; nearest in the largest lateral force"
 
 
 def panels(found: Orders) -> list[Panel]:
     """Pictures: amplitude over order of each quantity, then the orbit of each shaft."""
-    made = [_amplitudes(name, part) for name, part in found.table.groupby("quantity", sort=False)]
+    made = [_amplitudes(str(name), part) for name, part in found.table.groupby("quantity", sort=False)]
     for shaft in dict.fromkeys(orbit.shaft for orbit in found.orbits):
         own = [orbit for orbit in found.orbits if orbit.shaft == shaft]
         at = f", at {own[0].point}" if own[0].point else ""
@@ -160,7 +165,7 @@ def figure(found: Orders) -> Figure:
 def _amplitudes(name: str, part: pd.DataFrame) -> Panel:
     place, _, _ = name.rpartition(".")
     noun = part["noun"].iloc[0]
-    most = part.loc[part["qmedian"].idxmax()]
+    most = max(part.to_dict("records"), key=lambda row: float(row["qmedian"]))
     said = f"The median of the joints is largest at order {most['order']}, {text.value(most['qmedian'], most['unit'])}."
     where = f", {place} shaft" if place else ""
     return Panel(
@@ -208,7 +213,8 @@ def _orbits(ax: Axes, orbits: list[Orbit]) -> None:
         colour, dash = LOOKS[orbit.near]
         x, y = np.vstack([orbit.force, orbit.force[:1]]).T
         handles += ax.plot(x, y, color=colour, ls=dash)
-        ax.plot(x[0], y[0], "o", ms=6.0, color=colour)
+        small = orbit.near == "nominal"  # mostly a point at the centre, where other orbits pass
+        ax.plot(x[0], y[0], "o", ms=4.0 if small else 6.0, zorder=4 if small else 3, color=colour)
         k = max(1, len(orbit.force) // 12)
         if _largest(orbit) > SMALL * max(map(_largest, orbits)):
             head = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 16.0}

@@ -160,6 +160,33 @@ def test_a_force_that_turns_and_one_that_swings_have_orbits_with_the_same_semi_a
             assert orbit.row == 1 + largest[56]  # the 57th of 60 joints
 
 
+def test_of_several_points_an_amplitude_is_the_largest_and_an_orbit_that_of_the_point_that_matters_most(tmp_path):
+    before, after = SLOW.split("[operation]")
+    alpha, rest = after.split("[tolerances]")[0], "[tolerances]" + after.split("[tolerances]")[1]
+    points = (("flat", alpha.replace("25", "5")), ("bent", alpha))
+    text = before + "".join(f'[[operation]]\nname = "{name}"{own}' for name, own in points) + rest
+    (tmp_path / "two.toml").write_text(text.replace("n = 24", "n = 8"), encoding="utf-8")
+    tolstat.run(tolstat.load(tmp_path / "two.toml"), tmp_path / "two.h5", workers=1)
+    with Reader.open(tmp_path / "two.h5") as store:
+        view = store.view()
+        found, bent, flat = (orders_of(part) for part in (view, view.at("bent"), view.at("flat")))
+    tables = {name: one.table.set_index("load") for name, one in (("all", found), ("bent", bent), ("flat", flat))}
+    name = "input.moment_2x"
+    assert tables["all"].loc[name, "qmedian"] == tables["bent"].loc[name, "qmedian"]
+    assert tables["bent"].loc[name, "qmedian"] > 3 * tables["flat"].loc[name, "qmedian"]
+    for shaft in SHAFTS:
+        largest = {
+            one.orbits[0].point: max(np.abs(own.force).max() for own in one.orbits if own.shaft == shaft)
+            for one in (bent, flat)
+        }
+        shown = [own for own in found.orbits if own.shaft == shaft]
+        assert {own.point for own in shown} == {max(largest, key=lambda point: largest[point])}
+        of_point = (bent if shown[0].point == "bent" else flat).orbits
+        for own, alone in zip(shown, [own for own in of_point if own.shaft == shaft], strict=True):
+            np.testing.assert_array_equal(own.force, alone.force)
+    assert found.apart == 0.0
+
+
 @pytest.mark.parametrize(
     ("change", "asked"),
     [

@@ -212,9 +212,9 @@ def _orbits(ax: Axes, orbits: list[Orbit]) -> None:
     for orbit in orbits:
         colour, dash = LOOKS[orbit.near]
         x, y = np.vstack([orbit.force, orbit.force[:1]]).T
-        handles += ax.plot(x, y, color=colour, ls=dash)
         small = orbit.near == "nominal"  # mostly a point at the centre, where other orbits pass
-        ax.plot(x[0], y[0], "o", ms=4.0 if small else 6.0, zorder=4 if small else 3, color=colour)
+        size, order = (4.0, 4) if small else (6.0, 3)
+        handles += ax.plot(x, y, "o", markevery=[0], ms=size, zorder=order, color=colour, ls=dash)
         k = max(1, len(orbit.force) // 12)
         if _largest(orbit) > SMALL * max(map(_largest, orbits)):
             head = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 16.0}

@@ -17,7 +17,7 @@ from tolstat.common.load_kinds import ORDERS
 from tolstat.common.loads import unit_text
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Panel
-from tolstat.display.table import Column, Row
+from tolstat.display.table import Column, Row, has
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,31 +34,30 @@ ORBITS = {"nominal": "nominal joint", "median": "near median", "95 %": "near 95 
 """Labels of the orbits, by `Orbit.near`."""
 
 
-def _quantile(key: str) -> Callable[[Row], str]:
-    def cell(row: Row) -> str:
-        estimate, low, high = (row[f"q{key}{end}"] for end in ("", "_lower", "_upper"))
-        own = text.value(estimate, row["unit"])
-        return own if np.isnan(low) else f"{own} ({text.span_of(low, high, row['unit'])})"
+def _value(name: str) -> Callable[[Row], str]:
+    return lambda row: text.value(row[name], row["unit"])
 
-    return cell
+
+def _interval(key: str) -> Callable[[Row], str]:
+    return lambda row: text.span_of(row[f"q{key}_lower"], row[f"q{key}_upper"], row["unit"])
 
 
 COLUMNS = (
     Column("amplitude", lambda row: str(row["load"])),
-    Column(
-        "nominal joint",
-        lambda row: text.value(row["nominal"], row["unit"]) if row["nominal"] == row["nominal"] else "-",
-    ),
-    Column("5 %", _quantile("5"), rank=2),
-    Column("median", _quantile("median"), rank=1),
-    Column("95 %", _quantile("95")),
+    Column("nominal joint", _value("nominal")),
+    Column("5 %", _value("q5")),
+    Column("interval of 5 %", _interval("5"), shown=has("q5_lower"), rank=3),
+    Column("median", _value("qmedian")),
+    Column("interval of median", _interval("median"), shown=has("qmedian_lower"), rank=2),
+    Column("95 %", _value("q95")),
+    Column("interval of 95 %", _interval("95"), shown=has("q95_lower"), rank=1),
 )
 """Columns of the table `Orders.table`: quantiles over the joints with their intervals."""
 
 
 def note(found: Orders) -> str:
     """Notes to the table: number of joints, intervals, which joints the orbits are of."""
-    lines = [f"{found.joints} joints, {found.left_out} without a valid load left out; in brackets 95 % intervals"]
+    lines = [f"{found.joints} joints, {found.left_out} without a valid load left out; intervals are of 95 %"]
     if found.table["q95_lower"].isna().all():
         lines = [lines[0].partition(";")[0], "no intervals: the joints are not independent"]
     if found.orbits:
@@ -72,7 +71,7 @@ def note(found: Orders) -> str:
 
 def panels(found: Orders) -> list[Panel]:
     """Pictures: amplitude over order of each quantity, then the orbit of each shaft."""
-    made = [_amplitudes(name, part) for name, part in found.table.groupby("quantity", sort=False)]
+    made = [_amplitudes(str(name), part) for name, part in found.table.groupby("quantity", sort=False)]
     for shaft in dict.fromkeys(orbit.shaft for orbit in found.orbits):
         own = [orbit for orbit in found.orbits if orbit.shaft == shaft]
         made.append(

@@ -12,6 +12,7 @@ from tolstat import cli, sampling, study
 from tolstat.common.load_kinds import SHAFTS
 from tolstat.common.tables import Options, Simulation
 from tolstat.display.asked import Asked
+from tolstat.kernel.revolution.orders import semi_major
 from tolstat.questions.orders import query, rendering, section
 from tolstat.solver.simulation import history_specs
 from tolstat.store import Reader, ResultStore
@@ -158,3 +159,13 @@ def test_the_command_prints_json_and_writes_pictures(turning, tmp_path):
         own = rendering.points(query.orders_of(store.view()))
     assert len(own["theta"]) == 6 * STEPS
     assert own["f_x"][0] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    "vector", [lambda a: (np.cos(a), np.sin(a)), lambda a: (np.cos(a), -np.sin(a)), lambda a: (np.sin(a), 0.0 * a)]
+)
+def test_a_force_that_turns_and_one_that_swings_have_the_same_amplitude(vector):
+    angle = 2 * np.pi * np.arange(STEPS) / STEPS
+    x, y = (np.sum(22.0 * part * np.exp(-1j * angle)) for part in vector(angle))
+    found = semi_major((x.real, x.imag), (y.real, y.imag), STEPS)
+    assert found == pytest.approx(22.0, rel=1e-12)

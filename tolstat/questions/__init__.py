@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
     from tolstat.questions.lots.query import lots_of as lots_of
     from tolstat.questions.multifidelity.query import two_fidelities as two_fidelities
+    from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
     from tolstat.questions.selective.query import assembled as assembled
@@ -101,6 +102,7 @@ QUESTIONS = (
         has_section=True,
     ),
     Question("bearing_life", ("lives.lives_of",), "Read", ("bearing_life",), has_section=True, has_summary=True),
+    Question("orders", ("query.orders_of",), "Read", ("orders",), has_section=True),
     Question("accuracy", has_section=True, has_summary=True),
     Question("joints", has_section=True),
     Question("time_above", ("query.time_above",), "Read", ("time_above",)),

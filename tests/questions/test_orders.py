@@ -90,18 +90,26 @@ def test_quantiles_of_each_amplitude_with_their_order_statistics(invented):
         assert (row["q5_lower"], row["q95_upper"]) == (0.0, np.inf)  # too few joints
 
 
-def test_ideal_joint_has_even_orders_of_its_closed_form(slow):
-    """Moment T|sin(beta)|/cos(gamma) about the normal to the input pins, which turn with the shaft."""
-    with Reader.open(slow[0]) as store:
+def test_ideal_joint_has_the_even_orders_of_its_closed_forms(tmp_path):
+    """Moment T|sin(beta)|/cos(gamma) along the pins of the input fork, which turns by theta; torque T tau."""
+    path = tmp_path / "ideal.toml"
+    path.write_text(SLOW.replace("quasistatic", "ideal").replace("n = 24", "n = 2"), encoding="utf-8")
+    tolstat.run(tolstat.load(path), tmp_path / "ideal.h5", workers=1)
+    with Reader.open(tmp_path / "ideal.h5") as store:
         table = orders_of(store.view(), orbits=False).table.set_index("load")
-    alpha, theta = np.radians(25.0), 2 * np.pi * np.arange(720) / 720
-    beta, sine = np.arctan(np.tan(alpha) * np.sin(theta)), np.sin(alpha) * np.cos(theta)
-    moment = 100.0 * np.sin(beta) / np.sqrt(1 - sine**2)
-    curve = np.column_stack([-moment * np.sin(theta), moment * np.cos(theta)])
-    for n in ORDERS:
-        assert table.loc[f"input.moment_{n}x", "nominal"] == pytest.approx(semi_major(curve, n), abs=0.02)
-        assert table.loc[f"output.lateral_{n}x", "nominal"] < 0.1
-    assert table.loc["input.moment_2x", "nominal"] > 1000 * table.loc["input.moment_1x", "nominal"]
+    alpha = np.radians(25.0)
+    below = 1.0 - (np.sin(alpha) * np.cos(THETA)) ** 2
+    moment = 100.0 * np.sin(np.arctan(np.tan(alpha) * np.sin(THETA))) / np.sqrt(below)
+    curves = {
+        "input.moment": np.column_stack([-moment * np.sin(THETA), moment * np.cos(THETA)]),
+        "input.drive": np.column_stack([100.0 * np.cos(alpha) / below, 0.0 * THETA]),
+    }
+    for name, curve in curves.items():
+        assert semi_major(curve, 2) > 5.0
+        for n in ORDERS:
+            own = table.loc[f"{name}_{n}x", "nominal"]
+            assert own == pytest.approx(semi_major(curve, n), rel=1e-4, abs=1e-4), (name, n)
+    assert max(table.loc[f"output.lateral_{n}x", "nominal"] for n in ORDERS) < 1e-3
 
 
 def test_orbits_simulated_again_are_those_of_the_histories_and_have_the_stored_orders(slow):

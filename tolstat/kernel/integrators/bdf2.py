@@ -1,20 +1,33 @@
-"""BDF2 with variable step, applied to q' = v and v' = a (Hairer, Wanner: Solving ODEs I, III.5).
+"""BDF2 with variable step, applied to q' = v and v' = a (Hairer, Wanner: Solving ODEs I, III.5); the trapezoidal rule.
 
 At the new point (3 y_2 - 4 y_1 + y_0) / (2 h) approximates y', for equal steps; with r the ratio of the step to the one
 before, ((1+2r)/(1+r) y_2 - (1+r) y_1 + r^2/(1+r) y_0) / h. Zero-stable for r < 1 + sqrt(2). The first step is implicit
-Euler. Algebraic order 2, L-stable.
+Euler. Algebraic order 2, L-stable. The trapezoidal rule, y_1' = 2 (y_1 - y_0) / h - y_0', damps nothing: a closer look
+at ringing takes it, a few steps long.
 """
 
-from tolstat.kernel.integrators.state import AHEAD, H_OLD
+from tolstat.kernel.integrators.state import AHEAD, H_OLD, TRAPEZOIDAL
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
 
 @njit
-def formula(h, h_old):
-    """Return cv = dv/dq of a step `h` (s), and the weights (1/s) of the last two points in a derivative."""
+def formula(h, h_old, trapezoidal):
+    """Formula of a step `h` (s) after one of `h_old` (s).
+
+    Returns
+    -------
+    cv : float
+        dv/dq, 1/s.
+    b1, b2 : float
+        Weights of the last two points in a derivative, 1/s.
+    b3 : float
+        Weight of the last derivative.
+    """
     r = where(h_old > 0, h / h_old, 0.0)
-    return (1 + 2 * r) / (1 + r) / h, -(1 + r) / h, r * r / (1 + r) / h
+    rule = trapezoidal > 0
+    cv, b1 = where(rule, 2 / h, (1 + 2 * r) / (1 + r) / h), where(rule, -2 / h, -(1 + r) / h)
+    return cv, b1, where(rule, 0.0, r * r / (1 + r) / h), where(rule, -1.0, 0.0)
 
 
 @njit
@@ -32,16 +45,16 @@ def trial(h, of, last, before, known, ahead):
     known, ahead : bool, float
         Whether q is predicted by its expected change `ahead`, or else by a Taylor series.
     """
-    cv, b1, b2 = of
+    cv, b1, b2, b3 = of
     q = last[0] + where(known, ahead, h * (last[1] + 0.5 * h * last[2]))
-    v = cv * q + (b1 * last[0] + b2 * before[0])
-    return q, v, cv * v + (b1 * last[1] + b2 * before[1])
+    v = cv * q + (b1 * last[0] + b2 * before[0]) + b3 * last[1]
+    return q, v, cv * v + (b1 * last[1] + b2 * before[1]) + b3 * last[2]
 
 
 @njit
 def predict(h, state, options):
     """Write a trial point that satisfies the formula of a step `h` (s); return cv = dv/dq and ca = da/dq."""
-    of = formula(h, state.memory[H_OLD])
+    of = formula(h, state.memory[H_OLD], state.memory[TRAPEZOIDAL])
     known = state.memory[AHEAD] > 0
     for i in range(state.q.size):
         last, before = (state.q0[i], state.v0[i], state.a0[i]), (state.q1[i], state.v1[i])

@@ -7,11 +7,12 @@ import numpy as np
 STEPS, ITERATIONS, HALVINGS, FACTORISATIONS, ATTEMPTS_LEFT, ALLOWED = range(6)
 """Indices into ``State.counters``; `ALLOWED` is the number of iterations at which Newton's iteration gives up."""
 UNLIMITED = 2**62
-H_OLD, CV_FACTORISED, AHEAD, STAGED_STEP, LAST_ITERATION_BELOW, TOLERANCE, FORCE, TORQUE = range(8)
-MEMORY = 8
+H_OLD, CV_FACTORISED, AHEAD, STAGED_STEP, LAST_ITERATION_BELOW, TOLERANCE, FORCE, TORQUE, TRAPEZOIDAL = range(9)
+MEMORY = 9
 """Indices into ``State.memory``: last accepted step, s; cv of the tangent in use (0: none); whether `ahead` is used
 (1); length of the last step if its first stage is kept (else 0); weighted residual up to which one more iteration needs
-no check; for error-controlled steps: tolerance, and the force (N) and torque (N m) that errors are relative to."""
+no check; for error-controlled steps: tolerance, and the force (N) and torque (N m) that errors are relative to; whether
+BDF2 gives way to the trapezoidal rule (1)."""
 
 
 class State(NamedTuple):
@@ -30,7 +31,7 @@ class State(NamedTuple):
     residual: np.ndarray
     weight: np.ndarray  # factors that make residuals dimensionless
     ahead: np.ndarray  # expected change of q in the next step, where a better prediction than a Taylor series is known
-    memory: np.ndarray  # (8,) indices `H_OLD` to `TORQUE`
+    memory: np.ndarray  # (9,) indices `H_OLD` to `TRAPEZOIDAL`
     counters: np.ndarray  # (6,) steps, Newton iterations, halvings, factorisations, attempts at a step still allowed,
     # Newton iterations allowed
 

@@ -18,6 +18,7 @@ from tolstat.kernel.integrators.state import (
     MEMORY,
     STAGED_STEP,
     STEPS,
+    TRAPEZOIDAL,
 )
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
 from tolstat.kernel.mechanics.topology import N_DOF
@@ -136,6 +137,7 @@ def put_points(lane, state, control, motion):
         motion.q0[i, lane], motion.v0[i, lane], motion.a0[i, lane] = state.q0[i], state.v0[i], state.a0[i]
         motion.q1[i, lane], motion.v1[i, lane] = state.q1[i], state.v1[i]
     motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = state.memory[H_OLD], state.memory[AHEAD]
+    motion.memory[TRAPEZOIDAL, lane] = state.memory[TRAPEZOIDAL]
     motion.memory[LAST_ITERATION_BELOW, lane] = motion.memory[STAGED_STEP, lane] = 0.0
     control.passed[lane] = control.factorised[lane] = control.stage[lane] = 0.0
 

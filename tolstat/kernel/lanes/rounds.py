@@ -6,7 +6,7 @@ lanes that begin a step, stage or angle, and lanes whose trial point is accepted
 
 from tolstat.kernel.integrators import bdf2, trbdf2
 from tolstat.kernel.integrators.integrate import ROUNDOFF, SLOW, scaled_size
-from tolstat.kernel.integrators.state import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP
+from tolstat.kernel.integrators.state import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP, TRAPEZOIDAL
 from tolstat.kernel.lanes.batch import CHECK
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, ENOUGH, FAR
@@ -24,7 +24,7 @@ first_and_second, first, second = trbdf2.formula, trbdf2.first, trbdf2.second
 def begin_steps(begins, passed, motion, control):
     """Accept the last sub-step where it passed; predict the trial point of the next one where one begins (BDF2)."""
     h = control.h
-    of = formula(h, motion.memory[H_OLD])
+    of = formula(h, motion.memory[H_OLD], motion.memory[TRAPEZOIDAL])
     known = motion.memory[AHEAD] > 0
     for i in range(N_DOF):
         q, v, a, q0, v0 = motion.q[i], motion.v[i], motion.a[i], motion.q0[i], motion.v0[i]

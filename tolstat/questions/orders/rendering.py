@@ -15,7 +15,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
 from tolstat.common.load_kinds import ORDERS
-from tolstat.common.loads import unit_text
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Panel
 from tolstat.display.table import Column, Row, has
@@ -47,25 +46,24 @@ ORIGIN = {
 
 
 def _value(name: str) -> Callable[[Row], str]:
-    return lambda row: text.formed(row[name])
+    return lambda row: text.value(row[name], row["unit"])
 
 
 def _interval(key: str) -> Callable[[Row], str]:
-    return lambda row: text.ends(row[f"{key}_lower"], row[f"{key}_upper"], ".3g")
+    return lambda row: text.span_of(row[f"q{key}_lower"], row[f"q{key}_upper"], row["unit"])
 
 
 COLUMNS = (
     Column("amplitude", lambda row: str(row["load"])),
-    Column("unit", lambda row: unit_text(row["unit"]), words=True),
-    Column("nominal", _value("nominal")),
-    Column("5 %", _value("q5"), rank=1),
-    Column("interval of 5 %", _interval("q5"), shown=has("q5_lower"), rank=3),
+    Column("nominal joint", _value("nominal")),
+    Column("5 %", _value("q5")),
+    Column("interval of 5 %", _interval("5"), shown=has("q5_lower"), rank=3),
     Column("median", _value("qmedian")),
-    Column("interval of the median", _interval("qmedian"), shown=has("qmedian_lower"), rank=2),
+    Column("interval of median", _interval("median"), shown=has("qmedian_lower"), rank=2),
     Column("95 %", _value("q95")),
-    Column("interval of 95 %", _interval("q95"), shown=has("q95_lower")),
+    Column("interval of 95 %", _interval("95"), shown=has("q95_lower"), rank=1),
 )
-"""Columns of the table `Orders.table`: quantiles over the joints, each followed by its interval."""
+"""Columns of the table `Orders.table`: quantiles over the joints with their intervals."""
 
 
 def note(found: Orders) -> str:
